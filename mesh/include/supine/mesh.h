@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Triangle surfaces of lungs: load, weld, topology, measure, save.
+ *
+ * Inside the program a mesh is in millimetres and in the DICOM patient axes, LPS: +x left,
+ * +y posterior, +z head. */
+#ifndef SUPINE_MESH_H
+#define SUPINE_MESH_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <supine/status.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** The axes that a file's coordinates are in. */
+typedef enum supine_axes {
+  SUPINE_AXES_AUTO = 0, /**< the file's SPACE tag, LPS where it has none */
+  SUPINE_AXES_LPS,
+  SUPINE_AXES_RAS
+} supine_axes;
+
+/** A triangle surface. Zero-initialise; supine_mesh_free releases what load or make put there. */
+typedef struct supine_mesh {
+  size_t vertex_count;
+  double *vertices; /**< [vertex_count, 3] mm, LPS */
+  size_t triangle_count;
+  uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
+} supine_mesh;
+
+/** How to read a file. Zero-initialised means: axes and millimetres as the file says. */
+typedef struct supine_mesh_load_options {
+  supine_axes axes;
+  double millimetres_per_unit; /**< scale to mm; 0: 1 */
+} supine_mesh_load_options;
+
+/** What loading found and did. */
+typedef struct supine_mesh_report {
+  size_t file_vertices;         /**< vertices as the importer gave them */
+  size_t file_faces;            /**< faces as the importer gave them */
+  size_t welded_vertices;       /**< vertices that joined an earlier one at the same position */
+  size_t degenerate_faces;      /**< faces dropped: two corners at one vertex, or not a triangle */
+  size_t unreferenced_vertices; /**< vertices dropped: no triangle names them */
+  supine_axes axes;             /**< axes that were assumed for the file: LPS or RAS */
+  bool axes_from_tag;           /**< the file said so itself, with a SPACE tag */
+  bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
+  const char *likely_unit; /**< "m", "cm", "um", ... where the box cannot be a lung's in mm; else
+                                NULL. A string literal. */
+} supine_mesh_report;
+
+/** Reads one surface: everything that assimp reads; polygons are cut into triangles, all nodes of
+ * a scene are joined, vertices at the same position are welded in order of first appearance.
+ *
+ * @param path     file
+ * @param options  NULL: defaults
+ * @param mesh     zero-initialised; written on success alone
+ * @param report   optional
+ * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
+ * @retval SUPINE_ERROR_FORMAT  empty, truncated or malformed, or no importer for it
+ * @retval SUPINE_ERROR_MESH    no triangles, a coordinate that is not finite (vertex named)
+ * @retval SUPINE_ERROR_MEMORY
+ * Thread-safe: several files can load at once. */
+supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
+                               supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
+
+/** Frees the arrays and zeroes the struct; a zeroed struct is legal. */
+void supine_mesh_free(supine_mesh *mesh);
+
+/** The edges and vertex adjacency of a mesh. */
+typedef struct supine_topology {
+  size_t edge_count;
+  uint32_t *edges;           /**< [edge_count, 2] vertex pairs, first < second, sorted */
+  size_t boundary_edges;     /**< edges of one triangle */
+  size_t non_manifold_edges; /**< edges of three or more triangles */
+  size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
+  size_t component_count;    /**< connected components, over shared vertices */
+  uint32_t *component;       /**< [vertex_count] component of each vertex, 0 the first to appear */
+  long euler_characteristic; /**< V - E + F */
+  long genus;  /**< (2 * components - euler_characteristic) / 2 where closed, else -1 */
+  bool closed; /**< every edge joins exactly two triangles, consistently */
+} supine_topology;
+
+/** Finds edges and components. Linear in time and memory but for the sort of the edges.
+ * @param topology  zero-initialised; written on success alone
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_topology_create(const supine_mesh *mesh, supine_topology *topology);
+void supine_topology_free(supine_topology *topology);
+
+/** Enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed, positive where
+ * the triangles face outwards; meaningful on closed surfaces alone. */
+double supine_mesh_volume(const supine_mesh *mesh);
+
+/** Axis-aligned box, mm. */
+void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
+
+/** One third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
+void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
+
+/** What goes into a file beside the surface itself. */
+typedef struct supine_mesh_save_options {
+  supine_axes axes;    /**< of the file; AUTO: LPS. Written as its SPACE tag */
+  const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
+                            vector and its magnitude (mm) as point data */
+  const char *comment; /**< optional, one line */
+} supine_mesh_save_options;
+
+/** Writes the surface as the name's ending says: .ply (binary), .obj, .stl (binary), .vtp.
+ * The file appears whole or not at all: written to a temporary name beside it, then renamed.
+ * @retval SUPINE_ERROR_ARGUMENT  an ending that is none of these
+ * @retval SUPINE_ERROR_WRITE     no such folder, no permission, full disk */
+supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
+                               const supine_mesh_save_options *options, supine_error *error);
+
+/** True where `path` has an ending that supine_mesh_save writes. */
+bool supine_mesh_save_supports(const char *path);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

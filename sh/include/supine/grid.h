@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The Gauss-Legendre x equispaced quadrature rule on the sphere. */
+#ifndef SUPINE_GRID_H
+#define SUPINE_GRID_H
+
+#include <stddef.h>
+
+#include <supine/status.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** A rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) = z[j] and
+ * longitude 2 pi k / longitudes; its weight is weight[j] * 2 pi / longitudes. */
+typedef struct supine_sh_grid {
+  size_t latitudes;
+  size_t longitudes;
+  double *z;      /**< [latitudes] Gauss-Legendre nodes, descending: from +z to -z */
+  double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
+} supine_sh_grid;
+
+/** Makes the rule with the given numbers of latitudes and longitudes (at least 1 each).
+ * It integrates products of two functions of band L exactly where latitudes > L and
+ * longitudes > 2 L.
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
+
+/** Frees a rule; NULL is legal. */
+void supine_sh_grid_destroy(supine_sh_grid *grid);
+
+/** Unit direction (j, k). */
+void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * Status codes and error details, shared by every Supine library. */
+#ifndef SUPINE_STATUS_H
+#define SUPINE_STATUS_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Marks the symbols that a shared library shows. */
+#if defined(__GNUC__)
+#define SUPINE_API __attribute__((visibility("default")))
+#define SUPINE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define SUPINE_API
+#define SUPINE_PRINTF(text, first)
+#endif
+
+/** What a function has to say about its work. Zero is success. */
+typedef enum supine_status {
+  SUPINE_OK = 0,
+  SUPINE_ERROR_ARGUMENT,     /**< an argument is outside its documented range */
+  SUPINE_ERROR_MEMORY,       /**< an allocation failed */
+  SUPINE_ERROR_READ,         /**< a file is missing or cannot be read */
+  SUPINE_ERROR_FORMAT,       /**< a file's content breaks its format */
+  SUPINE_ERROR_MESH,         /**< a mesh cannot carry the computation */
+  SUPINE_ERROR_OPEN_SURFACE, /**< a volume was asked of a surface that encloses none */
+  SUPINE_ERROR_UNSUPPORTED,  /**< the feature is not in this build */
+  SUPINE_ERROR_WRITE,        /**< an output cannot be written */
+  SUPINE_ERROR_NUMERICAL,    /**< a computation did not converge or left its range */
+  SUPINE_ERROR_INTERRUPTED,  /**< the caller's progress function asked to stop */
+  SUPINE_STATUS_COUNT        /**< sentinel: the number of codes above */
+} supine_status;
+
+/** A sentence for a status; never NULL, also for values outside the enumeration. */
+SUPINE_API const char *supine_status_string(supine_status status);
+
+/** Where a function that fails leaves the detail: which file, which vertex, which remedy.
+ * Owned by the caller, passed last, and optional: NULL means that the detail is not wanted. */
+typedef struct supine_error {
+  supine_status status;
+  char message[512]; /**< one line, NUL-terminated, no trailing newline */
+} supine_error;
+
+/** Fills `error` (when not NULL) from a printf format, cut to fit, and returns `status`. */
+SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,
+                                          const char *format, ...) SUPINE_PRINTF(3, 4);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
