@@ -32,7 +32,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   *output = (supine_output){0};
   const size_t length = strlen(path);
   output->path = malloc(length + 1);
-  output->temporary = malloc(length + sizeof suffix);
+  output->temporary = calloc(1, length + sizeof suffix);
   if (output->path == NULL || output->temporary == NULL) {
     supine_output_abandon(output);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
