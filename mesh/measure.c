@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Volume, box and vertex areas of a surface. */
+#include <math.h>
+
+#include "internal.h"
+
+static void cross(const double a[3], const double b[3], double product[3]) {
+  product[0] = a[1] * b[2] - a[2] * b[1];
+  product[1] = a[2] * b[0] - a[0] * b[2];
+  product[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+double supine_mesh_volume(const supine_mesh *mesh) {
+  double minimum[3];
+  double maximum[3];
+  supine_mesh_box(mesh, minimum, maximum);
+  double sum = 0.0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    double p[3][3]; /* corners about the box centre, where they cancel least */
+    for (int k = 0; k < 3; ++k) {
+      const double *vertex = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)k];
+      for (int axis = 0; axis < 3; ++axis) {
+        p[k][axis] = vertex[axis] - 0.5 * (minimum[axis] + maximum[axis]);
+      }
+    }
+    double product[3];
+    cross(p[1], p[2], product);
+    sum += p[0][0] * product[0] + p[0][1] * product[1] + p[0][2] * product[2];
+  }
+  return sum / 6.0;
+}
+
+void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    minimum[axis] = mesh->vertex_count == 0 ? 0.0 : mesh->vertices[axis];
+    maximum[axis] = minimum[axis];
+  }
+  for (size_t i = 1; i < mesh->vertex_count; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = mesh->vertices[3 * i + (size_t)axis];
+      minimum[axis] = x < minimum[axis] ? x : minimum[axis];
+      maximum[axis] = x > maximum[axis] ? x : maximum[axis];
+    }
+  }
+}
+
+void supine_mesh_vertex_area(const supine_mesh *mesh, double *area) {
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    area[i] = 0.0;
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    const double *p = mesh->vertices + 3 * (size_t)corner[0];
+    double side[2][3];
+    for (int k = 0; k < 2; ++k) {
+      const double *q = mesh->vertices + 3 * (size_t)corner[k + 1];
+      for (int axis = 0; axis < 3; ++axis) {
+        side[k][axis] = q[axis] - p[axis];
+      }
+    }
+    double product[3];
+    cross(side[0], side[1], product);
+    const double third =
+        sqrt(product[0] * product[0] + product[1] * product[1] + product[2] * product[2]) / 6.0;
+    for (int k = 0; k < 3; ++k) {
+      area[corner[k]] += third;
+    }
+  }
+}

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The axes that a comment in a file's head names, as 3D Slicer writes them: SPACE=LPS. */
+#include <ctype.h>
+#include <string.h>
+#include <strings.h>
+
+#include "internal.h"
+
+/* The next place, from `at` on, where `word` stands with no letter or digit before it. */
+static const unsigned char *find_word(const unsigned char *at, const unsigned char *end,
+                                      const unsigned char *begin, const char *word) {
+  const size_t length = strlen(word);
+  for (; (size_t)(end - at) >= length; ++at) {
+    if (strncasecmp((const char *)at, word, length) == 0 && (at == begin || !isalnum(at[-1]))) {
+      return at;
+    }
+  }
+  return NULL;
+}
+
+static bool ends_word(const unsigned char *at, const unsigned char *end) {
+  return at == end || !isalnum(*at);
+}
+
+static bool is_axes(const unsigned char *at, const unsigned char *end, const char *axes) {
+  return end - at >= 3 && strncasecmp((const char *)at, axes, 3) == 0 && ends_word(at + 3, end);
+}
+
+mesh_space mesh_space_find(const unsigned char *text, size_t size) {
+  static const char tag[] = "SPACE=";
+  const unsigned char *end = text + size;
+  const unsigned char *at = find_word(text, end, text, tag);
+  if (at == NULL) {
+    return MESH_SPACE_NONE;
+  }
+  at += sizeof tag - 1;
+  return is_axes(at, end, "LPS")   ? MESH_SPACE_LPS
+         : is_axes(at, end, "RAS") ? MESH_SPACE_RAS
+                                   : MESH_SPACE_FOREIGN;
+}
+
+bool mesh_space_mentions_ras(const unsigned char *text, size_t size) {
+  const unsigned char *end = text + size;
+  const unsigned char *at = text;
+  while ((at = find_word(at, end, text, "RAS")) != NULL) {
+    if (ends_word(at + 3, end)) {
+      return true;
+    }
+    ++at;
+  }
+  return false;
+}
