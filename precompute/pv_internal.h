@@ -32,14 +32,15 @@ typedef struct pv_origin {
   const double *volumes;   /* [count] */
 } pv_origin;
 
-/* Enough samples, finite, pressures strictly rising or falling, volumes not all the same. */
+/* Enough samples, finite, pressures strictly rising or falling, volume higher at the end. */
 supine_status supine_pv_samples_check(const pv_origin *origin, supine_error *error);
 
 /* Least and greatest pressure, volumes at these, and the span of the volumes, mL. */
 void supine_pv_samples_range(const pv_origin *origin, supine_pv_curve *curve, double *span);
 
-/* Whether some volume falls, while pressure rises, further back from the local trend than
- * `allowed`; `v` are the volumes by rising pressure, in the unit of `allowed`. */
+/* Whether some volume falls, while pressure rises, by more than `allowed` from the local trend or
+ * from the greatest volume before it; `v` are the volumes by rising pressure, in the unit of
+ * `allowed`. */
 supine_status supine_pv_check_falls(const pv_origin *origin, const double *v, double allowed,
                                     supine_error *error);
 

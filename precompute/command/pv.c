@@ -166,6 +166,12 @@ static int run_fit(const char *path, const options *chosen) {
   if (status != SUPINE_OK) {
     return command_fail(status, &error);
   }
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    if (reports[limb].rms_percent > 1.0) {
+      (void)fprintf(stderr, "supine pv: note: the %s samples scatter %.2g %% about their curve\n",
+                    supine_pv_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
+    }
+  }
   if (chosen->json) {
     print_json(&pv, reports, chosen->confidence);
     return command_finish();

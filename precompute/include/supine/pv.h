@@ -73,9 +73,10 @@ const char *supine_pv_limb_name(supine_pv_limb limb);
  *
  * Exhale: Salazar-Knowles with k = ln 2 / 7.58 cmH2O, the mean half-inflation pressure of 20 normal
  * subjects [Salazar1964], and 6000 mL, an adult's total lung capacity, at 30 cmH2O. Inhale: a
- * Venegas sigmoid between the same ends with c = 9 and d = 5 cmH2O; b d = 35,600 mL cmH2O lies in
- * the 10^4 to 10^5 that Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found over published curves,
- * but c and d are round numbers, no mean of measured lungs. */
+ * Venegas sigmoid between the same ends with c = 10 and d = 6 cmH2O, which stays under the exhale
+ * limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that Narusawa (J. Appl. Physiol. 91,
+ * 2001, 201-210) found over published curves, but c and d are round numbers, no mean of measured
+ * lungs. */
 const supine_pv *supine_pv_normal(void);
 
 /** Whether a limb's numbers are finite, its ranges rise and its parameters are within bounds.
@@ -124,10 +125,10 @@ typedef struct supine_pv_report {
  * range the samples say little about some parameters: those stop at +-SUPINE_PV_CONTROL_MAX at the
  * latest and their intervals are wide, while the curve itself still fits.
  *
- * Pressures must rise or fall strictly. Volumes must rise with pressure, but for falls that noise
- * explains: a step back from the local trend of up to 8 % of the volume range, or up to 7 sigma of
- * the difference of two samples, sigma estimated robustly from the misfit, where at least 15
- * samples tell it.
+ * Pressures must rise or fall strictly. Volumes must rise with pressure, but for noise: a sample
+ * may step back from the local trend, or from the greatest volume so far, by up to 8 % of the
+ * volume range and, where at least 15 samples tell what the noise is, by up to 7 sigma of the
+ * difference of two samples, sigma estimated from the median misfit.
  *
  * @param count       more than SUPINE_PV_UNKNOWNS
  * @param pressures   [count] cmH2O
