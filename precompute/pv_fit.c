@@ -134,7 +134,8 @@ supine_status supine_pv_fit(size_t count, const double *pressures, const double 
                             const size_t *lines, const char *name, double confidence,
                             supine_pv_curve *curve, supine_pv_report *report, supine_error *error) {
   enum { TELLING = 15 }; /* samples that let noise be estimated beside the unknowns */
-  static const double allowed_share = 0.08;
+  static const double allowed_share_few = 0.08;
+  static const double allowed_share = 0.15;
   static const double allowed_sigmas = 7.0;
   if (!(confidence > 0.0 && confidence < 1.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "confidence %g is not between 0 and 1",
@@ -159,7 +160,8 @@ supine_status supine_pv_fit(size_t count, const double *pressures, const double 
     goto cleanup;
   }
   problem_fill(&limb, pressures, volumes, &found, span);
-  status = supine_pv_check_falls(&origin, limb.v, allowed_share, error);
+  status = supine_pv_check_falls(&origin, limb.v,
+                                 count < TELLING ? allowed_share_few : allowed_share, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

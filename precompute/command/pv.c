@@ -22,7 +22,7 @@ static const char help[] =
     "fit   finds the five control parameters of each limb from samples, and says how sure they "
     "are\n"
     "      and how far the curve misses the samples (RMS, in mL and as a percentage of the volume\n"
-    "      range; measured limbs are followed to under 1 %).\n"
+    "      range; Venegas' and Salazar-Knowles' curves are followed to under 1 %).\n"
     "show  prints volume and compliance against pressure as CSV; without FILE, of the built-in\n"
     "      normal adult lung.\n"
     "\n"
@@ -102,22 +102,34 @@ typedef struct options {
   bool json;
 } options;
 
+/* What is not finite is null, as JSON has no word for it. */
+static void print_json_number(const char *before, double number) {
+  (void)fputs(before, stdout);
+  if (isfinite(number)) {
+    (void)printf("%.17g", number);
+  } else {
+    (void)fputs("null", stdout);
+  }
+}
+
+static void print_json_numbers(const char *before, size_t count, const double *numbers) {
+  for (size_t i = 0; i < count; ++i) {
+    print_json_number(i == 0 ? before : ", ", numbers[i]);
+  }
+  (void)putchar(']');
+}
+
 static void print_json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
-  (void)printf("{\"samples\": %zu, \"pressure_cmH2O\": [%.17g, %.17g], "
-               "\"volume_mL\": [%.17g, %.17g], \"control\": [",
-               report->samples, curve->pressure[0], curve->pressure[1], curve->volume[0],
-               curve->volume[1]);
-  for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
-    (void)printf("%s%.17g", i == 0 ? "" : ", ", curve->control[i]);
-  }
-  (void)printf("], \"control_interval\": [");
-  for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
-    (void)printf("%s%.17g", i == 0 ? "" : ", ", report->control_interval[i]);
-  }
-  (void)printf("], \"volume_interval_mL\": [%.17g, %.17g], \"rms_mL\": %.17g, "
-               "\"rms_percent\": %.17g, \"condition\": %.17g}",
-               report->volume_interval[0], report->volume_interval[1], report->rms,
-               report->rms_percent, report->condition);
+  (void)printf("{\"samples\": %zu", report->samples);
+  print_json_numbers(", \"pressure_cmH2O\": [", 2, curve->pressure);
+  print_json_numbers(", \"volume_mL\": [", 2, curve->volume);
+  print_json_numbers(", \"volume_interval_mL\": [", 2, report->volume_interval);
+  print_json_numbers(", \"control\": [", SUPINE_PV_CONTROLS, curve->control);
+  print_json_numbers(", \"control_interval\": [", SUPINE_PV_CONTROLS, report->control_interval);
+  print_json_number(", \"rms_mL\": ", report->rms);
+  print_json_number(", \"rms_percent\": ", report->rms_percent);
+  print_json_number(", \"condition\": ", report->condition);
+  (void)putchar('}');
 }
 
 static void print_json(const supine_pv *pv, const supine_pv_report *reports, double confidence) {

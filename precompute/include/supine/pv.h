@@ -123,12 +123,13 @@ typedef struct supine_pv_report {
  * V to each basis function; covariance and Student-t intervals follow from the responses at the
  * minimum. The range of the limb is that of the samples. Where a limb is flat over much of its
  * range the samples say little about some parameters: those stop at +-SUPINE_PV_CONTROL_MAX at the
- * latest and their intervals are wide, while the curve itself still fits.
+ * latest and their intervals are wide, while the curve itself still fits. Samples that no lung
+ * gives, such as a single step, end there too: `rms_percent` tells.
  *
  * Pressures must rise or fall strictly. Volumes must rise with pressure, but for noise: a sample
  * may step back from the local trend, or from the greatest volume so far, by up to 8 % of the
- * volume range and, where at least 15 samples tell what the noise is, by up to 7 sigma of the
- * difference of two samples, sigma estimated from the median misfit.
+ * volume range. Where at least 15 samples tell what the noise is, by up to 7 sigma of the
+ * difference of two samples, sigma estimated from the median misfit, and never more than 15 %.
  *
  * @param count       more than SUPINE_PV_UNKNOWNS
  * @param pressures   [count] cmH2O
