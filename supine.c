@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The program: picks the command. */
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -17,6 +18,7 @@ static const struct {
     {"info", supine_command_info, "say what a basis file holds and how exact it is"},
     {"deform", supine_command_deform, "deform a basis for a posture and a volume"},
     {"solve", supine_command_solve, "full physics for one posture: the reference"},
+    {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
@@ -42,32 +44,19 @@ static void print_help(void) {
              "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
 }
 
-int main(int argc, char **argv) {
-  (void)gsl_set_error_handler_off();
-  if (argc < 2) {
-    print_help();
-    return SUPINE_EXIT_USAGE;
+/* Position of a command in the table, or COMMAND_COUNT. */
+static size_t find_command(const char *name) {
+  size_t i = 0;
+  while (i < COMMAND_COUNT && strcmp(name, commands[i].name) != 0) {
+    ++i;
   }
-  const char *name = argv[1];
-  if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
-    if (argc > 2) { /* supine help COMMAND */
-      argv[1] = argv[2];
-      argv[2] = (char[]){"--help"};
-      return main(argc, argv);
-    }
-    print_help();
-    return supine_command_finish("help");
-  }
-  if (strcmp(name, "--version") == 0) {
-    (void)puts("supine " SUPINE_VERSION);
-    return supine_command_finish("version");
-  }
+  return i;
+}
+
+static int unknown_command(const char *name) {
   const char *names[COMMAND_COUNT];
   for (size_t i = 0; i < COMMAND_COUNT; ++i) {
     names[i] = commands[i].name;
-    if (strcmp(name, names[i]) == 0) {
-      return commands[i].function(argc - 1, argv + 1);
-    }
   }
   const char *nearest = supine_suggest(name, names, COMMAND_COUNT);
   if (nearest != NULL) {
@@ -76,4 +65,34 @@ int main(int argc, char **argv) {
     (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists them\n", name);
   }
   return SUPINE_EXIT_USAGE;
+}
+
+int main(int argc, char **argv) {
+  (void)gsl_set_error_handler_off();
+  if (argc < 2) {
+    print_help();
+    return SUPINE_EXIT_USAGE;
+  }
+  const char *name = argv[1];
+  const bool help =
+      strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0;
+  if (help && argc == 2) {
+    print_help();
+    return supine_command_finish("help");
+  }
+  if (strcmp(name, "--version") == 0) {
+    (void)puts("supine " SUPINE_VERSION);
+    return supine_command_finish("version");
+  }
+  const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
+  const size_t index = find_command(wanted);
+  if (index == COMMAND_COUNT) {
+    return unknown_command(wanted);
+  }
+  if (help) {
+    char option[] = "--help";
+    char *arguments[] = {argv[2], option, NULL};
+    return commands[index].function(2, arguments);
+  }
+  return commands[index].function(argc - 1, argv + 1);
 }

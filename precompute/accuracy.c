@@ -7,6 +7,7 @@
 #include <supine/accuracy.h>
 #include <supine/parallel.h>
 #include <supine/sh.h>
+#include <supine/volume.h>
 
 #include "internal.h"
 
@@ -146,9 +147,8 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
   for (size_t d = 0; d < truth->direction_count; ++d) {
     double cubic[3];
     supine_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
-    scales[2 * d] = supine_volume_root(truth->cubic + 3 * d, volume);
-    scales[2 * d + 1] = supine_volume_root(cubic, volume);
-    if (!isfinite(scales[2 * d]) || !isfinite(scales[2 * d + 1])) {
+    if (supine_volume_scale(truth->cubic + 3 * d, volume, &scales[2 * d], NULL) != SUPINE_OK ||
+        supine_volume_scale(cubic, volume, &scales[2 * d + 1], NULL) != SUPINE_OK) {
       return false;
     }
   }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include <supine/parallel.h>
+#include <supine/volume.h>
 #include <supine/volume_forms.h>
 
 #include "internal.h"
@@ -203,23 +204,7 @@ void supine_volume_forms_contract(const supine_volume_forms *forms, const double
   const size_t n = forms->column_count;
   cubic[0] = cubic[1] = cubic[2] = 0.0;
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
-    const double *l = forms->linear + lung * n;
-    const double *q = forms->quadratic + lung * n * n;
-    const double *t = forms->cubic + lung * n * n * n;
-    for (size_t i = 0; i < n; ++i) {
-      double square = 0.0;
-      double cube = 0.0;
-      for (size_t j = 0; j < n; ++j) {
-        double inner = 0.0;
-        for (size_t k = 0; k < n; ++k) {
-          inner += t[(i * n + j) * n + k] * weights[k];
-        }
-        square += q[i * n + j] * weights[j];
-        cube += inner * weights[j];
-      }
-      cubic[0] += l[i] * weights[i];
-      cubic[1] += square * weights[i];
-      cubic[2] += cube * weights[i];
-    }
+    supine_volume_add(n, forms->linear + lung * n, forms->quadratic + lung * n * n,
+                      forms->cubic + lung * n * n * n, weights, cubic);
   }
 }

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine pv: fit a lung's pressure-volume relation to samples, and show one. */
-#include <getopt.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <supine/pv.h>
 
-int supine_command_pv(int argc, char **argv);
+#include "../../runtime/command/command.h"
+
+static const char command[] = "pv";
 
 static const char help[] =
     "Usage: supine pv fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
@@ -60,39 +59,8 @@ static const char help[] =
     "  supine breathe lungs.safetensors --pv patient.pv.csv -o breath.pvd\n"
     "  supine pv show patient.pv.csv --step 0.5 > curve.csv\n";
 
-/* Exit codes of the program. */
-static int command_fail(supine_status status, const supine_error *error) {
-  (void)fprintf(stderr, "supine pv: %s\n", error->message);
-  switch (status) {
-  case SUPINE_ERROR_WRITE:
-    return 4;
-  case SUPINE_ERROR_NUMERICAL:
-  case SUPINE_ERROR_MEMORY:
-    return 5;
-  case SUPINE_ERROR_ARGUMENT:
-    return 1;
-  default:
-    return 2;
-  }
-}
-
-static int command_usage(const char *message, const char *what) {
-  (void)fprintf(stderr, "supine pv: %s%s; see supine pv --help\n", message, what);
-  return 1;
-}
-
-static int command_finish(void) {
-  if (fflush(stdout) != 0 || ferror(stdout) != 0) {
-    (void)fputs("supine pv: cannot write to standard output\n", stderr);
-    return 4;
-  }
-  return 0;
-}
-
 static bool parse_positive(const char *text, double *number) {
-  char *end = NULL;
-  *number = strtod(text, &end);
-  return end != text && *end == '\0' && isfinite(*number) && *number > 0.0;
+  return supine_parse_number(text, number) && *number > 0.0;
 }
 
 typedef struct options {
@@ -176,23 +144,23 @@ static int run_fit(const char *path, const options *chosen) {
     status = supine_pv_save(chosen->output, &pv, &error);
   }
   if (status != SUPINE_OK) {
-    return command_fail(status, &error);
+    return supine_command_fail(command, &error);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].rms_percent > 1.0) {
-      (void)fprintf(stderr, "supine pv: note: the %s samples scatter %.2g %% about their curve\n",
-                    supine_pv_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
+      supine_command_say(command, "note: the %s samples scatter %.2g %% about their curve",
+                         supine_pv_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
     }
   }
   if (chosen->json) {
     print_json(&pv, reports, chosen->confidence);
-    return command_finish();
+    return supine_command_finish(command);
   }
   (void)printf("intervals at %g %% confidence\n", 100.0 * chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     print_limb(supine_pv_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
   }
-  return command_finish();
+  return supine_command_finish(command);
 }
 
 /* One row of show; nothing where the pressure is outside a limb. */
@@ -223,13 +191,13 @@ static int run_show(const char *path, const options *chosen) {
   supine_pv pv = *supine_pv_normal();
   supine_status status = path != NULL ? supine_pv_load(path, &pv, &error) : SUPINE_OK;
   if (status != SUPINE_OK) {
-    return command_fail(status, &error);
+    return supine_command_fail(command, &error);
   }
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
   const double steps = (high - low) / chosen->step;
   if (!(steps < ROWS_MAX)) {
-    return command_usage("--step is too small for this range", "");
+    return supine_command_usage(command, "--step is too small for this range");
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
@@ -238,7 +206,7 @@ static int run_show(const char *path, const options *chosen) {
   if (status == SUPINE_OK) {
     status = print_row(&pv, high, &error);
   }
-  return status == SUPINE_OK ? command_finish() : command_fail(status, &error);
+  return status == SUPINE_OK ? supine_command_finish(command) : supine_command_fail(command, &error);
 }
 
 int supine_command_pv(int argc, char **argv) {
@@ -247,17 +215,17 @@ int supine_command_pv(int argc, char **argv) {
       {"json", no_argument, NULL, 'j'},         {"step", required_argument, NULL, 's'},
       {"help", no_argument, NULL, 'h'},         {NULL, 0, NULL, 0}};
   options chosen = {.output = NULL, .confidence = 0.95, .step = 1.0, .json = false};
-  optind = 0; /* begin anew, options and words in any order */
   int option = 0;
-  /* NOLINTNEXTLINE(concurrency-mt-unsafe): one thread reads the command line */
-  while ((option = getopt_long(argc, argv, "o:c:js:h", names, NULL)) != -1) {
+  optind = 0; /* begin anew, options and words in any order */
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, ":o:c:js:h", names, NULL)) != -1) {
     switch (option) {
     case 'o':
       chosen.output = optarg;
       break;
     case 'c':
       if (!parse_positive(optarg, &chosen.confidence) || chosen.confidence >= 1.0) {
-        return command_usage("--confidence wants a number between 0 and 1, not ", optarg);
+        return supine_command_usage(command, "--confidence wants a number between 0 and 1, not '%s'", optarg);
       }
       break;
     case 'j':
@@ -265,25 +233,26 @@ int supine_command_pv(int argc, char **argv) {
       break;
     case 's':
       if (!parse_positive(optarg, &chosen.step)) {
-        return command_usage("--step wants a positive number of cmH2O, not ", optarg);
+        return supine_command_usage(command, "--step wants a positive number of cmH2O, not '%s'", optarg);
       }
       break;
     case 'h':
       (void)fputs(help, stdout);
-      return command_finish();
+      return supine_command_finish(command);
     default:
-      return command_usage("cannot read the options", "");
+      return supine_command_bad_option(command, names, option, argv);
     }
   }
   const int words = argc - optind;
   const char *verb = words > 0 ? argv[optind] : "";
   if (strcmp(verb, "fit") == 0) {
     return words == 2 ? run_fit(argv[optind + 1], &chosen)
-                      : command_usage("fit wants one file of samples", "");
+                      : supine_command_usage(command, "fit wants one file of samples");
   }
   if (strcmp(verb, "show") == 0) {
     return words <= 2 ? run_show(words == 2 ? argv[optind + 1] : NULL, &chosen)
-                      : command_usage("show wants at most one file of parameters", "");
+                      : supine_command_usage(command, "show wants at most one file of parameters");
   }
-  return command_usage(words > 0 ? "fit or show, not " : "fit or show what?", verb);
+  return words > 0 ? supine_command_usage(command, "fit or show, not '%s'", verb)
+                   : supine_command_usage(command, "fit or show what?");
 }

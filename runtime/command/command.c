@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +49,7 @@ void supine_command_say(const char *command, const char *format, ...) {
 
 int supine_command_fail(const char *command, const supine_error *error) {
   supine_command_say(command, "%s", error->message);
-  return supine_exit_code(error->status);
+  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL : supine_exit_code(error->status);
 }
 
 int supine_command_usage(const char *command, const char *format, ...) {

@@ -28,6 +28,7 @@ supine_command_function supine_command_precompute;
 supine_command_function supine_command_info;
 supine_command_function supine_command_deform;
 supine_command_function supine_command_solve;
+supine_command_function supine_command_pv;
 
 /* The exit code that a status ends the program with. */
 int supine_exit_code(supine_status status);

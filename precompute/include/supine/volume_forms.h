@@ -46,10 +46,6 @@ supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const do
 void supine_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                   double cubic[3]);
 
-/** The scale s nearest 0 at which cubic[0] s + cubic[1] s^2 + cubic[2] s^3 = volume, reached from
- * 0 without the volume turning back; NAN where there is none. */
-double supine_volume_root(const double cubic[3], double volume);
-
 #ifdef __cplusplus
 }
 #endif
