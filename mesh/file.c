@@ -106,7 +106,7 @@ supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *er
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  file->head = file->size;
+  mesh_space_note(file, file->size);
   const char *ending = ending_of(path);
   if (!format_of_ending(ending, &file->format) &&
       !format_of_bytes(file->bytes, file->size, &file->format)) {

@@ -57,6 +57,9 @@ supine_status mesh_guard_off(mesh_file *file, supine_error *error) {
   mesh_text line;
   uint64_t vertices = 0;
   uint64_t faces = 0;
+  if (!mesh_guard_text(file, error)) {
+    return SUPINE_ERROR_FORMAT;
+  }
   if (!read_counts(&text, &vertices, &faces)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: does not begin with OFF and the counts of vertices and faces",

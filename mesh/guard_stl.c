@@ -53,13 +53,13 @@ supine_status mesh_guard_stl(mesh_file *file, supine_error *error) {
   const bool has_count = file->size >= STL_HEADER + 4;
   const size_t promised = has_count ? STL_HEADER + 4 + STL_FACET * binary_facets(file) : 0;
   if (has_count && promised == file->size) {
-    file->head = STL_HEADER;
+    mesh_space_note(file, STL_HEADER);
     file->faces = binary_facets(file);
     file->whole = file->faces > 0;
     return SUPINE_OK;
   }
   if (is_text(file)) {
-    return check_text(file, error);
+    return mesh_guard_text(file, error) ? check_text(file, error) : SUPINE_ERROR_FORMAT;
   }
   if (!has_count) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,

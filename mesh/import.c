@@ -34,8 +34,26 @@ static supine_status import_fail(const mesh_file *file, const char *words, supin
                           length == 0 ? "the importer failed" : line);
 }
 
-static supine_status read_scene(const mesh_file *file, const struct aiScene **scene,
+/* The bytes that a guard has seen; a path where none has. */
+static const struct aiScene *import(const mesh_file *file,
+                                    const struct aiPropertyStore *properties) {
+  static const char *const hints[] = {[MESH_FORMAT_PLY] = "ply",
+                                      [MESH_FORMAT_STL] = "stl",
+                                      [MESH_FORMAT_OBJ] = "obj",
+                                      [MESH_FORMAT_OFF] = "off"};
+  if (file->format == MESH_FORMAT_OTHER) {
+    return aiImportFileExWithProperties(file->path, 0, NULL, properties);
+  }
+  return aiImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size, 0,
+                                              hints[file->format], properties);
+}
+
+static supine_status read_scene(mesh_file *file, const struct aiScene **scene,
                                 supine_error *error) {
+  if (file->size > UINT32_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: larger than 4 GiB; reduce the mesh first", file->path);
+  }
   struct aiPropertyStore *properties = aiCreatePropertyStore();
   if (properties == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
@@ -48,12 +66,15 @@ static supine_status read_scene(const mesh_file *file, const struct aiScene **sc
     (void)pthread_rwlock_wrlock(&import_lock);
   }
   supine_status status = SUPINE_OK;
-  *scene = aiImportFileExWithProperties(file->path, 0, NULL, properties);
+  *scene = import(file, properties);
   if (*scene == NULL) {
     status = import_fail(file, file->whole ? NULL : aiGetErrorString(), error);
   }
   (void)pthread_rwlock_unlock(&import_lock);
   aiReleasePropertyStore(properties);
+  free(file->bytes);
+  file->bytes = NULL;
+  file->size = 0;
   return status;
 }
 
@@ -161,7 +182,7 @@ static void add_node(const struct aiScene *scene, const struct aiNode *node,
   }
 }
 
-supine_status mesh_import(const mesh_file *file, supine_mesh *mesh, size_t *dropped,
+supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                           supine_error *error) {
   supine_mesh joined = {0};
   const struct aiScene *scene = NULL;

@@ -40,56 +40,61 @@ typedef enum mesh_format {
   MESH_FORMAT_OFF
 } mesh_format;
 
+/** The axes that a SPACE tag names. */
+typedef enum mesh_space {
+  MESH_SPACE_NONE = 0, /**< no tag */
+  MESH_SPACE_LPS,
+  MESH_SPACE_RAS,
+  MESH_SPACE_FOREIGN /**< a tag of other axes */
+} mesh_space;
+
 /** A file on its way in. */
 typedef struct mesh_file {
   const char *path;
   mesh_format format;
   unsigned char *bytes; /**< all of PLY, STL, OBJ and OFF, the head of others */
   size_t size;
-  size_t head;  /**< bytes that may hold comments: a PLY's header, an STL's 80 bytes, ... */
-  size_t faces; /**< faces that the file promises, SIZE_MAX where it does not say */
-  bool whole;   /**< checked byte for byte: the importer cannot fail on it */
+  mesh_space space;
+  bool mentions_ras; /**< the word RAS stands in a comment */
+  size_t faces;      /**< faces that the file promises, SIZE_MAX where it does not say */
+  bool whole;        /**< checked byte for byte: the importer cannot fail on it */
 } mesh_file;
 
 /** Opens, tells the format from the ending (or, without a known one, the first bytes), reads. */
 supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *error);
 void mesh_file_free(mesh_file *file);
 
+/* ---- space.c ---- */
+
+/** Looks for SPACE=LPS, SPACE=RAS and the word RAS in the first `size` bytes, and sets space and
+ * mentions_ras. */
+void mesh_space_note(mesh_file *file, size_t size);
+
 /* ---- guard*.c: is the file as long and as large as it says? The importers believe the counts in
  * a file: they read past the end of some, take gigabytes for others, and read words that are no
- * numbers as 0. Each guard returns SUPINE_ERROR_FORMAT with the place. ---- */
+ * numbers as 0. Each guard returns SUPINE_ERROR_FORMAT with the place, notes the SPACE tag, and
+ * may take out of the bytes what importers misread or what would make them open other files. ----
+ */
 
 supine_status mesh_guard_ply(mesh_file *file, supine_error *error);
 supine_status mesh_guard_stl(mesh_file *file, supine_error *error);
 supine_status mesh_guard_obj(mesh_file *file, supine_error *error);
 supine_status mesh_guard_off(mesh_file *file, supine_error *error);
+/** Line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
+bool mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- import.c: the surface as assimp gives it: all nodes joined, polygons cut. ---- */
 
 /** @param mesh     file's units and axes, not welded; written on success alone
- *  @param dropped  points and lines */
-supine_status mesh_import(const mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                          supine_error *error);
+ *  @param dropped  points and lines
+ *  Frees the file's bytes as soon as it can. */
+supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped, supine_error *error);
 
 /* ---- weld.c ---- */
 
 /** Welds vertices of equal bits (the caller has made every -0 a 0), drops triangles with two
  * corners at one vertex, then vertices without a triangle. Works in place; counts are added to. */
 supine_status mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
-
-/* ---- space.c ---- */
-
-typedef enum mesh_space {
-  MESH_SPACE_NONE = 0,
-  MESH_SPACE_LPS,
-  MESH_SPACE_RAS,
-  MESH_SPACE_FOREIGN /**< a tag of other axes */
-} mesh_space;
-
-/** Finds SPACE=LPS or SPACE=RAS, in any case. */
-mesh_space mesh_space_find(const unsigned char *text, size_t size);
-/** Does the word RAS stand there? */
-bool mesh_space_mentions_ras(const unsigned char *text, size_t size);
 
 /* ---- unit.c ---- */
 

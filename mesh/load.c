@@ -23,7 +23,7 @@ static supine_status guard(mesh_file *file, supine_error *error) {
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
                                  supine_mesh_report *report, supine_error *error) {
-  const mesh_space tag = mesh_space_find(file->bytes, file->head);
+  const mesh_space tag = file->space;
   if (asked != SUPINE_AXES_AUTO) {
     report->axes = asked;
     return SUPINE_OK;
@@ -36,8 +36,7 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   }
   report->axes = tag == MESH_SPACE_RAS ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
   report->axes_from_tag = tag != MESH_SPACE_NONE;
-  report->comment_names_ras =
-      tag == MESH_SPACE_NONE && mesh_space_mentions_ras(file->bytes, file->head);
+  report->comment_names_ras = tag == MESH_SPACE_NONE && file->mentions_ras;
   return SUPINE_OK;
 }
 

@@ -26,10 +26,9 @@ static bool is_axes(const unsigned char *at, const unsigned char *end, const cha
   return end - at >= 3 && strncasecmp((const char *)at, axes, 3) == 0 && ends_word(at + 3, end);
 }
 
-mesh_space mesh_space_find(const unsigned char *text, size_t size) {
+static mesh_space find_space(const unsigned char *begin, const unsigned char *end) {
   static const char tag[] = "SPACE=";
-  const unsigned char *end = text + size;
-  const unsigned char *at = find_word(text, end, text, tag);
+  const unsigned char *at = find_word(begin, end, begin, tag);
   if (at == NULL) {
     return MESH_SPACE_NONE;
   }
@@ -39,14 +38,16 @@ mesh_space mesh_space_find(const unsigned char *text, size_t size) {
                                    : MESH_SPACE_FOREIGN;
 }
 
-bool mesh_space_mentions_ras(const unsigned char *text, size_t size) {
-  const unsigned char *end = text + size;
-  const unsigned char *at = text;
-  while ((at = find_word(at, end, text, "RAS")) != NULL) {
-    if (ends_word(at + 3, end)) {
-      return true;
-    }
+static bool mentions_ras(const unsigned char *begin, const unsigned char *end) {
+  const unsigned char *at = begin;
+  while ((at = find_word(at, end, begin, "RAS")) != NULL && !ends_word(at + 3, end)) {
     ++at;
   }
-  return false;
+  return at != NULL;
+}
+
+void mesh_space_note(mesh_file *file, size_t size) {
+  const unsigned char *end = file->bytes + (size < file->size ? size : file->size);
+  file->space = find_space(file->bytes, end);
+  file->mentions_ras = mentions_ras(file->bytes, end);
 }
