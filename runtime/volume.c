@@ -1,56 +1,47 @@
 /* SPDX-License-Identifier: MIT */
-/* Exact volumes: V(s) - V(0) = a s + b s^2 + c s^3, a, b, c forms in the weights. */
+/* Volume against breath scale, a cubic, and its inverse. */
 #include <math.h>
 #include <stdbool.h>
 
-#include "internal.h"
+#include <supine/volume.h>
 
-/* mL, of the breath scale s. */
-typedef struct cubic {
-  double a, b, c;
-} cubic;
-
-static cubic lung_cubic(const supine_basis *basis, size_t lung, const double *w) {
-  const size_t k = basis->info.mode_count;
-  const double *linear = basis->linear + lung * k;
-  const double *quadratic = basis->quadratic + lung * k * k;
-  const double *third = basis->cubic + lung * k * k * k;
-  cubic p = {0, 0, 0};
-  for (size_t i = 0; i < k; ++i) {
-    double b = 0;
-    double c = 0;
-    for (size_t j = 0; j < k; ++j) {
+void supine_volume_add(size_t count, const double *linear, const double *quadratic,
+                       const double *third, const double *weights, double cubic[3]) {
+  const double *w = weights;
+  for (size_t i = 0; i < count; ++i) {
+    double square = 0;
+    double cube = 0;
+    for (size_t j = 0; j < count; ++j) {
       double row = 0;
-      for (size_t m = 0; m < k; ++m) {
-        row += third[(i * k + j) * k + m] * w[m];
+      for (size_t m = 0; m < count; ++m) {
+        row += third[(i * count + j) * count + m] * w[m];
       }
-      b += quadratic[i * k + j] * w[j];
-      c += row * w[j];
+      square += quadratic[i * count + j] * w[j];
+      cube += row * w[j];
     }
-    p.a += linear[i] * w[i];
-    p.b += b * w[i];
-    p.c += c * w[i];
+    cubic[0] += linear[i] * w[i];
+    cubic[1] += square * w[i];
+    cubic[2] += cube * w[i];
   }
-  return p;
 }
 
-static double cubic_value(const cubic *p, double s) {
-  return s * (p->a + s * (p->b + s * p->c));
+double supine_volume_at(const double cubic[3], double scale) {
+  return scale * (cubic[0] + scale * (cubic[1] + scale * cubic[2]));
 }
 
-static double cubic_slope(const cubic *p, double s) {
-  return p->a + s * (2 * p->b + s * 3 * p->c);
+static double cubic_slope(const double c[3], double s) {
+  return c[0] + s * (2 * c[1] + s * 3 * c[2]);
 }
 
 /* The nearest s on one side of 0 where the slope is 0; infinite where there is none. */
-static double cubic_turn(const cubic *p, double side) {
+static double cubic_turn(const double c[3], double side) {
   double roots[2] = {INFINITY, INFINITY};
-  const double discriminant = p->b * p->b - 3 * p->a * p->c;
+  const double discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant >= 0) {
     /* 3 c s^2 + 2 b s + a = 0 without cancellation; a root may be infinite or NaN. */
-    const double q = -(p->b + copysign(sqrt(discriminant), p->b));
-    roots[0] = q / (3 * p->c);
-    roots[1] = p->a / q;
+    const double q = -(c[1] + copysign(sqrt(discriminant), c[1]));
+    roots[0] = q / (3 * c[2]);
+    roots[1] = c[0] / q;
   }
   double nearest = INFINITY;
   for (int i = 0; i < 2; ++i) {
@@ -62,16 +53,16 @@ static double cubic_turn(const cubic *p, double side) {
   return nearest * side;
 }
 
-/* Newton's steps, or bisection where they leave [low, high], between which p - volume changes
- * sign and p is monotone. */
-static double cubic_solve(const cubic *p, double volume, double low, double high) {
-  const bool rising = cubic_value(p, high) > cubic_value(p, low);
-  double s = volume / p->a;
+/* Newton's steps, or bisection where they leave [low, high], between which the volume's difference changes
+ * sign and the cubic is monotone. */
+static double cubic_solve(const double c[3], double volume, double low, double high) {
+  const bool rising = supine_volume_at(c, high) > supine_volume_at(c, low);
+  double s = volume / c[0];
   for (int i = 0; i < 200; ++i) {
     if (!(s > low && s < high)) {
       s = low + (high - low) / 2;
     }
-    const double residual = cubic_value(p, s) - volume;
+    const double residual = supine_volume_at(c, s) - volume;
     if (residual == 0 || s == low || s == high) {
       return s;
     }
@@ -80,7 +71,7 @@ static double cubic_solve(const cubic *p, double volume, double low, double high
     } else {
       low = s;
     }
-    const double next = s - residual / cubic_slope(p, s);
+    const double next = s - residual / cubic_slope(c, s);
     if (fabs(next - s) <= 1e-16 * fabs(s)) {
       return s;
     }
@@ -89,29 +80,30 @@ static double cubic_solve(const cubic *p, double volume, double low, double high
   return s;
 }
 
-/* The root of p = volume that is reached from s = 0 without the volume turning back. */
-static supine_status cubic_root(const cubic *p, double volume, double *scale, supine_error *error) {
+supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
+                                  supine_error *error) {
+  const double *c = cubic;
   if (volume == 0) {
     *scale = 0;
     return SUPINE_OK;
   }
-  if (!isfinite(volume) || !isfinite(p->a + p->b + p->c) || p->a == 0) {
+  if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "a volume of %g mL cannot be reached: here no scale changes it",
                             volume);
   }
-  const double side = volume / p->a > 0 ? 1 : -1;
-  double far = cubic_turn(p, side);
+  const double side = volume / c[0] > 0 ? 1 : -1;
+  double far = cubic_turn(c, side);
   if (isfinite(far)) {
-    const double reach = cubic_value(p, far);
+    const double reach = supine_volume_at(c, far);
     if (fabs(reach) < fabs(volume)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a volume of %g mL is out of reach: the surface folds beyond %g mL",
                               volume, reach);
     }
   } else {
-    far = volume / p->a;
-    while (isfinite(far) && fabs(cubic_value(p, far)) < fabs(volume)) {
+    far = volume / c[0];
+    while (isfinite(far) && fabs(supine_volume_at(c, far)) < fabs(volume)) {
       far *= 2;
     }
     far *= 2;
@@ -121,50 +113,7 @@ static supine_status cubic_root(const cubic *p, double volume, double *scale, su
                               volume);
     }
   }
-  *scale = side > 0 ? cubic_solve(p, volume, 0, far) : cubic_solve(p, volume, far, 0);
+  *scale = side > 0 ? cubic_solve(c, volume, 0, far) : cubic_solve(c, volume, far, 0);
   return SUPINE_OK;
 }
 
-static supine_status need_volume(const supine_basis *basis, supine_error *error) {
-  return basis->info.has_volume
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "the basis has no volumes, as its surface is open: give a breath "
-                                "scale instead, or close the mesh");
-}
-
-double supine_basis_lung_volume(const supine_basis *basis, size_t lung, const double *weights,
-                                double scale) {
-  const cubic p = lung_cubic(basis, lung, weights);
-  return cubic_value(&p, scale);
-}
-
-supine_status supine_basis_scale(const supine_basis *basis, const double *weights, double volume,
-                                 double *scale, supine_error *error) {
-  const supine_status status = need_volume(basis, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  cubic sum = {0, 0, 0};
-  for (size_t i = 0; i < basis->info.lung_count; ++i) {
-    const cubic p = lung_cubic(basis, i, weights);
-    sum.a += p.a;
-    sum.b += p.b;
-    sum.c += p.c;
-  }
-  return cubic_root(&sum, volume, scale, error);
-}
-
-supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung, const double *weights,
-                                      double volume, double *scale, supine_error *error) {
-  const supine_status status = need_volume(basis, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  if (lung >= basis->info.lung_count) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
-                            basis->info.lung_count);
-  }
-  const cubic p = lung_cubic(basis, lung, weights);
-  return cubic_root(&p, volume, scale, error);
-}

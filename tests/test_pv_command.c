@@ -15,7 +15,8 @@
 
 #include <supine/pv.h>
 
-int supine_command_pv(int argc, char **argv);
+#include "../runtime/command/command.h"
+
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
 static char good[64], bad[64], out[64], printed[64];
