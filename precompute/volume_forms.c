@@ -91,7 +91,7 @@ SUPINE_CLONES static void forms_range(void *context, size_t begin, size_t end, s
 static void forms_collect(const forms_work *work, size_t threads, size_t lung,
                           supine_volume_forms *forms) {
   const size_t n = work->count;
-  const double unit = millilitres / 6.0;
+  const double unit = millilitres / 6.0 * work->lungs->share[lung];
   double *linear = forms->linear + lung * n;
   double *quadratic = forms->quadratic + lung * n * n;
   double *cubic = forms->cubic + lung * n * n * n;
