@@ -42,7 +42,8 @@ supine_status supine_lungs_add_lesion(supine_lungs *lungs, const supine_lesion *
   size_t found = 0;
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    const double w = lesion_weight(hypot(hypot(p[0] - c[0], p[1] - c[1]), p[2] - c[2]), lesion->radius);
+    const double w =
+        lesion_weight(hypot(hypot(p[0] - c[0], p[1] - c[1]), p[2] - c[2]), lesion->radius);
     if (w > 0.0) {
       lungs->lesions[i] *= pow(lesion->factor, w);
       ++found;

@@ -30,9 +30,8 @@ supine_status supine_expandability_regional(const supine_lungs *lungs,
     double box[3];
     supine_lungs_box_coordinates(lungs, i, box);
     const double t = box[law->axis];
-    a[i] = law->shape == SUPINE_EXPANDABILITY_LINEAR
-               ? law->from + (law->to - law->from) * t
-               : law->from * pow(law->to / law->from, t);
+    a[i] = law->shape == SUPINE_EXPANDABILITY_LINEAR ? law->from + (law->to - law->from) * t
+                                                     : law->from * pow(law->to / law->from, t);
   }
   return SUPINE_OK;
 }

@@ -116,8 +116,8 @@ supine_status supine_expandability_load(const char *path, size_t count, double *
     }
     ++in.line;
     if (memchr(text, '\0', (size_t)length) != NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: not a text file", path,
-                                in.line);
+      status =
+          supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: not a text file", path, in.line);
       goto cleanup;
     }
     text[strcspn(text, "\n")] = '\0';

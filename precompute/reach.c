@@ -32,8 +32,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   for (size_t k = 0; k < 3; ++k) {
     const size_t a = (k + 1) % 3;
     const size_t b = (k + 2) % 3;
-    const double x = (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) -
-                     (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
+    const double x =
+        (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) - (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
     square += x * x;
   }
   return 0.5 * sqrt(square);

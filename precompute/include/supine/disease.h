@@ -27,7 +27,8 @@ typedef struct supine_lesion {
 
 /** Adds a lesion to the lungs. It acts after stiffness was scaled to geometric mean 1: scaling with
  * the lesion in it would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the
- * vertices, however far away.
+ * vertices, however far away. So at one breath scale tissue away from the lesion moves as before;
+ * at one volume it also takes, everywhere in the same proportion, what the lesion no longer does.
  *
  * @param reached  optional: how many vertices are nearer than the radius; 0: it changes nothing
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
