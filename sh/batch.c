@@ -47,75 +47,37 @@ supine_status supine_sh_batch_check(const supine_sh_transform *plan, const supin
   return SUPINE_OK;
 }
 
-SUPINE_CLONES
-static void store_row(size_t fields, int add, const double *restrict row, double *restrict out) {
-  if (add) {
-    for (size_t f = 0; f < fields; ++f) {
-      out[f] += row[f];
-    }
-  } else {
-    for (size_t f = 0; f < fields; ++f) {
-      out[f] = row[f];
-    }
-  }
-}
-
-void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                           size_t begin, size_t fields, int add, const double *block,
-                           double *coefficients) {
-  if (batch->field_stride == 1) {
-    for (size_t i = 0; i < plan->count; ++i) {
-      store_row(fields, add, block + i * plan->width,
-                coefficients + plan->position[i] * batch->coefficient_stride + begin);
-    }
-    return;
-  }
-  for (size_t f = 0; f < fields; ++f) {
-    double *out = coefficients + (begin + f) * batch->field_stride;
-    for (size_t i = 0; i < plan->count; ++i) {
-      const double before = add ? out[plan->position[i]] : 0;
-      out[plan->position[i]] = before + block[i * plan->width + f];
-    }
-  }
-}
-
-void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                          size_t begin, size_t fields, const double *coefficients, double *block) {
-  for (size_t i = 0; i < plan->count; ++i) {
-    const double *in = coefficients + plan->position[i] * batch->coefficient_stride;
-    double *row = block + i * plan->width;
-    for (size_t f = 0; f < fields; ++f) {
-      row[f] = in[(begin + f) * batch->field_stride];
-    }
-    for (size_t f = fields; f < plan->width; ++f) {
-      row[f] = 0;
-    }
-  }
-}
-
 typedef struct run {
   const supine_sh_transform *plan;
   supine_sh_block_function *block;
   const void *context;
+  size_t shift;
   const supine_sh_workspace *work; /* [threads] */
 } run;
 
+/* Items are fields counted from `shift` places before the first. */
 static void run_blocks(void *context, size_t begin, size_t end, size_t thread) {
   const run *job = context;
   const size_t width = job->plan->width;
-  for (size_t f = begin; f < end; f += width) {
-    job->block(job->context, &job->work[thread], f, end - f < width ? end - f : width);
+  for (size_t item = begin; item < end; item += width) {
+    const size_t stop = end - item < width ? end : item + width;
+    const size_t start = item < job->shift ? job->shift : item;
+    if (start < stop) {
+      job->block(job->context, &job->work[thread], start - job->shift, stop - start);
+    }
   }
+  supine_sh_rows_finish();
 }
 
 supine_status supine_sh_batch_run(const supine_sh_transform *plan, const supine_sh_batch *full,
                                   supine_sh_block_function *block, const void *context,
-                                  supine_error *error) {
-  const size_t blocks = full->fields / plan->width + (full->fields % plan->width != 0);
-  const size_t threads = blocks < full->threads ? blocks : full->threads;
-  if (threads == 0) {
+                                  const double *output, supine_error *error) {
+  if (full->fields == 0) {
     return SUPINE_OK;
   }
+  const size_t shift = (uintptr_t)output / sizeof *output % (SUPINE_SH_ALIGNMENT / sizeof *output);
+  const size_t blocks = (full->fields + shift - 1) / plan->width + 1;
+  const size_t threads = blocks < full->threads ? blocks : full->threads;
   const size_t ring = 2 * plan->longitudes * plan->width;
   const size_t spectra = 2 * (2 * plan->band + 1) * plan->pairs * plan->width;
   const size_t coefficients = plan->count * plan->width;
@@ -131,8 +93,8 @@ supine_status supine_sh_batch_run(const supine_sh_transform *plan, const supine_
     double *own = arrays + t * each;
     work[t] = (supine_sh_workspace){own, own + ring, own + 2 * ring, own + 2 * ring + spectra};
   }
-  run job = {plan, block, context, work};
-  supine_parallel_for(full->fields, plan->width, threads, run_blocks, &job);
+  run job = {plan, block, context, shift, work};
+  supine_parallel_for(full->fields + shift, plan->width, threads, run_blocks, &job);
 
 cleanup:
   free(arrays);

@@ -42,7 +42,9 @@ static void forward_block(const void *context, const supine_sh_workspace *work, 
                            plan->pairs);
   }
   sum_latitudes(plan, work, 0, plan->pairs);
-  supine_sh_block_store(plan, &job->batch, begin, fields, 0, work->coefficients, job->coefficients);
+  supine_sh_block_store(plan, &job->batch, begin, fields,
+                        supine_sh_row_mode(plan->count, job->batch.fields), work->coefficients,
+                        job->coefficients);
 }
 
 supine_status supine_sh_forward(const supine_sh_transform *plan, const supine_sh_batch *batch,
@@ -53,7 +55,7 @@ supine_status supine_sh_forward(const supine_sh_transform *plan, const supine_sh
   if (status != SUPINE_OK) {
     return status;
   }
-  return supine_sh_batch_run(plan, &job.batch, forward_block, &job, error);
+  return supine_sh_batch_run(plan, &job.batch, forward_block, &job, coefficients, error);
 }
 
 static void ring_block(const void *context, const supine_sh_workspace *work, size_t begin,
@@ -65,7 +67,8 @@ static void ring_block(const void *context, const supine_sh_workspace *work, siz
   supine_sh_ring_forward(plan, work, fields, job->batch.point_stride, north ? ring : NULL,
                          north ? NULL : ring, 0, 1);
   sum_latitudes(plan, work, north ? job->j : plan->latitudes - 1 - job->j, 1);
-  supine_sh_block_store(plan, &job->batch, begin, fields, 1, work->coefficients, job->coefficients);
+  supine_sh_block_store(plan, &job->batch, begin, fields, SUPINE_SH_ADD, work->coefficients,
+                        job->coefficients);
 }
 
 supine_status supine_sh_forward_ring(const supine_sh_transform *plan, const supine_sh_batch *batch,
@@ -81,5 +84,5 @@ supine_status supine_sh_forward_ring(const supine_sh_transform *plan, const supi
   if (status != SUPINE_OK) {
     return status;
   }
-  return supine_sh_batch_run(plan, &job.batch, ring_block, &job, error);
+  return supine_sh_batch_run(plan, &job.batch, ring_block, &job, coefficients, error);
 }

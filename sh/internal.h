@@ -27,8 +27,9 @@
 #endif
 
 enum {
-  SUPINE_SH_LANES = 16,    /* fields that a kernel works on together; `width` is a multiple */
-  SUPINE_SH_ALIGNMENT = 64 /* bytes, of every block array */
+  SUPINE_SH_LANES = 16,     /* fields that a kernel works on together; `width` is a multiple */
+  SUPINE_SH_WIDTH_MAX = 48, /* of `width` */
+  SUPINE_SH_ALIGNMENT = 64  /* bytes, of every block array */
 };
 
 struct supine_sh_transform {
@@ -64,34 +65,45 @@ static inline size_t supine_sh_group(size_t m, size_t parity, size_t sine) {
 /* legendre.c: fills analysis, synthesis and position. */
 supine_status supine_sh_legendre(supine_sh_transform *plan, const supine_sh_grid *grid);
 
+/* product.c: y[rows, width] = t[rows, columns] x[columns, width]; t has row stride `t_stride`. */
+void supine_sh_product(size_t rows, size_t columns, size_t width, const double *t, size_t t_stride,
+                       const double *x, double *y);
+
+/* rows.c: what becomes of the caller's memory. STREAM is SET for an output larger than caches. */
+typedef enum supine_sh_mode { SUPINE_SH_SET, SUPINE_SH_ADD, SUPINE_SH_STREAM } supine_sh_mode;
+
+/* SET or STREAM, by the size of the whole output. */
+supine_sh_mode supine_sh_row_mode(size_t rows, size_t fields);
+void supine_sh_row_write(size_t fields, supine_sh_mode mode, const double *row, double *out);
+/* Each thread, when it has written its last row. */
+void supine_sh_rows_finish(void);
+
 /* ring.c: rings of values to rows of spectra, and back. `fields` <= width of the block are there.
  * A pair's missing ring is NULL. `row` and `rows`: the pair's place among how many in a group. */
 void supine_sh_ring_forward(const supine_sh_transform *plan, const supine_sh_workspace *work,
                             size_t fields, size_t stride, const double *north, const double *south,
                             size_t row, size_t rows);
 void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_workspace *work,
-                            size_t fields, size_t stride, double *north, double *south, size_t row,
-                            size_t rows);
+                            size_t fields, size_t stride, supine_sh_mode mode, double *north,
+                            double *south, size_t row, size_t rows);
 
-/* product.c: y[rows, width] = t[rows, columns] x[columns, width]; t has row stride `t_stride`. */
-void supine_sh_product(size_t rows, size_t columns, size_t width, const double *t, size_t t_stride,
-                       const double *x, double *y);
-
-/* batch.c: the caller's arrays. */
-supine_status supine_sh_batch_check(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                                    size_t points, supine_sh_batch *full, supine_error *error);
+/* block.c: coefficients of the fields from `begin` on. */
 void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                           size_t begin, size_t fields, int add, const double *block,
+                           size_t begin, size_t fields, supine_sh_mode mode, const double *block,
                            double *coefficients);
 void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
                           size_t begin, size_t fields, const double *coefficients, double *block);
 
+/* batch.c: fills in the defaults and refuses strides that overlap or overflow. */
+supine_status supine_sh_batch_check(const supine_sh_transform *plan, const supine_sh_batch *batch,
+                                    size_t points, supine_sh_batch *full, supine_error *error);
+
 /* batch.c: calls `block` on every block of the batch, over the batch's threads, each with its own
- * workspace. */
+ * workspace. Blocks begin where `output` meets cache lines; the first may be shorter. */
 typedef void supine_sh_block_function(const void *context, const supine_sh_workspace *work,
                                       size_t begin, size_t fields);
 supine_status supine_sh_batch_run(const supine_sh_transform *plan, const supine_sh_batch *full,
                                   supine_sh_block_function *block, const void *context,
-                                  supine_error *error);
+                                  const double *output, supine_error *error);
 
 #endif

@@ -32,11 +32,13 @@ static void inverse_block(const void *context, const supine_sh_workspace *work, 
   const supine_sh_transform *plan = job->plan;
   const size_t stride = job->batch.point_stride;
   const size_t ring = plan->longitudes * stride;
+  const supine_sh_mode mode =
+      supine_sh_row_mode(plan->latitudes * plan->longitudes, job->batch.fields);
   supine_sh_block_load(plan, &job->batch, begin, fields, job->coefficients, work->coefficients);
   sum_degrees(plan, work);
   for (size_t p = 0; p < plan->pairs; ++p) {
     const size_t mirror = plan->latitudes - 1 - p;
-    supine_sh_ring_inverse(plan, work, fields, stride, job->values + p * ring + begin,
+    supine_sh_ring_inverse(plan, work, fields, stride, mode, job->values + p * ring + begin,
                            mirror == p ? NULL : job->values + mirror * ring + begin, p,
                            plan->pairs);
   }
@@ -50,5 +52,5 @@ supine_status supine_sh_inverse(const supine_sh_transform *plan, const supine_sh
   if (status != SUPINE_OK) {
     return status;
   }
-  return supine_sh_batch_run(plan, &job.batch, inverse_block, &job, error);
+  return supine_sh_batch_run(plan, &job.batch, inverse_block, &job, values, error);
 }

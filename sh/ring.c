@@ -15,6 +15,16 @@
 
 #include "internal.h"
 
+/* Asks for a row's part of the next block, or for nothing of use past the last: rows are far apart
+ * in the caller's memory, and too short here for the processor to foresee. */
+static void prefetch(size_t fields, const double *row) {
+#ifdef __GNUC__
+  for (size_t f = 0; f < fields; f += 64 / sizeof *row) {
+    __builtin_prefetch((const char *)row + f * sizeof *row);
+  }
+#endif
+}
+
 SUPINE_CLONES
 static void gather(size_t fields, const double *restrict north, const double *restrict south,
                    double *restrict z) {
@@ -61,6 +71,8 @@ void supine_sh_ring_forward(const supine_sh_transform *plan, const supine_sh_wor
   for (size_t k = 0; k < plan->longitudes; ++k) {
     double *z = work->ring + 2 * k * width;
     if (north != NULL && south != NULL) {
+      prefetch(fields, north + k * stride + fields);
+      prefetch(fields, south + k * stride + fields);
       gather(fields, north + k * stride, south + k * stride, z);
     } else if (north != NULL) {
       gather_one(fields, 1, north + k * stride, z);
@@ -103,24 +115,18 @@ static void join_order(size_t width, const double *restrict even, const double *
 }
 
 SUPINE_CLONES
-static void scatter(size_t fields, const double *restrict z, double *restrict north,
-                    double *restrict south) {
-  for (size_t f = 0; f < fields; ++f) {
+static void part(size_t width, const double *restrict z, double *restrict north,
+                 double *restrict south) {
+  for (size_t f = 0; f < width; ++f) {
     north[f] = z[2 * f] + z[2 * f + 1];
     south[f] = z[2 * f] - z[2 * f + 1];
   }
 }
 
-SUPINE_CLONES
-static void scatter_one(size_t fields, const double *restrict z, double *restrict north) {
-  for (size_t f = 0; f < fields; ++f) {
-    north[f] = z[2 * f] + z[2 * f + 1];
-  }
-}
-
 void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_workspace *work,
-                            size_t fields, size_t stride, double *north, double *south, size_t row,
-                            size_t rows) {
+                            size_t fields, size_t stride, supine_sh_mode mode, double *north,
+                            double *south, size_t row, size_t rows) {
+  double rings[2][SUPINE_SH_WIDTH_MAX];
   const size_t width = plan->width;
   const size_t group = rows * width;
   const double *in = work->spectra + row * width;
@@ -136,11 +142,10 @@ void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_wor
          2 * gap * width * sizeof *work->ring_spectrum);
   fftw_execute_dft(plan->fft, (fftw_complex *)work->ring_spectrum, (fftw_complex *)work->ring);
   for (size_t k = 0; k < plan->longitudes; ++k) {
-    const double *z = work->ring + 2 * k * width;
+    part(width, work->ring + 2 * k * width, rings[0], rings[1]);
+    supine_sh_row_write(fields, mode, rings[0], north + k * stride);
     if (south != NULL) {
-      scatter(fields, z, north + k * stride, south + k * stride);
-    } else {
-      scatter_one(fields, z, north + k * stride);
+      supine_sh_row_write(fields, mode, rings[1], south + k * stride);
     }
   }
 }

@@ -21,6 +21,8 @@
 #include <supine/sh.h>
 #include <supine/transform.h>
 
+#define CHOSEN "SUPINE_BENCH_KERNELS"
+
 static double now(void) {
   struct timespec t;
   (void)clock_gettime(CLOCK_MONOTONIC, &t);
@@ -57,15 +59,17 @@ static double probe_dgemm(void) {
   return 2e-9 * M * K * N / best;
 }
 
-/* Starts this program again under the fastest of OpenBLAS's kernels. */
+/* Starts this program again under the fastest of OpenBLAS's kernels, whatever the environment
+ * asked OpenBLAS for. */
 static void choose_kernels(char **arguments) {
   static const char *const names[] = {"HASWELL", "ZEN", "SKYLAKEX", "COOPERLAKE", "SAPPHIRERAPIDS"};
   char self[4096];
   const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
-  if (length < 0 || getenv("OPENBLAS_CORETYPE") != NULL) {
+  if (length < 0 || getenv(CHOSEN) != NULL) {
     return;
   }
   self[length] = '\0';
+  (void)unsetenv("OPENBLAS_L2_SIZE");
   const char *best = NULL;
   double most = 0;
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -86,7 +90,7 @@ static void choose_kernels(char **arguments) {
     }
   }
   (void)fflush(stdout);
-  if (best != NULL && setenv("OPENBLAS_CORETYPE", best, 1) == 0) {
+  if (best != NULL && setenv("OPENBLAS_CORETYPE", best, 1) == 0 && setenv(CHOSEN, best, 1) == 0) {
     (void)execv(self, arguments);
   }
 }

@@ -5,9 +5,9 @@
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)         forward
  *     value(g) = sum over l <= band, m of coefficient(l, m) Y(l, m)(g)            inverse
  *
- * Fields are many and bands low, so the work is laid out across fields: FFTW's real-world sizes
- * along longitude and a small matrix product for each order m along latitude, both on blocks of
- * fields that stay in cache. A field never mixes with its neighbours: neither rounding nor NaN
+ * Fields are many and bands low, so the work is laid out across fields: FFTW along
+ * longitude and a small matrix product for each order m along latitude, on blocks of fields that
+ * stay in cache. A field never mixes with its neighbours: neither rounding nor NaN
  * passes from one to another.
  *
  * A plan is read-only once made: any number of threads may execute it. Making and destroying plans
