@@ -181,7 +181,9 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = supine_sh_grid_for_band(band, SUPINE_SH_OVERSAMPLING_DEFAULT, &grid);
+  const char *over = getenv("OVER");
+  const size_t lat = (size_t)ceil((over ? atof(over) : 1.5) * (double)(band + 1));
+  status = supine_sh_grid_create(lat, 2 * lat, &grid);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no grid for band %zu: %s", band,
                            supine_status_string(status));

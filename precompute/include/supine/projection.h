@@ -42,6 +42,18 @@ supine_status supine_project_linear(const supine_lungs *lungs, const supine_forc
                                     const double *stiffness, size_t band,
                                     supine_projection *projection, supine_error *error);
 
+/** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
+ * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
+ * coefficients themselves; memory is one ring of fields and those.
+ * @param tolerance  relative residual of each solve; 0: the solver's default
+ * @param progress   optional
+ * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+supine_status supine_project_sampled(const supine_lungs *lungs, const supine_force_law *law,
+                                     const double *stiffness, size_t band, double tolerance,
+                                     supine_progress_function *progress, void *context,
+                                     supine_projection *projection, supine_error *error);
+
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */
 typedef struct supine_compression {

@@ -24,11 +24,12 @@ typedef struct supine_sh_grid {
   double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
 } supine_sh_grid;
 
-/** Makes the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX each).
- * It integrates products of two functions of band L exactly where latitudes > L and
+/** Makes the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
+ * each). It integrates products of two functions of band L exactly where latitudes > L and
  * longitudes > 2 L.
  * @retval SUPINE_ERROR_ARGUMENT  a number out of range
- * @retval SUPINE_ERROR_MEMORY    (GSL's error handler is called first if it is GSL that lacks it) */
+ * @retval SUPINE_ERROR_MEMORY    (GSL's error handler is called first if it is GSL that lacks it)
+ */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Frees a rule; NULL is legal. */
