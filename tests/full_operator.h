@@ -46,7 +46,8 @@ static inline full_operator full_operator_create(const supine_mesh *mesh,
     for (size_t side = 0; side < 2; ++side) {
       const size_t mass = topology->edges[2 * k + side];
       const double *p = mesh->vertices + 3 * mass;
-      const double d = fmax(1.0, hypot(hypot(p[0] - middle[0], p[1] - middle[1]), p[2] - middle[2]));
+      const double d =
+          fmax(1.0, hypot(hypot(p[0] - middle[0], p[1] - middle[1]), p[2] - middle[2]));
       op.row[at] = mass;
       op.column[at] = n + k;
       op.value[at++] = s[mass] / d;
