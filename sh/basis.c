@@ -1,2 +1,88 @@
 /* SPDX-License-Identifier: MIT */
-typedef int supine_placeholder;
+/* Real spherical harmonics of a direction.
+ *
+ * Y(l, +-m) = q(l, m)(z) * { Re, Im } (x + i y)^m, where q is the normalised Legendre function
+ * without its factor sin^m: a polynomial in z, so that a pole is no special case. In l it obeys
+ *
+ *     q(l, m) = a(l, m) (z q(l - 1, m) - q(l - 2, m) / a(l - 1, m))
+ *     a(l, m)^2 = (4 l^2 - 1) / (l^2 - m^2) */
+#include <math.h>
+
+#include <supine/sh.h>
+
+size_t supine_sh_count(size_t band) {
+  return (band + 1) * (band + 1);
+}
+
+size_t supine_sh_index(size_t l, int m) {
+  return (size_t)((ptrdiff_t)(l * l + l) + m);
+}
+
+/* Divides by the largest component first: no length over- or underflows. */
+static supine_status normalise(const double v[3], double unit[3]) {
+  const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+  if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]) || largest == 0) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  const double s[3] = {v[0] / largest, v[1] / largest, v[2] / largest};
+  const double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+  for (int i = 0; i < 3; ++i) {
+    unit[i] = s[i] / length;
+  }
+  return SUPINE_OK;
+}
+
+/* The column of Y(l, m) and Y(l, -m), l = m to band: `top` is q(m, m), `re` and `im` are
+ * (x + i y)^m. */
+static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
+                           double *y) {
+  double before = 0; /* q(l - 2, m) / a(l - 1, m) */
+  double q = top;    /* q(l - 1, m), then q(l, m) */
+  for (size_t l = m;; ++l) {
+    double *centre = y + l * l + l;
+    centre[-(ptrdiff_t)m] = q * im;
+    centre[m] = q * re; /* last: for m = 0 it is the one that counts */
+    if (l == band) {
+      return;
+    }
+    const double next = (double)(l + 1);
+    const double order = (double)m;
+    const double a = sqrt((4 * next * next - 1) / ((next - order) * (next + order)));
+    const double above = a * (z * q - before);
+    before = q / a;
+    q = above;
+  }
+}
+
+supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y) {
+  double unit[3];
+  if (band > SUPINE_SH_BAND_MAX || normalise(direction, unit) != SUPINE_OK) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  double top = 0.28209479177387814347; /* sqrt(1 / (4 pi)) */
+  double re = 1;
+  double im = 0;
+  evaluate_order(band, 0, unit[2], top, re, im, y);
+  top *= 1.41421356237309504880; /* sqrt(2): cos and sin share what exp(+-i m phi) had */
+  for (size_t m = 1; m <= band; ++m) {
+    const double turned = re * unit[0] - im * unit[1];
+    im = re * unit[1] + im * unit[0];
+    re = turned;
+    top *= sqrt((double)(2 * m + 1) / (double)(2 * m));
+    evaluate_order(band, m, unit[2], top, re, im, y);
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_sh_evaluate_many(size_t band, size_t count, const double *directions,
+                                      double *y) {
+  if (band > SUPINE_SH_BAND_MAX) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (supine_sh_evaluate(band, directions + 3 * i, y + i * supine_sh_count(band)) != SUPINE_OK) {
+      return SUPINE_ERROR_ARGUMENT;
+    }
+  }
+  return SUPINE_OK;
+}

@@ -1,2 +1,83 @@
-/* SPDX-License-Identifier: MIT */
-typedef int supine_placeholder;
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The Gauss-Legendre x equispaced quadrature rule on the sphere. */
+#include <math.h>
+#include <stdlib.h>
+
+#include <gsl/gsl_integration.h>
+#include <gsl/gsl_sf_legendre.h>
+
+#include <supine/grid.h>
+
+/* GSL tabulates some sizes and computes the others to about 1e-11. One Newton step on P_n takes
+ * those to rounding: quadratic convergence leaves 1e-22. work: [2 (n + 1)]
+ *
+ *     w = 2 / ((1 - z^2) P_n'(z)^2) */
+static void refine(supine_sh_grid *grid, double *work) {
+  const size_t n = grid->latitudes;
+  double *p = work;
+  double *slope = work + n + 1;
+  for (size_t j = 0; j < n; ++j) {
+    double z = grid->z[j];
+    (void)gsl_sf_legendre_Pl_deriv_array((int)n, z, p, slope);
+    z -= p[n] / slope[n];
+    (void)gsl_sf_legendre_Pl_deriv_array((int)n, z, p, slope);
+    grid->z[j] = z;
+    grid->weight[j] = 2 / ((1 - z) * (1 + z) * slope[n] * slope[n]);
+  }
+}
+
+supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid) {
+  *grid = NULL;
+  if (latitudes < 1 || latitudes > SUPINE_SH_GRID_MAX || longitudes < 1 ||
+      longitudes > SUPINE_SH_GRID_MAX) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_sh_grid *made = calloc(1, sizeof *made);
+  gsl_integration_glfixed_table *table = NULL;
+  double *work = malloc(2 * (latitudes + 1) * sizeof *work);
+  if (made == NULL || work == NULL) {
+    goto cleanup;
+  }
+  made->latitudes = latitudes;
+  made->longitudes = longitudes;
+  made->z = malloc(latitudes * sizeof *made->z);
+  made->weight = malloc(latitudes * sizeof *made->weight);
+  table = gsl_integration_glfixed_table_alloc(latitudes);
+  if (made->z == NULL || made->weight == NULL || table == NULL) {
+    goto cleanup;
+  }
+  for (size_t j = 0; j < latitudes; ++j) { /* GSL's nodes ascend */
+    const size_t south = latitudes - 1 - j;
+    (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
+  }
+  if (table->precomputed == 0) {
+    refine(made, work);
+  }
+  *grid = made;
+  made = NULL;
+  status = SUPINE_OK;
+
+cleanup:
+  gsl_integration_glfixed_table_free(table);
+  free(work);
+  supine_sh_grid_destroy(made);
+  return status;
+}
+
+void supine_sh_grid_destroy(supine_sh_grid *grid) {
+  if (grid != NULL) {
+    free(grid->z);
+    free(grid->weight);
+    free(grid);
+  }
+}
+
+void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]) {
+  const double z = grid->z[j];
+  const double sine = sqrt((1 - z) * (1 + z));
+  const double longitude = 2 * M_PI * (double)k / (double)grid->longitudes;
+  direction[0] = sine * cos(longitude);
+  direction[1] = sine * sin(longitude);
+  direction[2] = z;
+}

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(base supine_base)
+supine_test(sh_basis supine::sh m)
+supine_test(sh_grid supine::sh m)

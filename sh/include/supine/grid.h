@@ -12,6 +12,9 @@
 extern "C" {
 #endif
 
+/** The most latitudes or longitudes of a rule. */
+#define SUPINE_SH_GRID_MAX 16384
+
 /** A rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) = z[j] and
  * longitude 2 pi k / longitudes; its weight is weight[j] * 2 pi / longitudes. */
 typedef struct supine_sh_grid {
@@ -21,10 +24,12 @@ typedef struct supine_sh_grid {
   double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
 } supine_sh_grid;
 
-/** Makes the rule with the given numbers of latitudes and longitudes (at least 1 each).
- * It integrates products of two functions of band L exactly where latitudes > L and
+/** Makes the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
+ * each). It integrates products of two functions of band L exactly where latitudes > L and
  * longitudes > 2 L.
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_ARGUMENT  a number out of range
+ * @retval SUPINE_ERROR_MEMORY    (GSL's error handler is called first if it is GSL that lacks it)
+ */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Frees a rule; NULL is legal. */

@@ -1,0 +1,45 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# On a bare Debian 12, as root: install what is needed, build, then
+#   sh cmake/debian.sh demo    make a pair of lungs, precompute and deform them
+#   sh cmake/debian.sh test    build and pass the tests
+set -eu
+cd "$(dirname "$0")/.."
+
+# The one list of packages: what building needs, and what the tests need on top.
+build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev"
+tests="g++ libcmocka-dev libsuitesparse-dev libopenblas-dev python3-vtk9"
+
+install_missing() {
+  missing=""
+  for package in "$@"; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+      missing="$missing $package"
+  done
+  if [ -n "$missing" ]; then
+    apt-get update -qq
+    # shellcheck disable=SC2086
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
+  fi
+}
+
+case "${1-}" in
+demo)
+  # shellcheck disable=SC2086
+  install_missing $build
+  cmake --preset release -DBUILD_TESTING=OFF
+  cmake --build --preset release
+  exec sh cmake/demo.sh build/release/supine demo
+  ;;
+test)
+  # shellcheck disable=SC2086
+  install_missing $build $tests
+  cmake --preset release -DBUILD_TESTING=ON
+  cmake --build --preset release
+  exec ctest --preset release
+  ;;
+*)
+  echo "usage: sh cmake/debian.sh demo|test" >&2
+  exit 1
+  ;;
+esac

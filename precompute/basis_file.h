@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Writing a basis file. */
+#ifndef SUPINE_BASIS_FILE_H
+#define SUPINE_BASIS_FILE_H
+
+#include <supine/precompute.h>
+
+typedef struct supine_basis_content {
+  const supine_lungs *lungs;
+  const supine_model *model;
+  const double *directions; /* [N, 3] */
+  const supine_compression *compression;
+  const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
+  const supine_accuracy *accuracy;
+  bool harmonics;      /* the modes are the harmonics themselves */
+  const char *made_by; /* optional */
+} supine_basis_content;
+
+supine_status supine_basis_file_write(const char *path, const supine_basis_content *content,
+                                      supine_error *error);
+
+#endif

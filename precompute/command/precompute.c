@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine precompute: lung surfaces in, basis file out. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "model_options.h"
+
+static const char name[] = "precompute";
+
+static const char help[] =
+    "Usage: supine precompute MESH... -o FILE [OPTIONS]\n"
+    "\n"
+    "Solves the physics of one or two lungs for every direction of gravity at once and writes a\n"
+    "basis file, which 'supine deform' and the run-time library turn into deformed lungs in real\n"
+    "time. Both lungs may be in one file or in two; any surface that assimp reads will do (PLY,\n"
+    "OBJ, STL, OFF, ...). Closed surfaces can be asked for exact volumes later.\n"
+    "\n"
+    "  -o, --output FILE    basis file (safetensors)\n"
+    "  --band L             highest spherical-harmonic band, 0 to 64; default 15\n"
+    "  --modes K|harmonics  functions of orientation, and so multiplications per vertex, at run\n"
+    "                       time: the best K of the band (default 16, fewer where fewer do), or\n"
+    "                       the (L+1)^2 harmonics themselves. The paper's form is\n"
+    "                       --band 3 --modes harmonics\n"
+    "\n";
+
+static const char examples[] =
+    "\n"
+    "Examples:\n"
+    "  supine precompute left.ply right.ply -o lungs.safetensors\n"
+    "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors\n";
+
+/* The command line in one line, for the file's metadata: names of files without their folders. */
+static void describe(int argc, char **argv, char *text, size_t size) {
+  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc && used < size; ++i) {
+    const char *slash = strrchr(argv[i], '/');
+    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
+  }
+}
+
+static void report_result(const char *path, const supine_lungs *lungs,
+                          const supine_precompute_options *options,
+                          const supine_precompute_report *report) {
+  const supine_accuracy *accuracy = &report->accuracy;
+  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s\n", path,
+               lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
+               options->band, report->mode_count,
+               options->modes == 0 ? "harmonics" : "modes");
+  (void)printf("error against the full solve, on %zu directions that no grid used:\n"
+               "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n",
+               accuracy->direction_count, 100.0 * accuracy->relative_rms,
+               100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
+  if (accuracy->volume > 0.0) {
+    (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %g mL\n",
+                 accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, accuracy->volume);
+  }
+}
+
+int supine_command_precompute(int argc, char **argv) {
+  enum { BAND = OPTION_MODEL_END, MODES };
+  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                          {"band", required_argument, NULL, BAND},
+                                          {"modes", required_argument, NULL, MODES},
+                                          SUPINE_MODEL_OPTIONS,
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+  supine_model_options model = supine_model_options_default();
+  supine_precompute_options wanted = {.band = 15, .modes = 16};
+  const char *path = NULL;
+  char made_by[512];
+  describe(argc, argv, made_by, sizeof made_by);
+  int option;
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
+    int result = SUPINE_EXIT_OK;
+    switch (option) {
+    case 'o':
+      path = optarg;
+      break;
+    case BAND:
+      if (!supine_parse_count(optarg, &wanted.band) || wanted.band > SUPINE_SH_BAND_MAX) {
+        result = supine_command_usage(name, "--band takes 0 to %d, not '%s'", SUPINE_SH_BAND_MAX,
+                                      optarg);
+      }
+      break;
+    case MODES:
+      if (strcmp(optarg, "harmonics") == 0) {
+        wanted.modes = 0;
+      } else if (!supine_parse_count(optarg, &wanted.modes) || wanted.modes < 1 ||
+                 wanted.modes > 256) {
+        result = supine_command_usage(name, "--modes takes 1 to 256 or 'harmonics', not '%s'",
+                                      optarg);
+      }
+      break;
+    case 'h':
+      (void)fputs(help, stdout);
+      (void)fputs(supine_model_options_help, stdout);
+      (void)fputs(examples, stdout);
+      return supine_command_finish(name);
+    case '?':
+    case ':':
+      return supine_command_bad_option(name, options, option, argv);
+    default:
+      result = supine_model_options_take(&model, name, option, optarg);
+    }
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+  }
+  if (optind == argc) {
+    return supine_command_usage(name, "which surface? Name one or more mesh files");
+  }
+  if (path == NULL) {
+    return supine_command_usage(name, "-o FILE is missing");
+  }
+  supine_lungs lungs = {0};
+  int result = supine_model_load(&model, name, argv + optind, (size_t)(argc - optind), &lungs);
+  if (result == SUPINE_EXIT_OK) {
+    supine_progress progress = supine_progress_begin("precompute");
+    supine_precompute_report report;
+    supine_error error;
+    wanted.model = model.model;
+    wanted.made_by = made_by;
+    wanted.progress = supine_progress_step;
+    wanted.progress_context = &progress;
+    supine_interrupts_catch();
+    const supine_status status = supine_precompute(&lungs, &wanted, path, &report, &error);
+    supine_progress_end(&progress);
+    if (status != SUPINE_OK) {
+      result = supine_command_fail(name, &error);
+    } else {
+      report_result(path, &lungs, &wanted, &report);
+      result = supine_command_finish(name);
+    }
+  }
+  supine_lungs_free(&lungs);
+  return result;
+}

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Denormal numbers: the tail of a unit force's response fades into them, and they are slow. */
+#include "internal.h"
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+
+unsigned supine_denormals_flush(void) {
+  const unsigned saved = _mm_getcsr();
+  _mm_setcsr(saved | 0x8040U); /* flush to zero, denormals are zero */
+  return saved;
+}
+
+void supine_denormals_restore(unsigned saved) {
+  _mm_setcsr(saved);
+}
+#else
+unsigned supine_denormals_flush(void) {
+  return 0;
+}
+
+void supine_denormals_restore(unsigned saved) {
+  (void)saved;
+}
+#endif

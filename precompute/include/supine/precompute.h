@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Offline basis generation: lungs in, basis file out. */
+#ifndef SUPINE_PRECOMPUTE_H
+#define SUPINE_PRECOMPUTE_H
+
+#include <supine/accuracy.h>
+#include <supine/force.h>
+#include <supine/projection.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** The physical model of one basis or one solve. */
+typedef struct supine_model {
+  supine_force_law force;
+  supine_direction_law direction;
+  const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
+} supine_model;
+
+supine_model supine_model_default(void);
+
+/** Full physics for one orientation, no harmonics: u_i = s F_i d_i. */
+typedef struct supine_solution {
+  size_t vertex_count;
+  double *catch_;     /**< [N] F */
+  double *directions; /**< [N, 3] d, mm */
+  bool has_volume;    /**< the surface is closed, and cubic is set */
+  double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
+  supine_solve_report report;
+} supine_solution;
+
+/** Solves for gravity along the unit vector `g`.
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+supine_status supine_solve(const supine_lungs *lungs, const supine_model *model, const double g[3],
+                           supine_solution *solution, supine_error *error);
+void supine_solution_free(supine_solution *solution);
+
+/** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
+double supine_solution_largest(const supine_solution *solution);
+
+/** Positions p + s F d, [N, 3], mm. */
+void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
+                           double *positions);
+
+/** What a basis is made of. */
+typedef struct supine_precompute_options {
+  supine_model model;
+  size_t band;                        /**< L */
+  size_t modes;                       /**< K; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;                    /**< directions that the error is measured on; 0: 100 */
+  const char *made_by;                /**< how it was made, for the file's metadata; optional */
+  supine_progress_function *progress; /**< optional */
+  void *progress_context;
+} supine_precompute_options;
+
+/** What came of it. */
+typedef struct supine_precompute_report {
+  size_t mode_count;
+  size_t solve_count;
+  size_t iterations;
+  double residual;
+  supine_accuracy accuracy;
+} supine_precompute_report;
+
+/** Projects, compresses, measures, and writes the basis file, whole or not at all.
+ * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_INTERRUPTED, and those of the steps */
+supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
+                                const char *path, supine_precompute_report *report,
+                                supine_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

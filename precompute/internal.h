@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the files of this folder share and nobody else sees. */
+#ifndef SUPINE_PRECOMPUTE_INTERNAL_H
+#define SUPINE_PRECOMPUTE_INTERNAL_H
+
+#include <supine/equilibrium.h>
+
+/* Hot loops are compiled for several instruction sets and chosen when the program starts. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SUPINE_NO_CLONES)
+#define SUPINE_CLONES                                                                              \
+  __attribute__((target_clones("default", "arch=haswell", "arch=skylake-avx512")))
+#else
+#define SUPINE_CLONES
+#endif
+
+/* Vertex adjacency in compressed rows: the links of vertex i are row_begin[i] <= s < row_begin[i +
+ * 1]. */
+struct supine_network {
+  size_t vertex_count;
+  size_t *row_begin;   /* [N + 1] */
+  uint32_t *neighbour; /* [2 E] internal numbers */
+  double *distance;    /* [2 E] D(mass, spring): half the edge's length, at least 1 mm */
+  uint32_t *order;     /* [N] file's number of internal vertex i */
+  uint32_t *rank;      /* [N] internal number of the file's vertex i */
+};
+
+/* The stiffness of (III-E) from expandability or as given: scaled to geometric mean 1. */
+supine_status supine_stiffness_normalise(size_t count, const double *stiffness, double *scaled,
+                                         supine_error *error);
+
+/* D(mass, spring) of an edge of the given length, mm. */
+double supine_link_distance(const double *first, const double *second);
+
+/* Sets the processor to treat denormal numbers as zero; returns what to restore. */
+unsigned supine_denormals_flush(void);
+void supine_denormals_restore(unsigned saved);
+
+#endif

@@ -1,0 +1,289 @@
+/* SPDX-License-Identifier: MIT */
+/* Opening a basis file: every tensor is checked before anything uses it. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "internal.h"
+
+/* The file that is being checked, and where its name and a failure go. */
+typedef struct check {
+  const supine_safetensors *file;
+  const char *name;
+  supine_error *error;
+} check;
+
+static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *format, ...) {
+  char detail[256];
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(detail, sizeof detail, format, arguments);
+  va_end(arguments);
+  return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s", c->name, detail);
+}
+
+/* The tensor `name` when it is there, of that type and rank; otherwise NULL, with the reason. */
+static const supine_tensor *want(const check *c, const char *name, supine_dtype dtype,
+                                 size_t rank) {
+  const supine_tensor *tensor = supine_safetensors_find(c->file, name);
+  if (tensor == NULL || tensor->dtype != dtype || tensor->rank != rank) {
+    (void)refuse(c, "tensor '%s' is missing, or not of the type and rank of a basis file", name);
+    return NULL;
+  }
+  return tensor;
+}
+
+/* The same with every axis given. */
+static const void *want_shape(const check *c, const char *name, supine_dtype dtype, size_t rank,
+                              const size_t *shape) {
+  const supine_tensor *tensor = want(c, name, dtype, rank);
+  for (size_t i = 0; tensor != NULL && i < rank; ++i) {
+    if (tensor->shape[i] != shape[i]) {
+      (void)refuse(c, "axis %zu of tensor '%s' is %zu instead of %zu", i, name, tensor->shape[i],
+                   shape[i]);
+      return NULL;
+    }
+  }
+  return tensor == NULL ? NULL : tensor->data;
+}
+
+/* Without a branch an element, so that it runs at the speed of memory: x - x is 0 or NaN. */
+static bool finite_floats(const float *values, size_t count) {
+  size_t bad = 0;
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t bits = 0;
+    memcpy(&bits, &values[i], sizeof bits);
+    bad += (bits & 0x7F800000U) == 0x7F800000U;
+  }
+  return bad == 0;
+}
+
+static bool finite_doubles(const double *values, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    if (!isfinite(values[i])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* kind, format, version; sets info.vector. */
+static supine_status check_metadata(const check *c, supine_basis_info *info) {
+  const char *format = supine_safetensors_metadata(c->file, "format");
+  const char *version = supine_safetensors_metadata(c->file, "version");
+  const char *kind = supine_safetensors_metadata(c->file, "kind");
+  if (format == NULL || strcmp(format, "supine-basis") != 0) {
+    return refuse(c, "a safetensors file, but not a Supine basis: make one with supine precompute");
+  }
+  if (version == NULL || strcmp(version, "1") != 0) {
+    return refuse(c, "basis version %.16s; this program reads version 1",
+                  version == NULL ? "unknown" : version);
+  }
+  if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
+    return refuse(c, "its kind is neither scalar nor vector");
+  }
+  info->vector = strcmp(kind, "vector") == 0;
+  return supine_safetensors_verify(c->file, c->error);
+}
+
+static supine_status check_surface(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const supine_tensor *vertices = want(c, "vertices", SUPINE_F32, 2);
+  const supine_tensor *triangles = want(c, "triangles", SUPINE_U32, 2);
+  if (vertices == NULL || triangles == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  info->vertex_count = vertices->shape[0];
+  info->triangle_count = triangles->shape[0];
+  if (vertices->shape[1] != 3 || triangles->shape[1] != 3 || info->vertex_count == 0 ||
+      info->vertex_count > UINT32_MAX) {
+    return refuse(c, "vertices and triangles must be [N, 3], N from 1 to 4294967295");
+  }
+  basis->vertices = vertices->data;
+  basis->triangles = triangles->data;
+  uint32_t highest = 0;
+  for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
+    highest = basis->triangles[i] > highest ? basis->triangles[i] : highest;
+  }
+  if (highest >= info->vertex_count) {
+    return refuse(c, "a triangle names vertex %u of %zu", highest, info->vertex_count);
+  }
+  return finite_floats(basis->vertices, 3 * info->vertex_count)
+             ? SUPINE_OK
+             : refuse(c, "a vertex is not finite");
+}
+
+static supine_status check_field(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const size_t n = info->vertex_count;
+  const size_t rank = info->vector ? 3 : 2;
+  const supine_tensor *coefficients = want(c, "coefficients", SUPINE_F32, rank);
+  if (coefficients == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  const size_t modes = coefficients->shape[rank - 1];
+  if (coefficients->shape[0] != n || (info->vector && coefficients->shape[1] != 3) || modes < 1 ||
+      modes > SUPINE_MODES_MAX) {
+    return refuse(c, "coefficients must be [N, K] or [N, 3, K], N = %zu, K from 1 to %d", n,
+                  SUPINE_MODES_MAX);
+  }
+  info->mode_count = modes;
+  basis->coefficients = coefficients->data;
+  if (!finite_floats(basis->coefficients, n * modes * (info->vector ? 3 : 1))) {
+    return refuse(c, "a coefficient is not finite");
+  }
+  if (info->vector) {
+    return SUPINE_OK;
+  }
+  basis->direction = want_shape(c, "direction", SUPINE_F32, 2, (size_t[]){n, 3});
+  if (basis->direction == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  return finite_floats(basis->direction, 3 * n) ? SUPINE_OK
+                                                : refuse(c, "a direction is not finite");
+}
+
+static supine_status check_modes(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const supine_tensor *modes = want(c, "modes", SUPINE_F64, 2);
+  if (modes == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  while (info->band < SUPINE_SH_BAND_MAX && supine_sh_count(info->band) < modes->shape[1]) {
+    ++info->band;
+  }
+  if (modes->shape[0] != info->mode_count || modes->shape[1] != supine_sh_count(info->band)) {
+    return refuse(c, "modes must be [K, (L + 1)^2], K = %zu, L from 0 to %d", info->mode_count,
+                  SUPINE_SH_BAND_MAX);
+  }
+  basis->modes = modes->data;
+  return finite_doubles(basis->modes, info->mode_count * modes->shape[1])
+             ? SUPINE_OK
+             : refuse(c, "a mode is not finite");
+}
+
+/* Lungs come one after the other: 0 ... 0 1 ... 1 2 ... */
+static supine_status check_lungs(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const size_t n = info->vertex_count;
+  const unsigned char *lung = want_shape(c, "lung", SUPINE_U8, 1, &n);
+  if (lung == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  size_t at = 0;
+  size_t count = 0;
+  while (at < n && lung[at] == count && count < SUPINE_LUNGS_MAX) {
+    basis->lung_begin[count] = at;
+    while (at < n && lung[at] == count) {
+      ++at;
+    }
+    ++count;
+  }
+  if (at != n) {
+    return refuse(c, "vertex %zu is of lung %u: vertices must be grouped by lung, 0 to at most %d",
+                  at, lung[at], SUPINE_LUNGS_MAX - 1);
+  }
+  basis->lung_begin[count] = n;
+  info->lung_count = count;
+  info->lung_begin = basis->lung_begin;
+  return SUPINE_OK;
+}
+
+static supine_status check_volume(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const size_t g = info->lung_count;
+  const size_t k = info->mode_count;
+  const size_t shape[] = {g, k, k, k};
+  static const char *const names[] = {"volume_linear", "volume_quadratic", "volume_cubic"};
+  const double **const forms[] = {&basis->linear, &basis->quadratic, &basis->cubic};
+  size_t present = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    present += supine_safetensors_find(c->file, names[i]) != NULL;
+  }
+  if (present == 0) {
+    return SUPINE_OK;
+  }
+  size_t count = g;
+  for (size_t i = 0; i < 3; ++i) {
+    *forms[i] = want_shape(c, names[i], SUPINE_F64, i + 2, shape);
+    if (*forms[i] == NULL) {
+      return SUPINE_ERROR_FORMAT;
+    }
+    count *= k;
+    if (!finite_doubles(*forms[i], count)) {
+      return refuse(c, "%s is not finite", names[i]);
+    }
+  }
+  info->has_volume = true;
+  return SUPINE_OK;
+}
+
+/* Takes the file, whatever comes of it. */
+static supine_status open_file(supine_safetensors *file, const char *name, supine_basis **result,
+                               supine_error *error) {
+  const check c = {file, name, error};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_basis *basis = calloc(1, sizeof *basis);
+  *result = NULL;
+  if (basis == NULL) {
+    supine_safetensors_close(file);
+    return supine_error_set(error, status, "%s: out of memory", name);
+  }
+  basis->file = file;
+  status = check_metadata(&c, &basis->info);
+  static supine_status (*const steps[])(const check *, supine_basis *) = {
+      check_surface, check_field, check_modes, check_lungs, check_volume};
+  for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
+    status = steps[i](&c, basis);
+  }
+  if (status != SUPINE_OK) {
+    supine_basis_close(basis);
+    return status;
+  }
+  *result = basis;
+  return SUPINE_OK;
+}
+
+supine_status supine_basis_open(const char *path, supine_basis **basis, supine_error *error) {
+  supine_safetensors *file = NULL;
+  *basis = NULL;
+  const supine_status status = supine_safetensors_open(path, &file, error);
+  return status != SUPINE_OK ? status : open_file(file, path, basis, error);
+}
+
+supine_status supine_basis_open_memory(const void *bytes, size_t size, supine_basis **basis,
+                                       supine_error *error) {
+  static const char name[] = "basis in memory";
+  supine_safetensors *file = NULL;
+  *basis = NULL;
+  const supine_status status = supine_safetensors_open_memory(bytes, size, name, &file, error);
+  return status != SUPINE_OK ? status : open_file(file, name, basis, error);
+}
+
+void supine_basis_close(supine_basis *basis) {
+  if (basis == NULL) {
+    return;
+  }
+  supine_safetensors_close(basis->file);
+  free(basis);
+}
+
+const supine_basis_info *supine_basis_get_info(const supine_basis *basis) {
+  return &basis->info;
+}
+
+const char *supine_basis_metadata(const supine_basis *basis, const char *key) {
+  return supine_safetensors_metadata(basis->file, key);
+}
+
+const float *supine_basis_vertices(const supine_basis *basis) {
+  return basis->vertices;
+}
+
+const uint32_t *supine_basis_triangles(const supine_basis *basis) {
+  return basis->triangles;
+}

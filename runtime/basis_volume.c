@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+/* Exact volumes of a basis, from its forms in the weights. */
+#include <supine/volume.h>
+
+#include "internal.h"
+
+static void add_lung(const supine_basis *basis, size_t lung, const double *weights,
+                     double cubic[3]) {
+  const size_t k = basis->info.mode_count;
+  supine_volume_add(k, basis->linear + lung * k, basis->quadratic + lung * k * k,
+                    basis->cubic + lung * k * k * k, weights, cubic);
+}
+
+static supine_status need_volume(const supine_basis *basis, supine_error *error) {
+  return basis->info.has_volume
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                                "the basis has no volumes, as its surface is open: give a breath "
+                                "scale instead, or close the mesh");
+}
+
+double supine_basis_lung_volume(const supine_basis *basis, size_t lung, const double *weights,
+                                double scale) {
+  double cubic[3] = {0, 0, 0};
+  add_lung(basis, lung, weights, cubic);
+  return supine_volume_at(cubic, scale);
+}
+
+supine_status supine_basis_scale(const supine_basis *basis, const double *weights, double volume,
+                                 double *scale, supine_error *error) {
+  const supine_status status = need_volume(basis, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  double cubic[3] = {0, 0, 0};
+  for (size_t i = 0; i < basis->info.lung_count; ++i) {
+    add_lung(basis, i, weights, cubic);
+  }
+  return supine_volume_scale(cubic, volume, scale, error);
+}
+
+supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung, const double *weights,
+                                      double volume, double *scale, supine_error *error) {
+  const supine_status status = need_volume(basis, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (lung >= basis->info.lung_count) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
+                            basis->info.lung_count);
+  }
+  double cubic[3] = {0, 0, 0};
+  add_lung(basis, lung, weights, cubic);
+  return supine_volume_scale(cubic, volume, scale, error);
+}

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the commands of the program share: how they fail, read their arguments and show progress. */
+#ifndef SUPINE_COMMAND_H
+#define SUPINE_COMMAND_H
+
+#include <getopt.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include <supine/status.h>
+
+/* Exit codes of the program. */
+enum {
+  SUPINE_EXIT_OK = 0,
+  SUPINE_EXIT_USAGE = 1,
+  SUPINE_EXIT_INPUT = 2,
+  SUPINE_EXIT_UNSUPPORTED = 3,
+  SUPINE_EXIT_OUTPUT = 4,
+  SUPINE_EXIT_NUMERICAL = 5
+};
+
+/* A command: its own name is argv[0]; returns an exit code. */
+typedef int supine_command_function(int argc, char **argv);
+
+supine_command_function supine_command_phantom;
+supine_command_function supine_command_precompute;
+supine_command_function supine_command_info;
+supine_command_function supine_command_deform;
+supine_command_function supine_command_solve;
+supine_command_function supine_command_pv;
+
+/* The exit code that a status ends the program with. */
+int supine_exit_code(supine_status status);
+
+/* Prints "supine COMMAND: MESSAGE" to stderr. */
+void supine_command_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+
+/* Prints the error's message and returns its exit code. */
+int supine_command_fail(const char *command, const supine_error *error);
+
+/* Prints a message and "Try 'supine COMMAND --help'."; returns SUPINE_EXIT_USAGE. */
+int supine_command_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+
+/* Results reached stdout? Flushes; a full disk or closed pipe ends with SUPINE_EXIT_OUTPUT. */
+int supine_command_finish(const char *command);
+
+/* Reads a finite number, or a whole one, that takes up the whole text. */
+bool supine_parse_number(const char *text, double *value);
+bool supine_parse_count(const char *text, size_t *value);
+
+/* Reads exactly `count` finite numbers separated by commas. */
+bool supine_parse_numbers(const char *text, size_t count, double *values);
+
+/* The candidate that is fewest edits from `text`, or NULL where all are far. */
+const char *supine_suggest(const char *text, const char *const *candidates, size_t count);
+
+/* The value that follows option `name`, or a usage error that names what is missing is printed by
+ * getopt_long itself: commands pass ":" first in their short options and call this on '?' and ':'. */
+int supine_command_bad_option(const char *command, const struct option *options, int result,
+                              char **argv);
+
+/* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches
+ * supine_progress_function; false after SIGINT or SIGTERM. */
+typedef struct supine_progress {
+  const char *label;
+  double start;  /* seconds */
+  double shown;  /* when last rewritten */
+  bool terminal; /* stderr is one */
+} supine_progress;
+
+supine_progress supine_progress_begin(const char *label);
+bool supine_progress_step(void *progress, double fraction);
+void supine_progress_end(supine_progress *progress);
+
+/* Lets SIGINT and SIGTERM ask for an orderly end instead of ending the program. */
+void supine_interrupts_catch(void);
+bool supine_interrupted(void);
+
+#endif

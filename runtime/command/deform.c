@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine deform: a basis, a direction of gravity and a volume in, a deformed surface out. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/mesh.h>
+#include <supine/runtime.h>
+
+#include "basis_input.h"
+#include "orientation.h"
+
+static const char name[] = "deform";
+
+static const char help[] =
+    "Usage: supine deform BASIS --posture NAME [--volume ML] -o FILE\n"
+    "\n"
+    "Deforms the lungs of a basis file for any direction of gravity and any volume and writes the\n"
+    "surface. This is what the run-time library does each frame.\n"
+    "\n"
+    "  -o, --output FILE    .ply, .obj, .stl or .vtp; PLY and VTP carry the displacement\n"
+    "  --volume ML          air above the resting volume, both lungs together: the surface grows\n"
+    "                       by exactly that; may be negative; default 500\n"
+    "  --volume left=ML,right=ML   or lung by lung\n"
+    "  --scale MM           largest displacement instead, mm: for open surfaces\n"
+    "\n";
+
+static const char examples[] =
+    "\n"
+    "Examples:\n"
+    "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
+    "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 -o out.ply\n";
+
+typedef struct request {
+  supine_orientation orientation;
+  const char *path;
+  const char *volume; /* as given, or NULL */
+  bool has_scale;
+  double scale;
+} request;
+
+/* Positions at the given scales as doubles, for measuring and saving. */
+static supine_status deformed_mesh(const supine_basis *basis, const double *weights,
+                                   const double *scales, supine_mesh *mesh) {
+  const size_t n = mesh->vertex_count;
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  if (xyz == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_deform(basis, weights, scales, xyz);
+  for (size_t i = 0; i < 3 * n; ++i) {
+    mesh->vertices[i] = (double)xyz[i];
+  }
+  free(xyz);
+  return SUPINE_OK;
+}
+
+static double largest_displacement(const supine_mesh *rest, const supine_mesh *mesh) {
+  double largest = 0.0;
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    const double *a = rest->vertices + 3 * i;
+    const double *b = mesh->vertices + 3 * i;
+    largest = fmax(largest, hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]));
+  }
+  return largest;
+}
+
+/* Breath scales for what was asked: a largest displacement, or volumes. */
+static int find_scales(const supine_basis *basis, const request *wanted, const double *weights,
+                       const supine_mesh *rest, supine_mesh *mesh, double *scales) {
+  const size_t lungs = supine_basis_get_info(basis)->lung_count;
+  if (!wanted->has_scale) {
+    return supine_basis_volume_scales(basis, name, weights, wanted->volume, scales);
+  }
+  for (size_t j = 0; j < lungs; ++j) {
+    scales[j] = 1.0;
+  }
+  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  if (deformed_mesh(basis, weights, scales, mesh) != SUPINE_OK) {
+    return supine_command_fail(name, &error);
+  }
+  const double largest = largest_displacement(rest, mesh);
+  if (!(largest > 0.0)) {
+    supine_command_say(name, "nothing moves in this direction: no scale gives %g mm",
+                       wanted->scale);
+    return SUPINE_EXIT_NUMERICAL;
+  }
+  for (size_t j = 0; j < lungs; ++j) {
+    scales[j] = wanted->scale / largest;
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  supine_mesh rest = {0};
+  supine_mesh mesh = {0};
+  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  int result = SUPINE_EXIT_OK;
+  if (supine_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+      supine_basis_rest_mesh(basis, &mesh) != SUPINE_OK ||
+      supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {
+    result = supine_command_fail(name, &error);
+    goto cleanup;
+  }
+  result = find_scales(basis, wanted, weights, &rest, &mesh, scales);
+  if (result != SUPINE_EXIT_OK) {
+    goto cleanup;
+  }
+  const supine_mesh_save_options save = {.rest = rest.vertices};
+  if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK ||
+      supine_mesh_save(wanted->path, &mesh, &save, &error) != SUPINE_OK) {
+    result = supine_command_fail(name, &error);
+    goto cleanup;
+  }
+  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->path, gravity[0],
+               gravity[1], gravity[2], largest_displacement(&rest, &mesh));
+  if (info->has_volume) {
+    (void)printf(", %+.2f mL", 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest)));
+  }
+  (void)putchar('\n');
+  result = supine_command_finish(name);
+cleanup:
+  supine_mesh_free(&rest);
+  supine_mesh_free(&mesh);
+  return result;
+}
+
+int supine_command_deform(int argc, char **argv) {
+  enum { VOLUME = OPTION_ORIENTATION_END, SCALE };
+  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                          {"volume", required_argument, NULL, VOLUME},
+                                          {"scale", required_argument, NULL, SCALE},
+                                          SUPINE_ORIENTATION_OPTIONS,
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+  request wanted = {0};
+  int option;
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
+    int result = SUPINE_EXIT_OK;
+    switch (option) {
+    case 'o':
+      wanted.path = optarg;
+      break;
+    case VOLUME:
+      wanted.volume = optarg;
+      break;
+    case SCALE:
+      wanted.has_scale = supine_parse_number(optarg, &wanted.scale);
+      if (!wanted.has_scale) {
+        result = supine_command_usage(name, "--scale takes millimetres, not '%s'", optarg);
+      }
+      break;
+    case OPTION_POSTURE:
+    case OPTION_GRAVITY:
+    case OPTION_QUATERNION:
+    case OPTION_TILT:
+      result = supine_orientation_take(&wanted.orientation, name, option, optarg);
+      break;
+    case 'h':
+      (void)fputs(help, stdout);
+      (void)fputs(supine_orientation_help, stdout);
+      (void)fputs(examples, stdout);
+      return supine_command_finish(name);
+    default:
+      return supine_command_bad_option(name, options, option, argv);
+    }
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+  }
+  if (argc - optind != 1) {
+    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+  }
+  if (wanted.path == NULL) {
+    return supine_command_usage(name, "-o FILE is missing");
+  }
+  if (!supine_mesh_save_supports(wanted.path)) {
+    return supine_command_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+                                wanted.path);
+  }
+  if (wanted.volume != NULL && wanted.has_scale) {
+    return supine_command_usage(name, "give --volume or --scale, not both");
+  }
+  double gravity[3];
+  int result = supine_orientation_finish(&wanted.orientation, name, gravity);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  supine_basis *basis = NULL;
+  supine_error error;
+  if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
+    return supine_command_fail(name, &error);
+  }
+  result = deform(basis, &wanted, gravity);
+  supine_basis_close(basis);
+  return result;
+}

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine info: what a basis file holds and how exact it is. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include <supine/runtime.h>
+#include <supine/safetensors.h>
+
+#include "basis_input.h"
+
+static const char name[] = "info";
+
+static const char help[] =
+    "Usage: supine info BASIS [--json]\n"
+    "\n"
+    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, and\n"
+    "its error, measured against the full solve on directions that no grid used.\n"
+    "\n"
+    "Energy per band is the share of the squared displacement, over all orientations, that the\n"
+    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands beyond\n"
+    "l = 0 are what makes prone more than the reverse of supine.\n"
+    "\n"
+    "  --json               the same for programs\n";
+
+/* Share of the squared displacement in each band, [band + 1]: sum over the band's harmonics of
+ * modes^T G modes with G = sum over vertices of |d|^2 c c^T. */
+static bool band_energy(const supine_safetensors *file, const supine_basis_info *info,
+                        double *energy) {
+  const size_t k = info->mode_count;
+  const size_t terms = (info->band + 1) * (info->band + 1);
+  const float *c = supine_safetensors_find(file, "coefficients")->data;
+  const double *modes = supine_safetensors_find(file, "modes")->data;
+  const float *d = info->vector ? NULL : supine_safetensors_find(file, "direction")->data;
+  const size_t rows = info->vertex_count * (info->vector ? 3 : 1);
+  double *gram = calloc(k * k, sizeof *gram);
+  if (gram == NULL) {
+    return false;
+  }
+  for (size_t i = 0; i < rows; ++i) {
+    const float *u = d + 3 * i;
+    const double weight =
+        info->vector ? 1.0 : (double)u[0] * u[0] + (double)u[1] * u[1] + (double)u[2] * u[2];
+    for (size_t a = 0; a < k; ++a) {
+      const double scaled = weight * (double)c[i * k + a];
+      for (size_t b = a; b < k; ++b) {
+        gram[a * k + b] += scaled * (double)c[i * k + b];
+      }
+    }
+  }
+  double total = 0.0;
+  size_t t = 0;
+  for (size_t l = 0; l <= info->band; ++l) {
+    energy[l] = 0.0;
+    for (; t < (l + 1) * (l + 1); ++t) {
+      for (size_t a = 0; a < k; ++a) {
+        for (size_t b = 0; b < k; ++b) {
+          const double g = a <= b ? gram[a * k + b] : gram[b * k + a];
+          energy[l] += modes[a * terms + t] * g * modes[b * terms + t];
+        }
+      }
+    }
+    total += energy[l];
+  }
+  for (size_t l = 0; l <= info->band; ++l) {
+    energy[l] /= total;
+  }
+  free(gram);
+  return true;
+}
+
+static const char *const shown[] = {"force",        "direction",    "direction_constants",
+                                    "stiffness",    "midline_mm",   "rest_volume_ml",
+                                    "made_by"};
+static const char *const errors[] = {
+    "error_directions", "error_rms_percent", "error_p95_percent", "error_max_percent",
+    "error_volume_ml",  "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+
+static const char *text_of(const supine_basis *basis, const char *key) {
+  const char *value = supine_basis_metadata(basis, key);
+  return value != NULL ? value : "?";
+}
+
+static void print_text(const char *path, const supine_basis *basis, const double *energy) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  (void)printf("%s: basis of %zu lung%s (%s), %s field\n", path, info->lung_count,
+               info->lung_count == 1 ? "" : "s", text_of(basis, "lungs"),
+               info->vector ? "vector" : "scalar");
+  (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
+               info->has_volume ? "closed: volumes are exact" : "open: no volumes");
+  (void)printf("  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
+               info->mode_count,
+               strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
+               info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
+               info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
+  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
+    if (supine_basis_metadata(basis, shown[i]) != NULL) {
+      (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
+    }
+  }
+  if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
+    (void)printf("\nError against the full solve, on %s directions that no grid used:\n"
+                 "             RMS   95th percentile   largest\n"
+                 "  %%   %10s   %15s   %7s   of the RMS displacement\n",
+                 text_of(basis, "error_directions"), text_of(basis, "error_rms_percent"),
+                 text_of(basis, "error_p95_percent"), text_of(basis, "error_max_percent"));
+    if (supine_basis_metadata(basis, "error_volume_ml") != NULL) {
+      (void)printf("  mm  %10s   %15s   %7s   at %s mL\n", text_of(basis, "error_rms_mm"),
+                   text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"),
+                   text_of(basis, "error_volume_ml"));
+    }
+  }
+  (void)puts("\nEnergy per band:");
+  double odd = 0.0;
+  double even = 0.0;
+  for (size_t l = 0; l <= info->band; ++l) {
+    odd += l % 2 == 1 ? energy[l] : 0.0;
+    even += l % 2 == 0 && l > 0 ? energy[l] : 0.0;
+    if (energy[l] >= 5e-8) {
+      (void)printf("  l = %-3zu %10.5f %%\n", l, 100.0 * energy[l]);
+    }
+  }
+  (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
+}
+
+static json_t *number_or_text(const char *text) {
+  double value;
+  return supine_parse_number(text, &value) ? json_real(value) : json_string(text);
+}
+
+static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  json_t *bands = json_array();
+  json_t *error = json_object();
+  for (size_t l = 0; l <= info->band; ++l) {
+    (void)json_array_append_new(bands, json_real(energy[l]));
+  }
+  for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
+    const char *value = supine_basis_metadata(basis, errors[i]);
+    if (value != NULL) {
+      (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
+    }
+  }
+  json_t *root = json_pack(
+      "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
+      text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
+      (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
+      (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
+      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band", bands,
+      "error", error);
+  bool good = root != NULL;
+  for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
+    const char *value = supine_basis_metadata(basis, shown[i]);
+    good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
+  }
+  good = good && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+  (void)putchar('\n');
+  json_decref(root);
+  return good;
+}
+
+int supine_command_info(int argc, char **argv) {
+  static const struct option options[] = {
+      {"json", no_argument, NULL, 'j'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
+  bool json = false;
+  int option;
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
+    switch (option) {
+    case 'j':
+      json = true;
+      break;
+    case 'h':
+      (void)fputs(help, stdout);
+      return supine_command_finish(name);
+    default:
+      return supine_command_bad_option(name, options, option, argv);
+    }
+  }
+  if (argc - optind != 1) {
+    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+  }
+  const char *path = argv[optind];
+  supine_basis *basis = NULL;
+  supine_safetensors *file = NULL;
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  double *energy = NULL;
+  if (supine_basis_open(path, &basis, &error) != SUPINE_OK ||
+      supine_safetensors_open(path, &file, &error) != SUPINE_OK) {
+    result = supine_command_fail(name, &error);
+    goto cleanup;
+  }
+  energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
+  if (energy == NULL || !band_energy(file, supine_basis_get_info(basis), energy)) {
+    supine_command_say(name, "out of memory");
+    result = SUPINE_EXIT_NUMERICAL;
+    goto cleanup;
+  }
+  if (json && !print_json(path, basis, energy)) {
+    supine_command_say(name, "cannot print JSON");
+    result = SUPINE_EXIT_OUTPUT;
+    goto cleanup;
+  }
+  if (!json) {
+    print_text(path, basis, energy);
+  }
+  result = supine_command_finish(name);
+cleanup:
+  free(energy);
+  supine_safetensors_close(file);
+  supine_basis_close(basis);
+  return result;
+}

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+/* Directions of gravity: by posture, by DICOM patient position, by orientation, by tilt. */
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include <supine/posture.h>
+
+static const struct {
+  const char *name;
+  double gravity[3];
+} postures[] = {
+    {"supine", {0, 1, 0}},       {"prone", {0, -1, 0}},         {"left", {1, 0, 0}},
+    {"right", {-1, 0, 0}},       {"upright", {0, 0, -1}},       {"inverted", {0, 0, 1}},
+    {"left-lateral", {1, 0, 0}}, {"right-lateral", {-1, 0, 0}}, {"HFS", {0, 1, 0}},
+    {"FFS", {0, 1, 0}},          {"HFP", {0, -1, 0}},           {"FFP", {0, -1, 0}},
+    {"HFDL", {1, 0, 0}},         {"FFDL", {1, 0, 0}},           {"HFDR", {-1, 0, 0}},
+    {"FFDR", {-1, 0, 0}},
+};
+
+enum { POSTURES = sizeof postures / sizeof *postures, NAME_MAX_LENGTH = 15 };
+
+/* ASCII alone, whatever the locale. */
+static int lower(char c) {
+  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+}
+
+static bool same(const char *a, const char *b) {
+  while (*a != '\0' && lower(*a) == lower(*b)) {
+    ++a;
+    ++b;
+  }
+  return *a == *b;
+}
+
+supine_status supine_posture_gravity(const char *name, double gravity[3]) {
+  for (size_t i = 0; i < POSTURES; ++i) {
+    if (same(name, postures[i].name)) {
+      memcpy(gravity, postures[i].gravity, sizeof postures[i].gravity);
+      return SUPINE_OK;
+    }
+  }
+  return SUPINE_ERROR_ARGUMENT;
+}
+
+size_t supine_posture_count(void) {
+  return POSTURES;
+}
+
+const char *supine_posture_name(size_t index) {
+  return index < POSTURES ? postures[index].name : NULL;
+}
+
+/* Edit distance, row by row over `text`, which may be long. */
+static size_t distance(const char *text, const char *name) {
+  const size_t length = strlen(name);
+  size_t row[NAME_MAX_LENGTH + 1];
+  for (size_t j = 0; j <= length; ++j) {
+    row[j] = j;
+  }
+  for (const char *c = text; *c != '\0'; ++c) {
+    size_t diagonal = row[0]++;
+    for (size_t j = 1; j <= length; ++j) {
+      const size_t replaced = diagonal + (lower(*c) != lower(name[j - 1]));
+      const size_t shifted = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
+      diagonal = row[j];
+      row[j] = replaced < shifted ? replaced : shifted;
+    }
+  }
+  return row[length];
+}
+
+const char *supine_posture_nearest(const char *name) {
+  size_t best = 0;
+  size_t fewest = distance(name, postures[0].name);
+  for (size_t i = 1; i < POSTURES; ++i) {
+    const size_t edits = distance(name, postures[i].name);
+    if (edits < fewest) {
+      fewest = edits;
+      best = i;
+    }
+  }
+  return postures[best].name;
+}
+
+supine_status supine_posture_quaternion(const double quaternion[4], double gravity[3]) {
+  double largest = 0;
+  for (int i = 0; i < 4; ++i) {
+    if (!isfinite(quaternion[i])) {
+      return SUPINE_ERROR_ARGUMENT;
+    }
+    largest = fmax(largest, fabs(quaternion[i]));
+  }
+  if (largest == 0) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  const double w = quaternion[0] / largest;
+  const double x = quaternion[1] / largest;
+  const double y = quaternion[2] / largest;
+  const double z = quaternion[3] / largest;
+  const double square = w * w + x * x + y * y + z * z;
+  /* Minus the third row of R. */
+  gravity[0] = 2 * (w * y - x * z) / square;
+  gravity[1] = (0 - 2 * (y * z + w * x)) / square;
+  gravity[2] = (x * x + y * y - w * w - z * z) / square;
+  return SUPINE_OK;
+}
+
+supine_status supine_posture_tilt(const double gravity[3], double degrees, double tilted[3]) {
+  if (!isfinite(degrees) || !isfinite(gravity[0]) || !isfinite(gravity[1]) ||
+      !isfinite(gravity[2])) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  const double radians = remainder(degrees, 360) * (3.14159265358979323846 / 180);
+  const double y = gravity[1];
+  const double z = gravity[2];
+  tilted[0] = gravity[0];
+  tilted[1] = y * cos(radians) - z * sin(radians);
+  tilted[2] = y * sin(radians) + z * cos(radians);
+  return SUPINE_OK;
+}

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The program: picks the command. */
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <gsl/gsl_errno.h>
+
+#include "runtime/command/command.h"
+
+static const struct {
+  const char *name;
+  supine_command_function *function;
+  const char *summary;
+} commands[] = {
+    {"phantom", supine_command_phantom, "make a pair of lungs, at any resolution"},
+    {"precompute", supine_command_precompute, "turn lung surfaces into a basis file (offline)"},
+    {"info", supine_command_info, "say what a basis file holds and how exact it is"},
+    {"deform", supine_command_deform, "deform a basis for a posture and a volume"},
+    {"solve", supine_command_solve, "full physics for one posture: the reference"},
+    {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
+};
+
+enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
+
+static void print_help(void) {
+  (void)puts("supine - lungs that deform with gravity, in real time\n"
+             "\n"
+             "Usage: supine COMMAND [OPTIONS]\n"
+             "\n"
+             "Commands:");
+  for (size_t i = 0; i < COMMAND_COUNT; ++i) {
+    (void)printf("  %-11s %s\n", commands[i].name, commands[i].summary);
+  }
+  (void)puts("\n"
+             "'supine COMMAND --help' teaches each. A first round, without any data:\n"
+             "\n"
+             "  supine phantom -o lungs.ply\n"
+             "  supine precompute lungs.ply -o lungs.safetensors\n"
+             "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
+             "\n"
+             "Lengths are millimetres and volumes millilitres; axes are the DICOM patient axes\n"
+             "(x to the left, y to the back, z to the head).\n"
+             "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
+}
+
+/* Position of a command in the table, or COMMAND_COUNT. */
+static size_t find_command(const char *name) {
+  size_t i = 0;
+  while (i < COMMAND_COUNT && strcmp(name, commands[i].name) != 0) {
+    ++i;
+  }
+  return i;
+}
+
+static int unknown_command(const char *name) {
+  const char *names[COMMAND_COUNT];
+  for (size_t i = 0; i < COMMAND_COUNT; ++i) {
+    names[i] = commands[i].name;
+  }
+  const char *nearest = supine_suggest(name, names, COMMAND_COUNT);
+  if (nearest != NULL) {
+    (void)fprintf(stderr, "supine: no command '%s'; did you mean '%s'?\n", name, nearest);
+  } else {
+    (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists them\n", name);
+  }
+  return SUPINE_EXIT_USAGE;
+}
+
+int main(int argc, char **argv) {
+  (void)gsl_set_error_handler_off();
+  if (argc < 2) {
+    print_help();
+    return SUPINE_EXIT_USAGE;
+  }
+  const char *name = argv[1];
+  const bool help =
+      strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0;
+  if (help && argc == 2) {
+    print_help();
+    return supine_command_finish("help");
+  }
+  if (strcmp(name, "--version") == 0) {
+    (void)puts("supine " SUPINE_VERSION);
+    return supine_command_finish("version");
+  }
+  const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
+  const size_t index = find_command(wanted);
+  if (index == COMMAND_COUNT) {
+    return unknown_command(wanted);
+  }
+  if (help) {
+    char option[] = "--help";
+    char *arguments[] = {argv[2], option, NULL};
+    return commands[index].function(2, arguments);
+  }
+  return commands[index].function(argc - 1, argv + 1);
+}

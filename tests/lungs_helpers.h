@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Surfaces and numbers that several tests share. */
+#ifndef SUPINE_LUNGS_HELPERS_H
+#define SUPINE_LUNGS_HELPERS_H
+
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <supine/lungs.h>
+#include <supine/mesh.h>
+
+#include "../precompute/geodesic.h"
+#include "sh_helpers.h"
+
+/* Irregular numbers in [0, 1). */
+static inline double helper_random(uint64_t *seed) {
+  return 0.5 + 0.5 * random_signed(seed);
+}
+
+/* A closed surface of 10 f^2 + 2 vertices, lumpy, nowhere symmetric, about 200 mm across, centred at x. */
+static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
+  supine_mesh mesh = {.vertex_count = supine_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_geodesic_triangle_count(frequency)};
+  mesh.vertices = malloc(3 * mesh.vertex_count * sizeof *mesh.vertices);
+  mesh.triangles = malloc(3 * mesh.triangle_count * sizeof *mesh.triangles);
+  supine_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    double *p = mesh.vertices + 3 * i;
+    const double radius = 80.0 + 15.0 * p[0] * p[1] + 9.0 * p[2] * p[2] * p[0] + 0.5 * helper_random(&seed);
+    p[0] = x + 0.7 * radius * p[0];
+    p[1] = 3.1 + 1.1 * radius * p[1];
+    p[2] = -40.7 + 1.6 * radius * p[2];
+  }
+  return mesh;
+}
+
+/* Loads surfaces of ../shared/data as one model; false where they are not there. */
+static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
+                                     supine_lungs *lungs) {
+  supine_mesh meshes[2] = {0};
+  bool loaded = true;
+  for (size_t i = 0; i < count && loaded; ++i) {
+    char path[512];
+    (void)snprintf(path, sizeof path, "%s/%s", SUPINE_TEST_DATA, names[i]);
+    if (access(path, R_OK) != 0) {
+      printf("skipped: %s is not there\n", names[i]);
+      loaded = false;
+      break;
+    }
+    const supine_mesh_load_options options = {.axes = axes};
+    supine_error error;
+    if (supine_mesh_load(path, &options, &meshes[i], NULL, &error) != SUPINE_OK) {
+      printf("%s\n", error.message);
+      abort();
+    }
+  }
+  if (loaded && supine_lungs_create(meshes, count, NULL, lungs, NULL) != SUPINE_OK) {
+    abort();
+  }
+  for (size_t i = 0; i < count; ++i) {
+    supine_mesh_free(&meshes[i]);
+  }
+  return loaded;
+}
+
+/* Largest |a - b|, and largest |a|. */
+static inline double helper_difference(size_t count, const double *a, const double *b) {
+  double largest = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    largest = fmax(largest, fabs(a[i] - b[i]));
+  }
+  return largest;
+}
+
+static inline double helper_largest(size_t count, const double *a) {
+  double largest = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    largest = fmax(largest, fabs(a[i]));
+  }
+  return largest;
+}
+
+#endif

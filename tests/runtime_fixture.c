@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <dirent.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/safetensors.h>
+
+#include "runtime_fixture.h"
+
+double fixture_random(uint64_t *state) {
+  /* splitmix64 */
+  uint64_t z = (*state += UINT64_C(0x9E3779B97F4A7C15));
+  z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+  z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+  return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
+}
+
+/* A bipyramid over a polygon on vertices begin <= i < end, and its triangles. */
+static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
+  const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
+  for (size_t i = begin; i < end; ++i) {
+    float *p = f->vertex + 3 * i;
+    const double turn = 2.399 * (double)(i - begin);
+    const double angle =
+        corners > 0 ? 6.283185307179586 * (double)(i - begin) / (double)corners : turn;
+    const bool tip = corners > 0 && i >= end - 2;
+    const double height = tip ? (i == end - 1 ? 131.7 : -118.3) : 7 * fixture_random(state);
+    p[0] = (float)(150.3 * ((double)lung - 0.5) + (tip ? 0 : 70.7 * cos(angle)));
+    p[1] = (float)(tip ? 3.1 : 88.9 * sin(angle));
+    p[2] = (float)height;
+    f->lung[i] = (unsigned char)lung;
+  }
+  for (size_t j = 0; j < corners; ++j) {
+    const uint32_t here = (uint32_t)(begin + j);
+    const uint32_t next = (uint32_t)(begin + (j + 1) % corners);
+    const uint32_t down = (uint32_t)(end - 2);
+    const uint32_t up = (uint32_t)(end - 1);
+    const uint32_t pair[6] = {here, next, up, next, here, down};
+    memcpy(f->triangle + 3 * f->triangles, pair, sizeof pair);
+    f->triangles += 2;
+  }
+}
+
+/* Field k of vertex i, mm. */
+static void field(const fixture *f, size_t i, size_t k, double u[3]) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    u[axis] = f->vector
+                  ? (double)f->coefficient[(3 * i + axis) * f->modes + k]
+                  : (double)f->coefficient[i * f->modes + k] * (double)f->direction[3 * i + axis];
+  }
+}
+
+static double det(const double *a, const double *b, const double *c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+/* The forms of one triangle: det of three corners, each rest + s * sum of w_k u_k; mm^3 / 1000. */
+static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
+  const size_t K = f->modes;
+  double r[3][3];
+  for (size_t v = 0; v < 3; ++v) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      r[v][axis] = (double)f->vertex[3 * corner[v] + axis];
+    }
+  }
+  for (size_t i = 0; i < K; ++i) {
+    double a[3][3];
+    for (size_t v = 0; v < 3; ++v) {
+      field(f, corner[v], i, a[v]);
+    }
+    f->linear[lung * K + i] +=
+        (det(a[0], r[1], r[2]) + det(r[0], a[1], r[2]) + det(r[0], r[1], a[2])) / 6000;
+    for (size_t j = 0; j < K; ++j) {
+      double b[3][3];
+      for (int v = 0; v < 3; ++v) {
+        field(f, corner[v], j, b[v]);
+      }
+      f->quadratic[(lung * K + i) * K + j] +=
+          (det(a[0], b[1], r[2]) + det(a[0], r[1], b[2]) + det(r[0], a[1], b[2])) / 6000;
+      for (size_t m = 0; m < K; ++m) {
+        double c[3];
+        field(f, corner[2], m, c);
+        f->cubic[((lung * K + i) * K + j) * K + m] += det(a[0], b[1], c) / 6000;
+      }
+    }
+  }
+}
+
+fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
+                        bool volume, double amplitude, uint64_t seed) {
+  assert_true(vertices > 0 && modes > 0 && lungs > 0);
+  uint64_t state = seed;
+  fixture *f = calloc(1, sizeof *f);
+  assert_non_null(f);
+  *f = (fixture){.vertices = vertices,
+                 .modes = modes,
+                 .band = band,
+                 .lungs = lungs,
+                 .vector = vector,
+                 .volume = volume};
+  const size_t axes = vector ? 3 : 1;
+  const size_t harmonics = (band + 1) * (band + 1);
+  f->vertex = calloc(3 * vertices, sizeof *f->vertex);
+  f->triangle = calloc(6 * vertices, sizeof *f->triangle);
+  f->direction = calloc(3 * vertices, sizeof *f->direction);
+  f->coefficient = calloc(axes * vertices * modes, sizeof *f->coefficient);
+  f->mode = calloc(modes * harmonics, sizeof *f->mode);
+  f->lung = calloc(vertices, 1);
+  assert_true(f->vertex && f->triangle && f->direction && f->coefficient && f->mode && f->lung);
+  for (size_t j = 0; j < lungs; ++j) {
+    f->lung_begin[j + 1] = vertices * (j + 1) / lungs;
+    make_lung(f, j, f->lung_begin[j], f->lung_begin[j + 1], &state);
+  }
+  for (size_t i = 0; i < 3 * vertices; ++i) {
+    f->direction[i] = (float)(amplitude * fixture_random(&state));
+  }
+  for (size_t i = 0; i < axes * vertices * modes; ++i) {
+    const double size = (vector ? amplitude : 1) / (1 + 0.5 * (double)(i % modes));
+    f->coefficient[i] = (float)(size * fixture_random(&state));
+  }
+  for (size_t i = 0; i < modes * harmonics; ++i) {
+    f->mode[i] = fixture_random(&state);
+  }
+  if (volume) {
+    f->linear = calloc(lungs * modes + 1, sizeof *f->linear);
+    f->quadratic = calloc(lungs * modes * modes + 1, sizeof *f->quadratic);
+    f->cubic = calloc(lungs * modes * modes * modes + 1, sizeof *f->cubic);
+    assert_true(f->linear && f->quadratic && f->cubic);
+    for (size_t t = 0; t < f->triangles; ++t) {
+      add_forms(f, f->triangle + 3 * t, f->lung[f->triangle[3 * t]]);
+    }
+  }
+  return f;
+}
+
+void fixture_destroy(fixture *f) {
+  free(f->vertex);
+  free(f->triangle);
+  free(f->direction);
+  free(f->coefficient);
+  free(f->mode);
+  free(f->lung);
+  free(f->linear);
+  free(f->quadratic);
+  free(f->cubic);
+  free(f);
+}
+
+void fixture_write(const fixture *f, const char *path) {
+  const size_t n = f->vertices;
+  const size_t k = f->modes;
+  const size_t g = f->lungs;
+  supine_tensor tensors[9] = {
+      {"vertices", SUPINE_F32, 2, {n, 3}, f->vertex},
+      {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
+      {"coefficients", SUPINE_F32, 2, {n, k}, f->coefficient},
+      {"modes", SUPINE_F64, 2, {k, (f->band + 1) * (f->band + 1)}, f->mode},
+      {"lung", SUPINE_U8, 1, {n}, f->lung},
+  };
+  size_t count = 5;
+  if (f->vector) {
+    tensors[2] = (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, f->coefficient};
+  } else {
+    tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, f->direction};
+  }
+  if (f->volume) {
+    tensors[count++] = (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, f->linear};
+    tensors[count++] = (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, f->quadratic};
+    tensors[count++] = (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, f->cubic};
+  }
+  const supine_metadata metadata[] = {
+      {"format", "supine-basis"},
+      {"version", "1"},
+      {"kind", f->vector ? "vector" : "scalar"},
+      {"units", "mm"},
+  };
+  supine_error error = {0};
+  const supine_status status = supine_safetensors_write(path, tensors, count, metadata, 4, &error);
+  if (status != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+}
+
+unsigned char *fixture_read(const char *path, size_t *size) {
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  unsigned char *bytes = malloc(*size + 1);
+  assert_non_null(bytes);
+  assert_int_equal(fread(bytes, 1, *size, file), *size);
+  (void)fclose(file);
+  return bytes;
+}
+
+unsigned char *fixture_bytes(const fixture *f, size_t *size) {
+  char *folder = fixture_folder();
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/basis.safetensors", folder);
+  fixture_write(f, path);
+  unsigned char *bytes = fixture_read(path, size);
+  fixture_folder_remove(folder);
+  return bytes;
+}
+
+void fixture_deform(const fixture *f, const double *weights, const double *scales, double *xyz) {
+  for (size_t i = 0; i < f->vertices; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[3 * i + axis] = (double)f->vertex[3 * i + axis];
+    }
+    for (size_t k = 0; k < f->modes; ++k) {
+      double u[3];
+      field(f, i, k, u);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * i + axis] += scales[f->lung[i]] * weights[k] * u[axis];
+      }
+    }
+  }
+}
+
+double fixture_volume(const fixture *f, size_t lung, const double *xyz) {
+  double sum = 0;
+  for (size_t t = 0; t < f->triangles; ++t) {
+    const uint32_t *corner = f->triangle + 3 * t;
+    if (f->lung[corner[0]] == lung) {
+      sum += det(xyz + 3 * corner[0], xyz + 3 * corner[1], xyz + 3 * corner[2]);
+    }
+  }
+  return sum / 6000;
+}
+
+char *fixture_folder(void) {
+  char *folder = strdup("/tmp/supine-test-XXXXXX");
+  assert_non_null(folder);
+  assert_non_null(mkdtemp(folder));
+  return folder;
+}
+
+void fixture_folder_remove(char *folder) {
+  DIR *listing = opendir(folder);
+  assert_non_null(listing);
+  for (const struct dirent *item = readdir(listing); item != NULL; item = readdir(listing)) {
+    char path[512];
+    (void)snprintf(path, sizeof path, "%s/%s", folder, item->d_name);
+    (void)unlink(path);
+  }
+  (void)closedir(listing);
+  assert_int_equal(rmdir(folder), 0);
+  free(folder);
+}

@@ -1,0 +1,514 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The fast equilibrium solve against the definitions, the paper's iteration and its invariants. */
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <gsl/gsl_linalg.h>
+#include <suitesparse/umfpack.h>
+
+#include <supine/equilibrium.h>
+
+#include "full_operator.h"
+#include "lungs_helpers.h"
+
+/* A lumpy surface with irregular stiffness and forces. */
+typedef struct fixture {
+  supine_mesh mesh;
+  supine_topology topology;
+  supine_network *network;
+  double *stiffness; /* geometric mean far from 1 */
+  double *force;     /* [N, 3] */
+} fixture;
+
+static int setup(void **state) {
+  fixture *f = calloc(1, sizeof *f);
+  uint64_t seed = 20081;
+  f->mesh = helper_lump(4, 60.0, 77);
+  assert_int_equal(supine_topology_create(&f->mesh, &f->topology), SUPINE_OK);
+  assert_int_equal(supine_network_create(&f->mesh, &f->topology, &f->network), SUPINE_OK);
+  f->stiffness = malloc(f->mesh.vertex_count * sizeof(double));
+  f->force = malloc(3 * f->mesh.vertex_count * sizeof(double));
+  for (size_t i = 0; i < f->mesh.vertex_count; ++i) {
+    f->stiffness[i] = 0.2 + 7.0 * helper_random(&seed);
+  }
+  for (size_t i = 0; i < 3 * f->mesh.vertex_count; ++i) {
+    f->force[i] = helper_random(&seed);
+  }
+  *state = f;
+  return 0;
+}
+
+static int teardown(void **state) {
+  fixture *f = *state;
+  supine_network_destroy(f->network);
+  supine_topology_free(&f->topology);
+  supine_mesh_free(&f->mesh);
+  free(f->stiffness);
+  free(f->force);
+  free(f);
+  return 0;
+}
+
+static supine_equilibrium *equilibrium_of(const fixture *f, const double *stiffness, size_t rhs_max) {
+  supine_equilibrium *eq = NULL;
+  assert_int_equal(supine_equilibrium_create(f->network, rhs_max, 1, &eq), SUPINE_OK);
+  assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+  return eq;
+}
+
+static double *solve_of(const fixture *f, const double *stiffness, size_t count) {
+  supine_equilibrium *eq = equilibrium_of(f, stiffness, count);
+  double *out = malloc(count * f->mesh.vertex_count * sizeof *out);
+  assert_int_equal(supine_equilibrium_solve(eq, count, f->force, 0.0, false, out, NULL, NULL),
+                   SUPINE_OK);
+  supine_equilibrium_destroy(eq);
+  return out;
+}
+
+/* Scales stiffness to geometric mean 1, as the operator defines it. */
+static double *normalised(size_t count, const double *stiffness) {
+  double *out = malloc(count * sizeof *out);
+  double sum = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += log(stiffness[i]);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    out[i] = stiffness[i] / exp(sum / (double)count);
+  }
+  return out;
+}
+
+static void test_solve_all_nodes_equals_dense_definition(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  double *e = normalised(n, f->stiffness);
+  full_operator op = full_operator_create(&f->mesh, &f->topology, e);
+  gsl_matrix *matrix = gsl_matrix_alloc(op.node_count, op.node_count);
+  gsl_matrix_set_identity(matrix);
+  for (size_t i = 0; i < op.entry_count; ++i) {
+    gsl_matrix_set(matrix, op.row[i], op.column[i], -op.value[i]);
+  }
+  gsl_vector *b = gsl_vector_calloc(op.node_count);
+  gsl_vector *x = gsl_vector_alloc(op.node_count);
+  for (size_t i = 0; i < n; ++i) {
+    gsl_vector_set(b, i, f->force[3 * i]);
+  }
+  gsl_permutation *p = gsl_permutation_alloc(op.node_count);
+  int sign;
+  gsl_linalg_LU_decomp(matrix, p, &sign);
+  gsl_linalg_LU_solve(matrix, p, b, x);
+
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
+  double *force = malloc(n * sizeof *force);
+  double *masses = malloc(n * sizeof *masses);
+  double *springs = malloc(f->topology.edge_count * sizeof *springs);
+  for (size_t i = 0; i < n; ++i) {
+    force[i] = f->force[3 * i];
+  }
+  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, masses, NULL, NULL), SUPINE_OK);
+  supine_equilibrium_spring_catch(eq, &f->topology, springs);
+  for (size_t i = 0; i < op.node_count; ++i) {
+    const double should = op.own[i] * gsl_vector_get(x, i);
+    assert_close(i < n ? masses[i] : springs[i - n], should, 1e-12);
+  }
+  supine_equilibrium_destroy(eq);
+  full_operator_free(&op);
+  gsl_matrix_free(matrix);
+  gsl_vector_free(b);
+  gsl_vector_free(x);
+  gsl_permutation_free(p);
+  free(e);
+  free(force);
+  free(masses);
+  free(springs);
+}
+
+static void test_solve_catch_sums_to_applied_force(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 3);
+  double *masses = malloc(3 * n * sizeof *masses);
+  double *springs = malloc(3 * f->topology.edge_count * sizeof *springs);
+  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, masses, NULL, NULL), SUPINE_OK);
+  supine_equilibrium_spring_catch(eq, &f->topology, springs);
+  for (size_t r = 0; r < 3; ++r) {
+    double applied = 0.0;
+    double caught = 0.0;
+    for (size_t i = 0; i < n; ++i) {
+      applied += f->force[3 * i + r];
+      caught += masses[3 * i + r];
+    }
+    for (size_t k = 0; k < f->topology.edge_count; ++k) {
+      caught += springs[3 * k + r];
+    }
+    assert_close(caught, applied, 1e-12 * applied);
+  }
+  supine_equilibrium_destroy(eq);
+  free(masses);
+  free(springs);
+}
+
+static void test_solve_scaled_stiffness_changes_nothing(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  double *scaled = malloc(n * sizeof *scaled);
+  for (size_t i = 0; i < n; ++i) {
+    scaled[i] = 1234.5 * f->stiffness[i];
+  }
+  double *a = solve_of(f, f->stiffness, 3);
+  double *b = solve_of(f, scaled, 3);
+  assert_true(helper_difference(3 * n, a, b) <= 1e-12 * helper_largest(3 * n, a));
+  free(scaled);
+  free(a);
+  free(b);
+}
+
+static void test_solve_stiffer_vertex_moves_less(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  double *stiff = malloc(n * sizeof *stiff);
+  memcpy(stiff, f->stiffness, n * sizeof *stiff);
+  stiff[17] *= 8.0;
+  double *a = solve_of(f, f->stiffness, 3);
+  double *b = solve_of(f, stiff, 3);
+  assert_true(b[3 * 17] < 0.5 * a[3 * 17]);
+  free(stiff);
+  free(a);
+  free(b);
+}
+
+static void count_progress(void *context, size_t steps, double held) {
+  double *last = context;
+  assert_true(held <= last[1] + 1e-12);
+  last[0] = (double)steps;
+  last[1] = held;
+}
+
+static void test_pitcher_catcher_agrees_with_fast_solve(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
+  double *force = malloc(n * sizeof *force);
+  double *fast = malloc(n * sizeof *fast);
+  double *slow = malloc(n * sizeof *slow);
+  double *springs = malloc(f->topology.edge_count * sizeof *springs);
+  double *caught = malloc(f->topology.edge_count * sizeof *springs);
+  for (size_t i = 0; i < n; ++i) { /* both signs */
+    force[i] = f->force[3 * i] - 0.4;
+  }
+  double last[2] = {0.0, INFINITY};
+  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, fast, NULL, NULL), SUPINE_OK);
+  supine_equilibrium_spring_catch(eq, &f->topology, springs);
+  assert_int_equal(supine_pitcher_catcher(&f->mesh, &f->topology, f->stiffness, force, 1e-13, slow,
+                                          caught, count_progress, last, NULL),
+                   SUPINE_OK);
+  assert_true(last[0] > (double)n);
+  assert_true(helper_difference(n, fast, slow) <= 1e-9 * helper_largest(n, fast));
+  assert_true(helper_difference(f->topology.edge_count, springs, caught) <=
+              1e-9 * helper_largest(f->topology.edge_count, springs));
+  supine_equilibrium_destroy(eq);
+  free(force);
+  free(fast);
+  free(slow);
+  free(springs);
+  free(caught);
+}
+
+/* M is symmetric: T[i, j] S_j / S_i = T[j, i] S_i / S_j with S = 1/E. */
+static void test_transfer_column_reciprocity_and_positivity(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  const size_t first = f->topology.edges[20];
+  const size_t second = f->topology.edges[21];
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
+  double *a = malloc(n * sizeof *a);
+  double *b = malloc(n * sizeof *b);
+  assert_int_equal(supine_transfer_column(eq, first, a, NULL), SUPINE_OK);
+  assert_int_equal(supine_transfer_column(eq, second, b, NULL), SUPINE_OK);
+  const double ratio = f->stiffness[first] / f->stiffness[second];
+  assert_true(a[second] > 0.0);
+  assert_close(a[second] / (ratio * ratio), b[first], 1e-12 * b[first]);
+  for (size_t i = 0; i < n; ++i) {
+    assert_true(a[i] > -1e-15);
+  }
+  supine_error error;
+  assert_int_equal(supine_transfer_column(eq, n, a, &error), SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "162"));
+  supine_equilibrium_destroy(eq);
+  free(a);
+  free(b);
+}
+
+static void test_transfer_columns_superpose_to_solution(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
+  double *column = malloc(n * sizeof *column);
+  double *sum = calloc(n, sizeof *sum);
+  double *whole = solve_of(f, f->stiffness, 3);
+  for (size_t j = 0; j < n; ++j) { /* (2): F = T f */
+    assert_int_equal(supine_transfer_column(eq, j, column, NULL), SUPINE_OK);
+    for (size_t i = 0; i < n; ++i) {
+      sum[i] += column[i] * f->force[3 * j + 1];
+    }
+  }
+  for (size_t i = 0; i < n; ++i) {
+    assert_close(sum[i], whole[3 * i + 1], 1e-12);
+  }
+  supine_equilibrium_destroy(eq);
+  free(column);
+  free(sum);
+  free(whole);
+}
+
+/* A shuffled file has links that span it all, and is renumbered inside. */
+static void test_solve_shuffled_vertices_same_answer(void **state) {
+  (void)state;
+  supine_mesh mesh = helper_lump(20, -70.0, 5);
+  const size_t n = mesh.vertex_count;
+  uint32_t *place = malloc(n * sizeof *place);
+  uint64_t seed = 31;
+  for (size_t i = 0; i < n; ++i) {
+    place[i] = (uint32_t)i;
+  }
+  for (size_t i = n - 1; i > 0; --i) {
+    const size_t j = (size_t)(helper_random(&seed) * (double)(i + 1));
+    const uint32_t swap = place[i];
+    place[i] = place[j];
+    place[j] = swap;
+  }
+  supine_mesh shuffled = {.vertex_count = n, .triangle_count = mesh.triangle_count};
+  shuffled.vertices = malloc(3 * n * sizeof(double));
+  shuffled.triangles = malloc(3 * mesh.triangle_count * sizeof(uint32_t));
+  for (size_t i = 0; i < n; ++i) {
+    memcpy(shuffled.vertices + 3 * (size_t)place[i], mesh.vertices + 3 * i, 3 * sizeof(double));
+  }
+  for (size_t i = 0; i < 3 * mesh.triangle_count; ++i) {
+    shuffled.triangles[i] = place[mesh.triangles[i]];
+  }
+  const supine_mesh *meshes[2] = {&mesh, &shuffled};
+  double *out[2];
+  for (size_t m = 0; m < 2; ++m) {
+    supine_topology topology = {0};
+    supine_network *network = NULL;
+    supine_equilibrium *eq = NULL;
+    double *force = malloc(n * sizeof *force);
+    double *stiffness = malloc(n * sizeof *stiffness);
+    out[m] = malloc(n * sizeof *out[m]);
+    for (size_t i = 0; i < n; ++i) {
+      const size_t at = m == 0 ? i : place[i];
+      force[at] = mesh.vertices[3 * i + 1];
+      stiffness[at] = 1.0 + fabs(mesh.vertices[3 * i]);
+    }
+    assert_int_equal(supine_topology_create(meshes[m], &topology), SUPINE_OK);
+    assert_int_equal(supine_network_create(meshes[m], &topology, &network), SUPINE_OK);
+    assert_int_equal(supine_equilibrium_create(network, 1, 2, &eq), SUPINE_OK);
+    assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+    assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out[m], NULL, NULL), SUPINE_OK);
+    supine_equilibrium_destroy(eq);
+    supine_network_destroy(network);
+    supine_topology_free(&topology);
+    free(force);
+    free(stiffness);
+  }
+  const double largest = helper_largest(n, out[0]);
+  for (size_t i = 0; i < n; ++i) {
+    assert_close(out[0][i], out[1][place[i]], 1e-12 * largest);
+  }
+  free(out[0]);
+  free(out[1]);
+  free(place);
+  supine_mesh_free(&mesh);
+  supine_mesh_free(&shuffled);
+}
+
+static void test_solve_warm_start_same_answer_fewer_steps(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->mesh.vertex_count;
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 3);
+  double *cold = malloc(3 * n * sizeof *cold);
+  double *warm = malloc(3 * n * sizeof *warm);
+  double *near = malloc(3 * n * sizeof *near);
+  supine_solve_report first;
+  supine_solve_report second;
+  for (size_t i = 0; i < 3 * n; ++i) {
+    near[i] = f->force[i] * (1.0 + 1e-6 * sin((double)i));
+  }
+  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, cold, &first, NULL), SUPINE_OK);
+  assert_int_equal(supine_equilibrium_solve(eq, 3, near, 0.0, true, warm, &second, NULL), SUPINE_OK);
+  assert_true(second.iterations < first.iterations);
+  assert_int_equal(supine_equilibrium_solve(eq, 3, near, 0.0, false, cold, NULL, NULL), SUPINE_OK);
+  assert_true(helper_difference(3 * n, cold, warm) <= 1e-13 * helper_largest(3 * n, cold));
+  supine_equilibrium_destroy(eq);
+  free(cold);
+  free(warm);
+  free(near);
+}
+
+static void test_set_stiffness_bad_value_names_vertex(void **state) {
+  const fixture *f = *state;
+  static const double bad[] = {0.0, -1.0, NAN, INFINITY};
+  const double good = f->stiffness[42];
+  supine_equilibrium *eq = equilibrium_of(f, NULL, 1);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    supine_error error;
+    f->stiffness[42] = bad[i];
+    assert_int_equal(supine_equilibrium_set_stiffness(eq, f->stiffness, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "vertex 42 "));
+  }
+  f->stiffness[42] = good;
+  supine_equilibrium_destroy(eq);
+}
+
+static void test_solve_bad_counts_refused(void **state) {
+  const fixture *f = *state;
+  supine_equilibrium *eq = NULL;
+  assert_int_equal(supine_equilibrium_create(f->network, 0, 1, &eq), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_equilibrium_create(f->network, SUPINE_RHS_MAX + 1, 1, &eq),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_null(eq);
+  eq = equilibrium_of(f, NULL, 2);
+  double out[1];
+  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, out, NULL, NULL),
+                   SUPINE_ERROR_ARGUMENT);
+  supine_equilibrium_destroy(eq);
+  supine_equilibrium_destroy(NULL);
+  supine_network_destroy(NULL);
+}
+
+static void test_solve_force_not_finite_reports_numerical(void **state) {
+  const fixture *f = *state;
+  supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
+  double *out = malloc(f->mesh.vertex_count * sizeof *out);
+  double *force = calloc(f->mesh.vertex_count, sizeof *force);
+  supine_error error;
+  force[3] = NAN;
+  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  assert_non_null(strstr(error.message, "residual"));
+  force[3] = 0.0; /* and no force at all is no error */
+  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error), SUPINE_OK);
+  assert_close(helper_largest(f->mesh.vertex_count, out), 0.0, 0.0);
+  supine_equilibrium_destroy(eq);
+  free(out);
+  free(force);
+}
+
+/* Both lungs of a real model, all nodes, by a sparse direct factorisation of the unsymmetric
+ * definition. */
+static void check_real_lungs(const char *const *names, supine_axes axes) {
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, axes, &lungs)) {
+    skip();
+    return;
+  }
+  const size_t n = lungs.mesh.vertex_count;
+  double *stiffness = malloc(n * sizeof *stiffness);
+  double *force = malloc(n * sizeof *force);
+  double *fast = malloc(n * sizeof *fast);
+  for (size_t i = 0; i < n; ++i) {
+    stiffness[i] = exp(sin(0.05 * lungs.mesh.vertices[3 * i]) + 0.02 * lungs.mesh.vertices[3 * i + 2]);
+    force[i] = lungs.mesh.vertices[3 * i + 1] - lungs.minimum[1];
+  }
+  double *e = normalised(n, stiffness);
+  full_operator op = full_operator_create(&lungs.mesh, &lungs.topology, e);
+  const int nodes = (int)op.node_count;
+  const int entries = (int)(op.entry_count + op.node_count);
+  int *ti = malloc((size_t)entries * sizeof *ti);
+  int *tj = malloc((size_t)entries * sizeof *tj);
+  double *tx = malloc((size_t)entries * sizeof *tx);
+  int *ap = malloc(((size_t)nodes + 1) * sizeof *ap);
+  int *ai = malloc((size_t)entries * sizeof *ai);
+  double *ax = malloc((size_t)entries * sizeof *ax);
+  double *b = calloc((size_t)nodes, sizeof *b);
+  double *x = malloc((size_t)nodes * sizeof *x);
+  for (size_t i = 0; i < op.entry_count; ++i) {
+    ti[i] = (int)op.row[i];
+    tj[i] = (int)op.column[i];
+    tx[i] = -op.value[i];
+  }
+  for (size_t j = 0; j < op.node_count; ++j) {
+    ti[op.entry_count + j] = tj[op.entry_count + j] = (int)j;
+    tx[op.entry_count + j] = 1.0;
+  }
+  memcpy(b, force, n * sizeof *b);
+  void *symbolic = NULL;
+  void *numeric = NULL;
+  assert_int_equal(umfpack_di_triplet_to_col(nodes, nodes, entries, ti, tj, tx, ap, ai, ax, NULL), 0);
+  assert_int_equal(umfpack_di_symbolic(nodes, nodes, ap, ai, ax, &symbolic, NULL, NULL), 0);
+  assert_int_equal(umfpack_di_numeric(ap, ai, ax, symbolic, &numeric, NULL, NULL), 0);
+  assert_int_equal(umfpack_di_solve(UMFPACK_A, ap, ai, ax, x, b, numeric, NULL, NULL), 0);
+  umfpack_di_free_symbolic(&symbolic);
+  umfpack_di_free_numeric(&numeric);
+
+  supine_network *network = NULL;
+  supine_equilibrium *eq = NULL;
+  supine_solve_report report;
+  assert_int_equal(supine_network_create(&lungs.mesh, &lungs.topology, &network), SUPINE_OK);
+  assert_int_equal(supine_equilibrium_create(network, 1, 0, &eq), SUPINE_OK);
+  assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, fast, &report, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n; ++i) {
+    x[i] *= op.own[i];
+  }
+  const double difference = helper_difference(n, x, fast) / helper_largest(n, x);
+  printf("%s: %zu vertices, %zu steps, %.1e from the direct solution\n", names[0], n,
+         report.iterations, difference);
+  assert_true(difference <= 1e-10);
+  supine_equilibrium_destroy(eq);
+  supine_network_destroy(network);
+  supine_lungs_free(&lungs);
+  full_operator_free(&op);
+  free(stiffness);
+  free(force);
+  free(fast);
+  free(e);
+  free(ti);
+  free(tj);
+  free(tx);
+  free(ap);
+  free(ai);
+  free(ax);
+  free(b);
+  free(x);
+}
+
+static void test_solve_real_adult_equals_direct_solution(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  check_real_lungs(names, SUPINE_AXES_AUTO);
+}
+
+static void test_solve_real_ras_lungs_equal_direct_solution(void **state) {
+  (void)state;
+  static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
+  check_real_lungs(names, SUPINE_AXES_RAS);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_solve_all_nodes_equals_dense_definition),
+      cmocka_unit_test(test_solve_catch_sums_to_applied_force),
+      cmocka_unit_test(test_solve_scaled_stiffness_changes_nothing),
+      cmocka_unit_test(test_solve_stiffer_vertex_moves_less),
+      cmocka_unit_test(test_pitcher_catcher_agrees_with_fast_solve),
+      cmocka_unit_test(test_transfer_column_reciprocity_and_positivity),
+      cmocka_unit_test(test_transfer_columns_superpose_to_solution),
+      cmocka_unit_test(test_solve_shuffled_vertices_same_answer),
+      cmocka_unit_test(test_solve_warm_start_same_answer_fewer_steps),
+      cmocka_unit_test(test_set_stiffness_bad_value_names_vertex),
+      cmocka_unit_test(test_solve_bad_counts_refused),
+      cmocka_unit_test(test_solve_force_not_finite_reports_numerical),
+      cmocka_unit_test(test_solve_real_adult_equals_direct_solution),
+      cmocka_unit_test(test_solve_real_ras_lungs_equal_direct_solution),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

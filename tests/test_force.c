@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The applied force (18), its factors, heights, and the direction of displacement (15)-(17). */
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/force.h>
+
+#include "lungs_helpers.h"
+
+static int setup(void **state) {
+  supine_mesh lumps[2] = {helper_lump(9, 90.0, 3), helper_lump(10, -85.0, 4)};
+  supine_lungs *lungs = calloc(1, sizeof *lungs);
+  assert_int_equal(supine_lungs_create(lumps, 2, NULL, lungs, NULL), SUPINE_OK);
+  supine_mesh_free(&lumps[0]);
+  supine_mesh_free(&lumps[1]);
+  *state = lungs;
+  return 0;
+}
+
+static int teardown(void **state) {
+  supine_lungs_free(*state);
+  free(*state);
+  return 0;
+}
+
+static double height(const supine_lungs *lungs, const double *g, size_t i) {
+  const double *p = lungs->mesh.vertices + 3 * i;
+  return g[0] * p[0] + g[1] * p[1] + g[2] * p[2];
+}
+
+static void test_height_range_random_directions_equals_brute_force(void **state) {
+  const supine_lungs *lungs = *state;
+  enum { COUNT = 77 };
+  double g[3 * COUNT];
+  double minimum[COUNT];
+  double maximum[COUNT];
+  uint64_t seed = 12;
+  for (size_t d = 0; d < COUNT; ++d) {
+    random_direction(&seed, g + 3 * d);
+  }
+  assert_int_equal(supine_height_range(&lungs->mesh, COUNT, g, minimum, maximum), SUPINE_OK);
+  for (size_t d = 0; d < COUNT; ++d) {
+    double low = INFINITY;
+    double high = -INFINITY;
+    for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+      low = fmin(low, height(lungs, g + 3 * d, i));
+      high = fmax(high, height(lungs, g + 3 * d, i));
+    }
+    assert_close(minimum[d], low, 8 * DBL_EPSILON * 300.0);
+    assert_close(maximum[d], high, 8 * DBL_EPSILON * 300.0);
+  }
+}
+
+static void test_force_default_law_is_height_zero_to_one(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  const supine_force_law law = supine_force_law_default();
+  double *down = malloc(n * sizeof *down);
+  double *up = malloc(n * sizeof *up);
+  const double g[3] = {0.36, -0.48, 0.8};
+  const double opposite[3] = {-0.36, 0.48, -0.8};
+  double low;
+  double high;
+  assert_int_equal(supine_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+  supine_force(lungs, &law, g, low, high, down);
+  supine_force(lungs, &law, opposite, -high, -low, up);
+  double least = INFINITY;
+  double most = -INFINITY;
+  for (size_t i = 0; i < n; ++i) {
+    least = fmin(least, down[i]);
+    most = fmax(most, down[i]);
+    assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* the parity of the law */
+  }
+  assert_close(least, 0.0, 4 * DBL_EPSILON);
+  assert_close(most, 1.0, 4 * DBL_EPSILON);
+  free(down);
+  free(up);
+}
+
+static void check_factors(const supine_lungs *lungs, const supine_force_law *law, size_t expected) {
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t rank = supine_force_column_count(law);
+  double *columns = malloc(n * rank * sizeof *columns);
+  double *force = malloc(n * sizeof *force);
+  double functions[SUPINE_FORCE_COLUMNS_MAX];
+  uint64_t seed = 9;
+  assert_int_equal(rank, expected);
+  supine_force_columns(lungs, law, columns);
+  for (int d = 0; d < 20; ++d) {
+    double g[3];
+    double low;
+    double high;
+    random_direction(&seed, g);
+    assert_int_equal(supine_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+    supine_force(lungs, law, g, low, high, force);
+    supine_force_functions(lungs, law, g, low, high, functions);
+    for (size_t i = 0; i < n; ++i) {
+      double sum = 0.0;
+      for (size_t r = 0; r < rank; ++r) {
+        sum += columns[i * rank + r] * functions[r];
+      }
+      assert_close(sum, force[i], 64 * DBL_EPSILON * 3.0);
+    }
+  }
+  free(columns);
+  free(force);
+}
+
+static void test_force_factors_reproduce_law(void **state) {
+  supine_force_law law = supine_force_law_default();
+  check_factors(*state, &law, 4);
+  law = (supine_force_law){.base = 0.3, .gain = 1.7, .box = {0.2, -0.4, 1.1}};
+  check_factors(*state, &law, 5);
+}
+
+static void test_force_box_part_uses_box_coordinates(void **state) {
+  const supine_lungs *lungs = *state;
+  const supine_force_law law = {.base = 0.5, .gain = 0.0, .box = {1.0, 10.0, 100.0}};
+  const double g[3] = {0.0, 1.0, 0.0};
+  double *force = malloc(lungs->mesh.vertex_count * sizeof *force);
+  supine_force(lungs, &law, g, lungs->minimum[1], lungs->maximum[1], force);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; i += 13) {
+    double box[3];
+    supine_lungs_box_coordinates(lungs, i, box);
+    assert_close(force[i], 0.5 + box[0] + 10.0 * box[1] + 100.0 * box[2], 1e-12);
+  }
+  free(force);
+}
+
+static void test_stiffness_soften_follows_height(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  supine_force_law law = supine_force_law_default();
+  law.soften = 1.3;
+  const double g[3] = {0.0, 1.0, 0.0};
+  double *e = malloc(n * sizeof *e);
+  supine_force_stiffness(lungs, &law, NULL, g, lungs->minimum[1], lungs->maximum[1], e);
+  for (size_t i = 0; i < n; ++i) {
+    const double h = (lungs->mesh.vertices[3 * i + 1] - lungs->minimum[1]) /
+                     (lungs->maximum[1] - lungs->minimum[1]);
+    assert_close(log(e[i]), -1.3 * (h - 0.5), 1e-14);
+  }
+  free(e);
+}
+
+static void test_directions_box_model_literal_values(void **state) {
+  (void)state;
+  /* A left lung 100 mm wide, 200 deep, 300 high, midline at its inner face x = 10. */
+  double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};
+  uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
+  const supine_mesh mesh = {5, vertices, 6, triangles};
+  supine_lungs lungs = {0};
+  const supine_direction_law law = supine_direction_law_default();
+  double d[15];
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+  assert_close(lungs.midline, 10.0, 0.0);
+  assert_int_equal(lungs.side[0], 1);
+  assert_int_equal(supine_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  /* X = 1, Y = 1 (front), Z = 1 (base) */
+  assert_close(d[3], 2.0, 1e-14);
+  assert_close(d[4], -1.5, 1e-14);
+  assert_close(d[5], -16.0, 1e-14);
+  /* back: Y = 0; apex: Z = 0; midline: X = 0: the fixed planes stay fixed */
+  assert_close(d[7], 0.0, 0.0);
+  assert_close(d[11], 0.0, 0.0);
+  assert_close(d[0], 0.0, 0.0);
+  /* X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4 */
+  assert_close(d[12], 0.70710678118654752, 1e-14);
+  assert_close(d[13], -0.75, 1e-14);
+  assert_close(d[14], -6.0628662660415918, 1e-13);
+  supine_lungs_free(&lungs);
+}
+
+static void test_directions_two_lungs_move_outwards(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  const supine_direction_law law = supine_direction_law_default();
+  double *d = malloc(3 * n * sizeof *d);
+  assert_int_equal(supine_directions(lungs, &law, d, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n; ++i) {
+    assert_true(i < lungs->lung_begin[1] ? d[3 * i] >= 0.0 : d[3 * i] <= 0.0);
+    assert_true(d[3 * i + 1] <= 0.0 && d[3 * i + 2] <= 0.0);
+  }
+  free(d);
+}
+
+static void test_directions_normal_and_radial_are_outward_units(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  double *normal = malloc(3 * n * sizeof *normal);
+  double *radial = malloc(3 * n * sizeof *radial);
+  supine_direction_law law = {.model = SUPINE_DIRECTION_NORMAL};
+  for (size_t k = 0; k < 6; ++k) {
+    law.c[k] = 1.0;
+  }
+  assert_int_equal(supine_directions(lungs, &law, normal, NULL), SUPINE_OK);
+  law.model = SUPINE_DIRECTION_RADIAL;
+  assert_int_equal(supine_directions(lungs, &law, radial, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n; ++i) {
+    const double *a = normal + 3 * i;
+    const double *b = radial + 3 * i;
+    assert_close(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], 1.0, 1e-14);
+    assert_close(b[0] * b[0] + b[1] * b[1] + b[2] * b[2], 1.0, 1e-14);
+    assert_true(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0.2);
+  }
+  free(normal);
+  free(radial);
+}
+
+static void test_directions_bad_constants_refused(void **state) {
+  double d[3];
+  supine_error error;
+  supine_direction_law law = supine_direction_law_default();
+  law.c[3] = 0.0;
+  assert_int_equal(supine_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "c4"));
+  law = supine_direction_law_default();
+  law.c[4] = NAN;
+  assert_int_equal(supine_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "c5"));
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_height_range_random_directions_equals_brute_force),
+      cmocka_unit_test(test_force_default_law_is_height_zero_to_one),
+      cmocka_unit_test(test_force_factors_reproduce_law),
+      cmocka_unit_test(test_force_box_part_uses_box_coordinates),
+      cmocka_unit_test(test_stiffness_soften_follows_height),
+      cmocka_unit_test(test_directions_box_model_literal_values),
+      cmocka_unit_test(test_directions_two_lungs_move_outwards),
+      cmocka_unit_test(test_directions_normal_and_radial_are_outward_units),
+      cmocka_unit_test(test_directions_bad_constants_refused),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

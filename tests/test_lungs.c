@@ -1,0 +1,276 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Joining surfaces into a model, telling left from right, made lungs, and volume forms. */
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/force.h>
+#include <supine/phantom.h>
+#include <supine/volume_forms.h>
+
+#include "lungs_helpers.h"
+
+static void test_lungs_two_files_any_order_left_first(void **state) {
+  (void)state;
+  for (int swap = 0; swap < 2; ++swap) {
+    supine_mesh lumps[2] = {helper_lump(5, swap ? -80.0 : 90.0, 3), helper_lump(6, swap ? 90.0 : -80.0, 4)};
+    supine_lungs lungs = {0};
+    assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
+    assert_int_equal(lungs.lung_count, 2);
+    assert_int_equal(lungs.lung_begin[1], lumps[swap].vertex_count);
+    assert_int_equal(lungs.triangle_begin[1], lumps[swap].triangle_count);
+    assert_close(lungs.midline, 0.5 * (lungs.minimum[0] + lungs.maximum[0]), 0.0);
+    assert_string_equal(supine_lungs_name(&lungs, 0), "left");
+    assert_string_equal(supine_lungs_name(&lungs, 1), "right");
+    assert_true(lungs.topology.closed);
+    for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
+      assert_true(i < lungs.lung_begin[1] ? lungs.mesh.vertices[3 * i] > 10.0
+                                          : lungs.mesh.vertices[3 * i] < 0.0);
+    }
+    supine_lungs_free(&lungs);
+    supine_mesh_free(&lumps[0]);
+    supine_mesh_free(&lumps[1]);
+  }
+}
+
+/* One file whose vertices alternate between the lungs. */
+static void test_lungs_interleaved_file_is_grouped(void **state) {
+  (void)state;
+  supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
+  const size_t n = lumps[0].vertex_count;
+  supine_mesh both = {2 * n, malloc(6 * n * sizeof(double)), 2 * lumps[0].triangle_count,
+                      malloc(6 * lumps[0].triangle_count * sizeof(uint32_t))};
+  for (size_t m = 0; m < 2; ++m) {
+    for (size_t i = 0; i < n; ++i) {
+      memcpy(both.vertices + 3 * (2 * i + m), lumps[m].vertices + 3 * i, 3 * sizeof(double));
+    }
+    for (size_t t = 0; t < lumps[m].triangle_count; ++t) {
+      for (size_t k = 0; k < 3; ++k) {
+        both.triangles[3 * (2 * t + m) + k] = (uint32_t)(2 * lumps[m].triangles[3 * t + k] + m);
+      }
+    }
+  }
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(&both, 1, NULL, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(lungs.lung_count, 2);
+  assert_int_equal(lungs.lung_begin[1], n);
+  assert_memory_equal(lungs.mesh.vertices, lumps[1].vertices, 3 * n * sizeof(double));
+  assert_memory_equal(lungs.mesh.vertices + 3 * n, lumps[0].vertices, 3 * n * sizeof(double));
+  assert_true(lungs.topology.closed);
+  assert_close(supine_mesh_volume(&lungs.mesh), supine_mesh_volume(&both),
+                      1e-12 * supine_mesh_volume(&both));
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&both);
+  supine_mesh_free(&lumps[0]);
+  supine_mesh_free(&lumps[1]);
+}
+
+static void test_lungs_one_file_midline_is_inner_face(void **state) {
+  (void)state;
+  static const double places[] = {90.0, -90.0};
+  for (size_t m = 0; m < 2; ++m) {
+    supine_mesh lump = helper_lump(5, places[m], 3);
+    supine_lungs lungs = {0};
+    assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
+    assert_int_equal(lungs.lung_count, 1);
+    assert_int_equal(lungs.side[0], m == 0 ? 1 : -1);
+    assert_close(lungs.midline, m == 0 ? lungs.minimum[0] : lungs.maximum[0], 0.0);
+    double box[3];
+    for (size_t i = 0; i < lump.vertex_count; ++i) {
+      supine_lungs_box_coordinates(&lungs, i, box);
+      assert_close(box[0],
+                          fabs(lump.vertices[3 * i] - lungs.midline) /
+                              (lungs.maximum[0] - lungs.minimum[0]),
+                          1e-14);
+    }
+    supine_lungs_free(&lungs);
+    supine_mesh_free(&lump);
+  }
+}
+
+static void test_lungs_given_midline_decides(void **state) {
+  (void)state;
+  supine_mesh lump = helper_lump(5, 90.0, 3);
+  supine_lungs lungs = {0};
+  double midline = 300.0;
+  assert_int_equal(supine_lungs_create(&lump, 1, &midline, &lungs, NULL), SUPINE_OK);
+  assert_string_equal(supine_lungs_name(&lungs, 0), "right");
+  supine_lungs_free(&lungs);
+  midline = NAN;
+  assert_int_equal(supine_lungs_create(&lump, 1, &midline, &lungs, NULL), SUPINE_ERROR_ARGUMENT);
+  supine_mesh_free(&lump);
+}
+
+static void test_lungs_debris_does_not_make_a_lung(void **state) {
+  (void)state;
+  supine_mesh meshes[2] = {helper_lump(12, 90.0, 3), helper_lump(2, 20.0, 4)};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(meshes, 2, NULL, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(lungs.lung_count, 1);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&meshes[0]);
+  supine_mesh_free(&meshes[1]);
+}
+
+static void test_lungs_flat_or_empty_surface_refused(void **state) {
+  (void)state;
+  double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  uint32_t triangles[] = {0, 1, 2};
+  const supine_mesh flat = {3, vertices, 1, triangles};
+  const supine_mesh empty = {0};
+  supine_lungs lungs = {0};
+  supine_error error;
+  assert_int_equal(supine_lungs_create(&flat, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "along z"));
+  assert_int_equal(supine_lungs_create(&empty, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
+}
+
+static void test_phantom_pair_is_closed_and_has_its_volume(void **state) {
+  (void)state;
+  static const size_t sizes[] = {84, 1000, 5000, 30000};
+  for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
+    supine_mesh mesh = {0};
+    supine_lungs lungs = {0};
+    assert_int_equal(supine_phantom_create(sizes[s], 2500.0, &mesh, NULL), SUPINE_OK);
+    assert_in_range(mesh.vertex_count, sizes[s] - sizes[s] / 5, sizes[s] + sizes[s] / 5);
+    assert_close(supine_mesh_volume(&mesh), 2.5e6, 1e-6);
+    assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+    assert_true(lungs.topology.closed);
+    assert_int_equal(lungs.topology.component_count, 2);
+    assert_int_equal(lungs.topology.genus, 0);
+    assert_int_equal(lungs.lung_count, 2);
+    assert_int_equal(lungs.lung_begin[1], mesh.vertex_count / 2);
+    supine_lungs_free(&lungs);
+    supine_mesh_free(&mesh);
+  }
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_phantom_create(10, 2500.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_phantom_create(1000, 0.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+}
+
+/* Volume gained by one lung of a pair, by measuring the deformed surface itself. */
+static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
+                     size_t count, const double *weights, double scale) {
+  const size_t n = lungs->mesh.vertex_count;
+  double *moved = malloc(3 * n * sizeof *moved);
+  for (size_t i = 0; i < n; ++i) {
+    double f = 0.0;
+    for (size_t k = 0; k < count; ++k) {
+      f += columns[i * count + k] * weights[k];
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      moved[3 * i + k] = lungs->mesh.vertices[3 * i + k] + scale * f * d[3 * i + k];
+    }
+  }
+  const size_t first = lungs->triangle_begin[lung];
+  supine_mesh part = {n, lungs->mesh.vertices, lungs->triangle_begin[lung + 1] - first,
+                      lungs->mesh.triangles + 3 * first};
+  const double rest = supine_mesh_volume(&part);
+  part.vertices = moved;
+  const double volume = 1e-3 * (supine_mesh_volume(&part) - rest);
+  free(moved);
+  return volume;
+}
+
+static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
+  (void)state;
+  enum { COLUMNS = 5, MIXED = 3 };
+  supine_mesh lumps[2] = {helper_lump(7, 90.0, 3), helper_lump(8, -85.0, 4)};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
+  const size_t n = lungs.mesh.vertex_count;
+  double *columns = malloc(n * COLUMNS * sizeof *columns);
+  double *mixed_columns = malloc(n * MIXED * sizeof *mixed_columns);
+  double *d = malloc(3 * n * sizeof *d);
+  double mix[COLUMNS * MIXED];
+  uint64_t seed = 44;
+  const supine_direction_law law = supine_direction_law_default();
+  assert_int_equal(supine_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n * COLUMNS; ++i) {
+    columns[i] = helper_random(&seed);
+  }
+  for (size_t i = 0; i < COLUMNS * MIXED; ++i) {
+    mix[i] = helper_random(&seed) - 0.5;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t k = 0; k < MIXED; ++k) {
+      mixed_columns[i * MIXED + k] = 0.0;
+      for (size_t r = 0; r < COLUMNS; ++r) {
+        mixed_columns[i * MIXED + k] += columns[i * COLUMNS + r] * mix[r * MIXED + k];
+      }
+    }
+  }
+  supine_volume_forms forms = {0};
+  supine_volume_forms mixed = {0};
+  assert_int_equal(supine_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL), SUPINE_OK);
+  assert_int_equal(supine_volume_forms_mix(&forms, mix, MIXED, &mixed), SUPINE_OK);
+  static const double weights[COLUMNS] = {0.7, -0.2, 0.9, 0.31, 0.11};
+  double cubic[3];
+  double mixed_cubic[3];
+  supine_volume_forms_contract(&forms, weights, cubic);
+  supine_volume_forms_contract(&mixed, weights, mixed_cubic);
+  for (double s = -3.0; s <= 5.0; s += 1.7) {
+    double direct = 0.0;
+    double mixed_direct = 0.0;
+    for (size_t lung = 0; lung < 2; ++lung) {
+      direct += gained(&lungs, lung, d, columns, COLUMNS, weights, s);
+      mixed_direct += gained(&lungs, lung, d, mixed_columns, MIXED, weights, s);
+    }
+    assert_close(s * (cubic[0] + s * (cubic[1] + s * cubic[2])), direct, 1e-9 * 1e3);
+    assert_close(s * (mixed_cubic[0] + s * (mixed_cubic[1] + s * mixed_cubic[2])),
+                        mixed_direct, 1e-9 * 1e3);
+  }
+  /* lung by lung, from its own forms */
+  supine_volume_forms right = {1, COLUMNS, forms.linear + COLUMNS,
+                               forms.quadratic + COLUMNS * COLUMNS,
+                               forms.cubic + COLUMNS * COLUMNS * COLUMNS};
+  supine_volume_forms_contract(&right, weights, cubic);
+  assert_close(2.0 * (cubic[0] + 2.0 * (cubic[1] + 2.0 * cubic[2])),
+                      gained(&lungs, 1, d, columns, COLUMNS, weights, 2.0), 1e-9 * 1e3);
+  supine_volume_forms_free(&forms);
+  supine_volume_forms_free(&mixed);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lumps[0]);
+  supine_mesh_free(&lumps[1]);
+  free(columns);
+  free(mixed_columns);
+  free(d);
+}
+
+static void test_volume_forms_open_surface_refused(void **state) {
+  (void)state;
+  supine_mesh lump = helper_lump(4, 90.0, 3);
+  --lump.triangle_count;
+  supine_lungs lungs = {0};
+  supine_volume_forms forms = {0};
+  supine_error error;
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(supine_volume_forms_create(&lungs, lungs.mesh.vertices, lungs.mesh.vertices, 1,
+                                              &forms, &error),
+                   SUPINE_ERROR_OPEN_SURFACE);
+  assert_non_null(strstr(error.message, "3 boundary"));
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lump);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_lungs_two_files_any_order_left_first),
+      cmocka_unit_test(test_lungs_interleaved_file_is_grouped),
+      cmocka_unit_test(test_lungs_one_file_midline_is_inner_face),
+      cmocka_unit_test(test_lungs_given_midline_decides),
+      cmocka_unit_test(test_lungs_debris_does_not_make_a_lung),
+      cmocka_unit_test(test_lungs_flat_or_empty_surface_refused),
+      cmocka_unit_test(test_phantom_pair_is_closed_and_has_its_volume),
+      cmocka_unit_test(test_volume_forms_equal_measured_volume_also_mixed),
+      cmocka_unit_test(test_volume_forms_open_surface_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

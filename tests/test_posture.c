@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Directions of gravity by posture, quaternion and tilt. */
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/posture.h>
+
+#include "runtime_fixture.h"
+
+static const double tolerance = 8 * DBL_EPSILON;
+
+static void assert_vector(const double v[3], double x, double y, double z) {
+  assert_true(fabs(v[0] - x) <= tolerance);
+  assert_true(fabs(v[1] - y) <= tolerance);
+  assert_true(fabs(v[2] - z) <= tolerance);
+}
+
+static void test_gravity_named_postures_literal(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    double x, y, z;
+  } cases[] = {
+      {"supine", 0, 1, 0},       {"prone", 0, -1, 0},
+      {"left", 1, 0, 0},         {"right", -1, 0, 0},
+      {"left-lateral", 1, 0, 0}, {"right-lateral", -1, 0, 0},
+      {"upright", 0, 0, -1},     {"inverted", 0, 0, 1},
+      {"HFS", 0, 1, 0},          {"FFS", 0, 1, 0},
+      {"HFP", 0, -1, 0},         {"FFP", 0, -1, 0},
+      {"HFDL", 1, 0, 0},         {"FFDL", 1, 0, 0},
+      {"HFDR", -1, 0, 0},        {"FFDR", -1, 0, 0},
+      {"hfs", 0, 1, 0},          {"SUPINE", 0, 1, 0},
+      {"ffDr", -1, 0, 0},        {"Right-Lateral", -1, 0, 0},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    double g[3] = {9, 9, 9};
+    assert_int_equal(supine_posture_gravity(cases[i].name, g), SUPINE_OK);
+    assert_vector(g, cases[i].x, cases[i].y, cases[i].z);
+  }
+}
+
+static void test_gravity_unknown_name_untouched(void **state) {
+  (void)state;
+  static const char *const names[] = {"", "supin", "supines", "HF", "left_lateral", " prone"};
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    double g[3] = {9, 8, 7};
+    assert_int_equal(supine_posture_gravity(names[i], g), SUPINE_ERROR_ARGUMENT);
+    assert_vector(g, 9, 8, 7);
+  }
+}
+
+static void test_name_every_index_is_known(void **state) {
+  (void)state;
+  assert_int_equal(supine_posture_count(), 16);
+  for (size_t i = 0; i < supine_posture_count(); ++i) {
+    double g[3];
+    assert_int_equal(supine_posture_gravity(supine_posture_name(i), g), SUPINE_OK);
+    assert_string_equal(supine_posture_nearest(supine_posture_name(i)), supine_posture_name(i));
+  }
+  assert_null(supine_posture_name(supine_posture_count()));
+}
+
+static void test_nearest_misspelling_suggests(void **state) {
+  (void)state;
+  static const char *const cases[][2] = {
+      {"suppine", "supine"},
+      {"spuine", "supine"},
+      {"pron", "prone"},
+      {"lef", "left"},
+      {"rigth", "right"},
+      {"upwright", "upright"},
+      {"invert", "inverted"},
+      {"HFDD", "HFDL"},
+      {"leftlateral", "left-lateral"},
+      {"Right_Lateral", "right-lateral"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    assert_string_equal(supine_posture_nearest(cases[i][0]), cases[i][1]);
+  }
+  assert_non_null(supine_posture_nearest(""));
+  char text[5000];
+  memset(text, 'q', sizeof text - 1);
+  text[sizeof text - 1] = '\0';
+  assert_non_null(supine_posture_nearest(text));
+}
+
+static void test_quaternion_known_orientations_literal(void **state) {
+  (void)state;
+  const double h = sqrt(0.5);
+  double g[3];
+  assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1); /* body axes as the world's: upright */
+  assert_false(signbit(g[0]) || signbit(g[1]));
+  /* Turned by +90 degrees about x, body y (the back) points to world z: lying on the belly. */
+  assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, -1, 0);
+  assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 1, 0); /* -90 degrees, sign and length of no matter: supine */
+  /* +90 degrees about y takes body z (head) to world x and body x (left) to world -z. */
+  assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
+  assert_vector(g, 1, 0, 0);
+  assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1); /* turning about gravity changes nothing */
+}
+
+/* v_world = q v q*, written out with cross products. */
+static void rotate(const double q[4], const double v[3], double out[3]) {
+  const double t[3] = {2 * (q[2] * v[2] - q[3] * v[1]), 2 * (q[3] * v[0] - q[1] * v[2]),
+                       2 * (q[1] * v[1] - q[2] * v[0])};
+  out[0] = v[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+  out[1] = v[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+  out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+}
+
+static void test_quaternion_random_rotates_to_world_down(void **state) {
+  (void)state;
+  uint64_t random = 20080321;
+  for (int i = 0; i < 1000; ++i) {
+    double q[4];
+    double square = 0;
+    for (int j = 0; j < 4; ++j) {
+      q[j] = fixture_random(&random);
+      square += q[j] * q[j];
+    }
+    double g[3];
+    assert_int_equal(supine_posture_quaternion(q, g), SUPINE_OK);
+    for (int j = 0; j < 4; ++j) {
+      q[j] /= sqrt(square);
+    }
+    double world[3];
+    rotate(q, g, world);
+    assert_vector(world, 0, 0, -1);
+  }
+}
+
+static void test_quaternion_zero_or_not_finite_refused(void **state) {
+  (void)state;
+  double g[3];
+  assert_int_equal(supine_posture_quaternion((double[]){0, 0, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){1, NAN, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){INFINITY, 0, 0, 0}, g),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){1e300, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1);
+  assert_int_equal(supine_posture_quaternion((double[]){5e-324, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1);
+}
+
+static void test_tilt_postures_literal(void **state) {
+  (void)state;
+  const double c = 0.96592582628906831; /* cos 15 degrees, Abramowitz & Stegun 4.3.128 */
+  const double s = 0.25881904510252074; /* sin 15 degrees */
+  double g[3] = {0, 1, 0};
+  assert_int_equal(supine_posture_tilt(g, 15, g), SUPINE_OK);
+  assert_vector(g, 0, c, s); /* Trendelenburg: the head is lower */
+  assert_int_equal(supine_posture_tilt((double[]){0, -1, 0}, 15, g), SUPINE_OK);
+  assert_vector(g, 0, -c, -s);
+  assert_int_equal(supine_posture_tilt((double[]){0, 0, -1}, 15, g), SUPINE_OK);
+  assert_vector(g, 0, s, -c); /* leaning back */
+  assert_int_equal(supine_posture_tilt((double[]){1, 0, 0}, 37, g), SUPINE_OK);
+  assert_vector(g, 1, 0, 0);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 360 * 1e6 + 90, g), SUPINE_OK);
+  assert_vector(g, 0, 0, 1);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, NAN, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_tilt((double[]){0, INFINITY, 0}, 1, g), SUPINE_ERROR_ARGUMENT);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_gravity_named_postures_literal),
+      cmocka_unit_test(test_gravity_unknown_name_untouched),
+      cmocka_unit_test(test_name_every_index_is_known),
+      cmocka_unit_test(test_nearest_misspelling_suggests),
+      cmocka_unit_test(test_quaternion_known_orientations_literal),
+      cmocka_unit_test(test_quaternion_random_rotates_to_world_down),
+      cmocka_unit_test(test_quaternion_zero_or_not_finite_refused),
+      cmocka_unit_test(test_tilt_postures_literal),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine pv: exit codes, and what it prints. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <gsl/gsl_errno.h>
+
+#include <supine/pv.h>
+
+#include "../runtime/command/command.h"
+
+
+static char folder[] = "/tmp/supine-pv-XXXXXX";
+static char good[64], bad[64], out[64], printed[64];
+static char text[65536];
+
+static void write_samples(const char *path, bool spoiled) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  (void)fputs("pressure_cmH2O,volume_mL\n", file);
+  for (int j = 0; j <= 15; ++j) {
+    const double pressure = 2.0 * j;
+    double volume = 0.0;
+    assert_int_equal(
+        supine_pv_evaluate(&supine_pv_normal()->limb[0], 1, &pressure, &volume, NULL, NULL),
+        SUPINE_OK);
+    (void)fprintf(file, "%.17g,%.17g\n", pressure, spoiled && j == 9 ? 0.0 : volume);
+  }
+  assert_int_equal(fclose(file), 0);
+}
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(good, sizeof good, "%s/good.csv", folder);
+  (void)snprintf(bad, sizeof bad, "%s/bad.csv", folder);
+  (void)snprintf(out, sizeof out, "%s/out.csv", folder);
+  (void)snprintf(printed, sizeof printed, "%s/printed", folder);
+  write_samples(good, false);
+  write_samples(bad, true);
+  return 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  (void)unlink(good);
+  (void)unlink(bad);
+  (void)unlink(out);
+  (void)unlink(printed);
+  return rmdir(folder);
+}
+
+/* Runs the command with one of its two streams in a file, then in `text`. */
+static int run(int stream, const char *const *words) {
+  char *argv[16] = {strdup("pv")};
+  int argc = 1;
+  for (; words[argc - 1] != NULL; ++argc) {
+    argv[argc] = strdup(words[argc - 1]);
+  }
+  FILE *target = stream == STDOUT_FILENO ? stdout : stderr;
+  (void)fflush(target);
+  const int kept = dup(stream);
+  FILE *file = fopen(printed, "w+b");
+  assert_non_null(file);
+  assert_true(kept >= 0 && dup2(fileno(file), stream) == stream);
+  const int code = supine_command_pv(argc, argv);
+  (void)fflush(target);
+  assert_true(dup2(kept, stream) == stream);
+  (void)close(kept);
+  rewind(file);
+  text[fread(text, 1, sizeof text - 1, file)] = '\0';
+  (void)fclose(file);
+  for (int i = 0; i < argc; ++i) {
+    free(argv[i]);
+  }
+  return code;
+}
+
+#define RUN(stream, ...) run(stream, (const char *const[]){__VA_ARGS__, NULL})
+
+static void test_command_fit_writes_parameters_that_load(void **state) {
+  (void)state;
+  assert_int_equal(RUN(STDOUT_FILENO, "fit", good, "-o", out), 0);
+  assert_non_null(strstr(text, "inhale: 16 samples, 0 to 30 cmH2O"));
+  assert_non_null(strstr(text, "exhale: no samples"));
+  assert_non_null(strstr(text, "95 % confidence"));
+  supine_pv pv;
+  assert_int_equal(supine_pv_load(out, &pv, NULL), SUPINE_OK);
+  const double difference = pv.limb[1].control[1] - supine_pv_normal()->limb[0].control[1];
+  assert_true(difference < 1e-6 && difference > -1e-6);
+}
+
+static void test_command_fit_json_has_each_field(void **state) {
+  (void)state;
+  assert_int_equal(RUN(STDOUT_FILENO, "fit", "--json", "--confidence", "0.5", good), 0);
+  static const char *const keys[] = {"{\"confidence\": 0.5, \"inhale\": {\"samples\": 16",
+                                     "\"pressure_cmH2O\": [0, 30]",
+                                     "\"control\": [",
+                                     "\"control_interval\": [",
+                                     "\"volume_interval_mL\": [",
+                                     "\"rms_mL\": ",
+                                     "\"rms_percent\": ",
+                                     "\"condition\": "};
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    assert_non_null(strstr(text, keys[i]));
+  }
+  assert_null(strstr(text, "exhale"));
+  assert_string_equal(text + strlen(text) - 3, "}}\n");
+}
+
+static void test_command_show_prints_curve(void **state) {
+  (void)state;
+  assert_int_equal(RUN(STDOUT_FILENO, "show", "--step", "12.5"), 0);
+  double cell[4][5];
+  char *at = strchr(text, '\n');
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 5; ++column) {
+      char *end = NULL;
+      cell[row][column] = strtod(at + 1, &end);
+      assert_true(end != at + 1);
+      assert_int_equal(*end, column < 4 ? ',' : '\n');
+      at = end;
+    }
+  }
+  assert_string_equal(at, "\n");
+  static const double pressures[4] = {0.0, 12.5, 25.0, 30.0};
+  for (int row = 0; row < 4; ++row) {
+    assert_true(cell[row][0] == pressures[row]);
+  }
+  assert_true(cell[0][1] == 0.0 && cell[3][1] == 6000.0); /* inhale, mL */
+  assert_true(cell[1][3] > cell[1][1]);                   /* exhale holds more */
+  assert_true(cell[0][4] > cell[3][4]);                   /* and stiffens */
+}
+
+static void test_command_help_teaches(void **state) {
+  (void)state;
+  assert_int_equal(RUN(STDOUT_FILENO, "--help"), 0);
+  assert_non_null(strstr(text, "pressure_cmH2O,volume_mL,limb"));
+  assert_non_null(strstr(text, "Examples:"));
+}
+
+static void expect_printed(const char *message) {
+  if (strstr(text, message) == NULL) {
+    fail_msg("\"%s\" has no \"%s\"", text, message);
+  }
+}
+
+static void test_command_failures_have_their_exit_codes(void **state) {
+  (void)state;
+  assert_int_equal(RUN(STDERR_FILENO, "fit"), 1);
+  expect_printed("one file of samples");
+  assert_int_equal(RUN(STDERR_FILENO, "fit", good, bad), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "draw", good), 1);
+  expect_printed("not draw");
+  assert_int_equal(run(STDERR_FILENO, (const char *const[]){NULL}), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "1"), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "x"), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "show", "--step", "0"), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "show", "--step", "1e-9"), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "show", good, out), 1);
+  assert_int_equal(RUN(STDERR_FILENO, "fit", "/nonexistent/s.csv"), 2);
+  expect_printed("/nonexistent/s.csv");
+  assert_int_equal(RUN(STDERR_FILENO, "fit", bad, "-o", out), 2);
+  expect_printed("bad.csv:11: volume 0 mL");
+  assert_int_equal(RUN(STDERR_FILENO, "show", good), 2);
+  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "-o", "/nonexistent/p.csv"), 4);
+  expect_printed("/nonexistent/p.csv");
+}
+
+int main(void) {
+  (void)gsl_set_error_handler_off();
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_command_fit_writes_parameters_that_load),
+      cmocka_unit_test(test_command_fit_json_has_each_field),
+      cmocka_unit_test(test_command_show_prints_curve),
+      cmocka_unit_test(test_command_help_teaches),
+      cmocka_unit_test(test_command_failures_have_their_exit_codes),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

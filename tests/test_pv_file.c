@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Files of samples and of parameters. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <gsl/gsl_errno.h>
+
+#include <supine/pv.h>
+
+static char folder[] = "/tmp/supine-pv-XXXXXX";
+static char path[64];
+
+static int folder_make(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(path, sizeof path, "%s/file.csv", folder);
+  return 0;
+}
+
+static int folder_remove(void **state) {
+  (void)state;
+  (void)unlink(path);
+  return rmdir(folder);
+}
+
+static void write_bytes(const char *text, size_t size) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(text, 1, size, file), size);
+  assert_int_equal(fclose(file), 0);
+}
+
+static void test_samples_load_comments_order_and_endings_read(void **state) {
+  (void)state;
+  static const char text[] = "\xEF\xBB\xBF# bench, 3rd of May\r\n"
+                             "\r\n"
+                             "limb , volume_mL,pressure_cmH2O\r\n"
+                             "inhale,100.5,-2\r\n"
+                             "exhale, 900 ,3e1\r\n"
+                             "  # comment, with commas\n"
+                             "inhale,\t200,4.25\n"
+                             "inhale,300,5";
+  write_bytes(text, sizeof text - 1);
+  supine_pv_samples samples;
+  supine_error error = {0};
+  assert_int_equal(supine_pv_samples_load(path, &samples, &error), SUPINE_OK);
+  assert_int_equal(samples.count[SUPINE_PV_INHALE], 3);
+  assert_int_equal(samples.count[SUPINE_PV_EXHALE], 1);
+  assert_true(samples.pressure[SUPINE_PV_INHALE][0] == -2.0);
+  assert_true(samples.volume[SUPINE_PV_INHALE][1] == 200.0);
+  assert_true(samples.pressure[SUPINE_PV_INHALE][2] == 5.0);
+  assert_true(samples.pressure[SUPINE_PV_EXHALE][0] == 30.0);
+  assert_int_equal(samples.line[SUPINE_PV_INHALE][0], 4);
+  assert_int_equal(samples.line[SUPINE_PV_EXHALE][0], 5);
+  assert_int_equal(samples.line[SUPINE_PV_INHALE][2], 8);
+  assert_string_equal(samples.name, path);
+  supine_pv_samples_clear(&samples);
+  supine_pv_samples_clear(&samples);
+  assert_null(samples.name);
+}
+
+static void expect_load(const char *text, size_t size, const char *expected) {
+  write_bytes(text, size);
+  supine_pv_samples samples;
+  supine_error error = {0};
+  assert_int_equal(supine_pv_samples_load(path, &samples, &error), SUPINE_ERROR_FORMAT);
+  if (strstr(error.message, expected) == NULL || strstr(error.message, path) == NULL) {
+    fail_msg("\"%s\" has no \"%s\"", error.message, expected);
+  }
+  assert_null(samples.name);
+}
+
+static void test_samples_load_malformed_names_the_line(void **state) {
+  (void)state;
+  static const struct {
+    const char *text;
+    const char *expected;
+  } bad[] = {
+      {"", "empty"},
+      {"# nothing\n\n", "empty"},
+      {"1,2\n3,4\n", ":1: unknown column \"1\""},
+      {"pressure_cmH2O,volume_mL,flow\n", ":1: unknown column \"flow\""},
+      {"pressure_cmH2O,pressure_cmH2O\n", ":1: repeated column"},
+      {"#\npressure_cmH2O,limb\n", ":2: the header has no column \"volume_mL\""},
+      {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 fields where the header has 2"},
+      {"pressure_cmH2O,volume_mL\n1,2,3\n", ":2: 3 fields"},
+      {"pressure_cmH2O,volume_mL\n1,2\n\n3,nan\n", ":4: volume_mL \"nan\""},
+      {"pressure_cmH2O,volume_mL\ninf,2\n", ":2: pressure_cmH2O \"inf\""},
+      {"pressure_cmH2O,volume_mL\n1e999,2\n", ":2: pressure_cmH2O \"1e999\""},
+      {"pressure_cmH2O,volume_mL\n,2\n", ":2: pressure_cmH2O \"\""},
+      {"pressure_cmH2O,volume_mL\n1,2 mL\n", ":2: volume_mL \"2 mL\""},
+      {"pressure_cmH2O,volume_mL\n1,\"2\"\n", ":2: volume_mL \"\"2\"\""},
+      {"pressure_cmH2O,volume_mL,limb\n1,2,in\n", ":2: limb \"in\""},
+      {"pressure_cmH2O,volume_mL,,,,,,,,,,,,,,,,\n", ":1: more than 16 fields"},
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    expect_load(bad[i].text, strlen(bad[i].text), bad[i].expected);
+  }
+  static const char nul[] = "pressure_cmH2O,volume_mL\n1,2\0\n";
+  expect_load(nul, sizeof nul - 1, ":2: a NUL byte");
+}
+
+static void test_load_missing_file_or_folder_reports_read(void **state) {
+  (void)state;
+  supine_pv_samples samples;
+  supine_pv pv;
+  supine_error error = {0};
+  assert_int_equal(supine_pv_samples_load("/nonexistent/s.csv", &samples, &error),
+                   SUPINE_ERROR_READ);
+  assert_non_null(strstr(error.message, "/nonexistent/s.csv"));
+  assert_int_equal(supine_pv_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_pv_load(folder, &pv, &error), SUPINE_ERROR_READ);
+}
+
+static void test_save_load_same_numbers(void **state) {
+  (void)state;
+  const supine_pv written = {
+      {{{-1.0 / 3.0, 29.9}, {1234.5678901234567, 5.0e3}, {0.1, -2.0 / 7.0, 1e-17, 49.9, -50.0}},
+       {{0.0, 30.0}, {-0.0, 6000.1}, {0.0, 1.0, 2.0, 3.0, 4.0}}}};
+  supine_pv read;
+  assert_int_equal(supine_pv_save(path, &written, NULL), SUPINE_OK);
+  assert_int_equal(supine_pv_load(path, &read, NULL), SUPINE_OK);
+  assert_memory_equal(&read, &written, sizeof read);
+  assert_int_equal(supine_pv_save(path, supine_pv_normal(), NULL), SUPINE_OK);
+  assert_int_equal(supine_pv_load(path, &read, NULL), SUPINE_OK);
+  assert_memory_equal(&read, supine_pv_normal(), sizeof read);
+}
+
+static void test_save_bad_target_or_curve_refused(void **state) {
+  (void)state;
+  supine_error error = {0};
+  assert_int_equal(supine_pv_save("/nonexistent/p.csv", supine_pv_normal(), &error),
+                   SUPINE_ERROR_WRITE);
+  assert_int_equal(supine_pv_save("/dev/full", supine_pv_normal(), &error), SUPINE_ERROR_WRITE);
+  const supine_pv empty = {0};
+  assert_int_equal(supine_pv_save(path, &empty, &error), SUPINE_ERROR_ARGUMENT);
+}
+
+#define HEADER                                                                                     \
+  "limb,pressure_low_cmH2O,pressure_high_cmH2O,volume_low_mL,volume_high_mL,c1,c2,c3,c4,c5\n"
+
+static void test_load_one_limb_serves_both(void **state) {
+  (void)state;
+  static const char *const texts[] = {HEADER "exhale,0,30,0,6000,-1,2,3,4,5\n",
+                                      HEADER "inhale,0,30,0,6000,-1,2,3,4,5\n"};
+  for (size_t i = 0; i < 2; ++i) {
+    write_bytes(texts[i], strlen(texts[i]));
+    supine_pv pv;
+    assert_int_equal(supine_pv_load(path, &pv, NULL), SUPINE_OK);
+    assert_memory_equal(&pv.limb[0], &pv.limb[1], sizeof pv.limb[0]);
+    assert_true(pv.limb[0].pressure[1] == 30.0 && pv.limb[0].control[4] == 5.0);
+  }
+}
+
+static void test_load_malformed_parameters_name_the_line(void **state) {
+  (void)state;
+  static const struct {
+    const char *text;
+    const char *expected;
+  } bad[] = {
+      {HEADER, "no row of parameters"},
+      {"limb,c1\n", ":1: the header has no column \"pressure_low_cmH2O\""},
+      {HEADER "inhale,0,30,0,6000,1,2,3,4\n", ":2: 9 fields where the header has 10"},
+      {HEADER "inhale,0,30,0,6000,1,2,3,4,x\n", ":2: c5 \"x\""},
+      {HEADER "inhale,30,0,0,6000,1,2,3,4,5\n", ":2: the limb's pressures must rise"},
+      {HEADER "inhale,0,30,7,7,1,2,3,4,5\n", ":2: the limb's volumes must rise"},
+      {HEADER "#\nexhale,0,30,0,7,1,2,51,4,5\n", ":3: control parameter c3 is 51"},
+      {HEADER "inhale,0,30,0,7,1,2,3,4,5\ninhale,0,30,0,7,1,2,3,4,5\n",
+       ":3: a second row for inhale"},
+      {HEADER "both,0,30,0,7,1,2,3,4,5\n", ":2: limb \"both\""},
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    write_bytes(bad[i].text, strlen(bad[i].text));
+    supine_pv pv;
+    supine_error error = {0};
+    assert_int_equal(supine_pv_load(path, &pv, &error), SUPINE_ERROR_FORMAT);
+    if (strstr(error.message, bad[i].expected) == NULL) {
+      fail_msg("\"%s\" has no \"%s\"", error.message, bad[i].expected);
+    }
+  }
+}
+
+static void write_limbs(bool inhale, bool exhale) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  (void)fputs("pressure_cmH2O,volume_mL,limb\n", file);
+  for (int limb = 0; limb < 2; ++limb) {
+    for (int j = 0; j < 12 && (limb == 0 ? inhale : exhale); ++j) {
+      const double pressure = 30.0 * (limb == 0 ? j : 11 - j) / 11.0;
+      double volume = 0.0;
+      assert_int_equal(
+          supine_pv_evaluate(&supine_pv_normal()->limb[limb], 1, &pressure, &volume, NULL, NULL),
+          SUPINE_OK);
+      (void)fprintf(file, "%.17g,%.17g,%s\n", pressure, volume,
+                    supine_pv_limb_name((supine_pv_limb)limb));
+    }
+  }
+  assert_int_equal(fclose(file), 0);
+}
+
+static void test_fit_samples_each_limb_its_own_or_the_other(void **state) {
+  (void)state;
+  for (int which = 1; which <= 3; ++which) {
+    write_limbs((which & 1) != 0, (which & 2) != 0);
+    supine_pv_samples samples;
+    assert_int_equal(supine_pv_samples_load(path, &samples, NULL), SUPINE_OK);
+    supine_pv pv;
+    supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
+    assert_int_equal(supine_pv_fit_samples(&samples, 0.95, &pv, reports, NULL), SUPINE_OK);
+    supine_pv_samples_clear(&samples);
+    for (int limb = 0; limb < 2; ++limb) {
+      const bool own = (which & (1 << limb)) != 0;
+      assert_int_equal(reports[limb].samples, own ? 12 : 0);
+      const supine_pv_curve *expected = &supine_pv_normal()->limb[own ? limb : 1 - limb];
+      for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
+        const double difference = pv.limb[limb].control[i] - expected->control[i];
+        assert_true(difference < 1e-6 && difference > -1e-6);
+      }
+    }
+  }
+}
+
+static void test_fit_samples_header_alone_is_too_few(void **state) {
+  (void)state;
+  static const char text[] = "pressure_cmH2O,volume_mL\n";
+  write_bytes(text, sizeof text - 1);
+  supine_pv_samples samples;
+  assert_int_equal(supine_pv_samples_load(path, &samples, NULL), SUPINE_OK);
+  supine_pv pv;
+  supine_error error = {0};
+  assert_int_equal(supine_pv_fit_samples(&samples, 0.95, &pv, NULL, &error), SUPINE_ERROR_FORMAT);
+  assert_non_null(strstr(error.message, "0 samples"));
+  supine_pv_samples_clear(&samples);
+}
+
+int main(void) {
+  (void)gsl_set_error_handler_off();
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_samples_load_comments_order_and_endings_read),
+      cmocka_unit_test(test_samples_load_malformed_names_the_line),
+      cmocka_unit_test(test_load_missing_file_or_folder_reports_read),
+      cmocka_unit_test(test_save_load_same_numbers),
+      cmocka_unit_test(test_save_bad_target_or_curve_refused),
+      cmocka_unit_test(test_load_one_limb_serves_both),
+      cmocka_unit_test(test_load_malformed_parameters_name_the_line),
+      cmocka_unit_test(test_fit_samples_each_limb_its_own_or_the_other),
+      cmocka_unit_test(test_fit_samples_header_alone_is_too_few),
+  };
+  return cmocka_run_group_tests(tests, folder_make, folder_remove);
+}

@@ -1,0 +1,400 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Basis files: what opens, and every damage that must not. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/runtime.h>
+#include <supine/safetensors.h>
+
+#include "runtime_fixture.h"
+
+/* Opens from a copy of exactly that size, so that a sanitizer sees any read past it. */
+static supine_status open_copy(const unsigned char *bytes, size_t size, supine_error *error) {
+  unsigned char *copy = malloc(size == 0 ? 1 : size);
+  assert_non_null(copy);
+  memcpy(copy, bytes, size);
+  supine_basis *basis = NULL;
+  const supine_status status = supine_basis_open_memory(copy, size, &basis, error);
+  assert_true((status == SUPINE_OK) == (basis != NULL));
+  supine_basis_close(basis);
+  free(copy);
+  return status;
+}
+
+static void test_open_made_basis_holds_what_was_written(void **state) {
+  (void)state;
+  fixture *f = fixture_create(37, 7, 3, 3, false, true, 9, 1);
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a.safetensors", folder);
+  fixture_write(f, path);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open(path, &basis, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  assert_int_equal(info->vertex_count, 37);
+  assert_int_equal(info->triangle_count, f->triangles);
+  assert_int_equal(info->mode_count, 7);
+  assert_int_equal(info->band, 3);
+  assert_int_equal(info->lung_count, 3);
+  for (size_t i = 0; i <= 3; ++i) {
+    assert_int_equal(info->lung_begin[i], 37 * i / 3);
+  }
+  assert_false(info->vector);
+  assert_true(info->has_volume);
+  assert_memory_equal(supine_basis_vertices(basis), f->vertex, 37 * 3 * sizeof(float));
+  assert_memory_equal(supine_basis_triangles(basis), f->triangle,
+                      f->triangles * 3 * sizeof(uint32_t));
+  assert_string_equal(supine_basis_metadata(basis, "units"), "mm");
+  assert_null(supine_basis_metadata(basis, "absent"));
+  supine_basis_close(basis);
+  supine_basis_close(NULL);
+  fixture_folder_remove(folder);
+  fixture_destroy(f);
+}
+
+static void test_open_every_truncation_refused(void **state) {
+  (void)state;
+  fixture *f = fixture_create(11, 2, 1, 2, false, true, 9, 2);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_OK);
+  for (size_t length = 0; length < size; ++length) {
+    assert_int_equal(open_copy(bytes, length, NULL), SUPINE_ERROR_FORMAT);
+  }
+  unsigned char *longer = calloc(size + 8, 1);
+  assert_non_null(longer);
+  memcpy(longer, bytes, size);
+  for (size_t extra = 1; extra <= 8; ++extra) {
+    assert_int_equal(open_copy(longer, size + extra, NULL), SUPINE_ERROR_FORMAT);
+  }
+  free(longer);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+/* Everything that one basis says, equal in the other. */
+static void assert_same_basis(const unsigned char *a, const unsigned char *b, size_t size) {
+  supine_basis *left = NULL;
+  supine_basis *right = NULL;
+  assert_int_equal(supine_basis_open_memory(a, size, &left, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_open_memory(b, size, &right, NULL), SUPINE_OK);
+  const supine_basis_info *x = supine_basis_get_info(left);
+  const supine_basis_info *y = supine_basis_get_info(right);
+  assert_int_equal(x->vertex_count, y->vertex_count);
+  assert_int_equal(x->triangle_count, y->triangle_count);
+  assert_int_equal(x->mode_count, y->mode_count);
+  assert_int_equal(x->band, y->band);
+  assert_int_equal(x->lung_count, y->lung_count);
+  assert_int_equal(x->vector, y->vector);
+  assert_int_equal(x->has_volume, y->has_volume);
+  static const char *const keys[] = {"format", "version", "kind", "units", "checksum"};
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    assert_string_equal(supine_basis_metadata(left, keys[i]),
+                        supine_basis_metadata(right, keys[i]));
+  }
+  double weights[2][SUPINE_MODES_MAX];
+  const double gravity[3] = {0.48, -0.6, 0.64};
+  assert_int_equal(supine_basis_weights(left, gravity, weights[0]), SUPINE_OK);
+  assert_int_equal(supine_basis_weights(right, gravity, weights[1]), SUPINE_OK);
+  assert_memory_equal(weights[0], weights[1], x->mode_count * sizeof(double));
+  const double scales[SUPINE_LUNGS_MAX] = {1.5, 2.5};
+  float *xyz = calloc(6 * x->vertex_count, sizeof *xyz);
+  assert_non_null(xyz);
+  supine_deform(left, weights[0], scales, xyz);
+  supine_deform(right, weights[1], scales, xyz + 3 * x->vertex_count);
+  assert_memory_equal(xyz, xyz + 3 * x->vertex_count, 3 * x->vertex_count * sizeof *xyz);
+  free(xyz);
+  supine_basis_close(left);
+  supine_basis_close(right);
+}
+
+static void test_open_every_flipped_bit_refused_or_same(void **state) {
+  (void)state;
+  fixture *f = fixture_create(11, 2, 1, 2, false, true, 9, 3);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  unsigned char *damaged = malloc(size);
+  assert_non_null(damaged);
+  memcpy(damaged, bytes, size);
+  uint64_t header = 0;
+  memcpy(&header, bytes, 8);
+  size_t accepted = 0;
+  for (size_t bit = 0; bit < 8 * size; ++bit) {
+    damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
+    const supine_status status = open_copy(damaged, size, NULL);
+    if (status == SUPINE_OK) {
+      assert_true(bit / 8 < 8 + header); /* never in the data */
+      assert_same_basis(bytes, damaged, size);
+      ++accepted;
+    } else {
+      assert_int_equal(status, SUPINE_ERROR_FORMAT);
+    }
+    damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
+  }
+  /* Only the padding can change without a trace, between a space and other white space. */
+  assert_true(accepted <= 8);
+  /* Whole bytes of the header: every value. */
+  for (size_t i = 0; i < 8 + header; ++i) {
+    for (unsigned value = 0; value < 256; value += 7) {
+      damaged[i] = (unsigned char)value;
+      if (damaged[i] != bytes[i] && open_copy(damaged, size, NULL) == SUPINE_OK) {
+        assert_same_basis(bytes, damaged, size);
+      }
+    }
+    damaged[i] = bytes[i];
+  }
+  free(damaged);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+/* Writes the fixture after `spoil` has had its way, and expects the file to be refused. */
+static void expect_refused(void (*spoil)(fixture *), const char *reason) {
+  fixture *f = fixture_create(12, 3, 1, 2, false, true, 9, 4);
+  spoil(f);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_error error = {0};
+  assert_int_equal(open_copy(bytes, size, &error), SUPINE_ERROR_FORMAT);
+  if (strstr(error.message, reason) == NULL) {
+    fail_msg("'%s' in place of '%s'", error.message, reason);
+  }
+  free(bytes);
+  fixture_destroy(f);
+}
+
+static void spoil_triangle(fixture *f) {
+  f->triangle[5] = (uint32_t)f->vertices;
+}
+static void spoil_vertex(fixture *f) {
+  f->vertex[35] = NAN;
+}
+static void spoil_direction(fixture *f) {
+  f->direction[0] = INFINITY;
+}
+static void spoil_coefficient(fixture *f) {
+  f->coefficient[35] = -INFINITY;
+}
+static void spoil_mode(fixture *f) {
+  f->mode[11] = (double)NAN;
+}
+static void spoil_linear(fixture *f) {
+  f->linear[5] = (double)NAN;
+}
+static void spoil_quadratic(fixture *f) {
+  f->quadratic[17] = (double)INFINITY;
+}
+static void spoil_cubic(fixture *f) {
+  f->cubic[53] = (double)NAN;
+}
+static void spoil_lung_order(fixture *f) {
+  f->lung[11] = 0;
+}
+static void spoil_lung_gap(fixture *f) {
+  for (size_t i = 6; i < 12; ++i) {
+    f->lung[i] = 2;
+  }
+}
+static void spoil_lung_first(fixture *f) {
+  f->lung[0] = 1;
+}
+
+static void test_open_wrong_content_refused_with_reason(void **state) {
+  (void)state;
+  expect_refused(spoil_triangle, "a triangle names vertex 12 of 12");
+  expect_refused(spoil_vertex, "a vertex is not finite");
+  expect_refused(spoil_direction, "a direction is not finite");
+  expect_refused(spoil_coefficient, "a coefficient is not finite");
+  expect_refused(spoil_mode, "a mode is not finite");
+  expect_refused(spoil_linear, "volume_linear is not finite");
+  expect_refused(spoil_quadratic, "volume_quadratic is not finite");
+  expect_refused(spoil_cubic, "volume_cubic is not finite");
+  expect_refused(spoil_lung_order, "grouped by lung");
+  expect_refused(spoil_lung_gap, "vertex 6 is of lung 2");
+  expect_refused(spoil_lung_first, "vertex 0 is of lung 1");
+}
+
+typedef struct parts {
+  supine_tensor tensors[10];
+  size_t tensor_count;
+  supine_metadata metadata[4];
+  size_t metadata_count;
+} parts;
+
+static const float zeros[64] = {0};
+static const double zeros64[64] = {0};
+
+/* A sound basis of four vertices and one mode, to be spoiled. */
+static parts sound(void) {
+  return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, zeros},
+                             {"triangles", SUPINE_U32, 2, {2, 3}, zeros},
+                             {"direction", SUPINE_F32, 2, {4, 3}, zeros},
+                             {"coefficients", SUPINE_F32, 2, {4, 1}, zeros},
+                             {"modes", SUPINE_F64, 2, {1, 4}, zeros64},
+                             {"lung", SUPINE_U8, 1, {4}, zeros},
+                             {"volume_linear", SUPINE_F64, 2, {1, 1}, zeros64},
+                             {"volume_quadratic", SUPINE_F64, 3, {1, 1, 1}, zeros64},
+                             {"volume_cubic", SUPINE_F64, 4, {1, 1, 1, 1}, zeros64}},
+                 .tensor_count = 9,
+                 .metadata = {{"format", "supine-basis"}, {"version", "1"}, {"kind", "scalar"}},
+                 .metadata_count = 3};
+}
+
+static supine_status open_parts(const parts *p) {
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a", folder);
+  assert_int_equal(supine_safetensors_write(path, p->tensors, p->tensor_count, p->metadata,
+                                            p->metadata_count, NULL),
+                   SUPINE_OK);
+  supine_basis *basis = NULL;
+  supine_error error = {0};
+  const supine_status status = supine_basis_open(path, &basis, &error);
+  assert_true(status == SUPINE_OK || strstr(error.message, path) != NULL);
+  supine_basis_close(basis);
+  fixture_folder_remove(folder);
+  return status;
+}
+
+static void test_open_wrong_structure_refused(void **state) {
+  (void)state;
+  parts p = sound();
+  assert_int_equal(open_parts(&p), SUPINE_OK);
+  for (size_t i = 0; i < 9; ++i) { /* each tensor missing, misnamed, of other type */
+    p = sound();
+    p.tensors[i].name = "other";
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+    p = sound();
+    p.tensors[i].dtype = p.tensors[i].dtype == SUPINE_U8 ? SUPINE_U32 : SUPINE_U8;
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+    for (size_t axis = 0; axis < p.tensors[i].rank; ++axis) { /* each axis longer or empty */
+      p = sound();
+      p.tensors[i].shape[axis] += 1;
+      const bool free_axis = (i == 1 && axis == 0);
+      assert_int_equal(open_parts(&p), free_axis ? SUPINE_OK : SUPINE_ERROR_FORMAT);
+      p.tensors[i].shape[axis] = 0;
+      assert_int_equal(open_parts(&p), free_axis ? SUPINE_OK : SUPINE_ERROR_FORMAT);
+    }
+  }
+  for (size_t i = 0; i < 3; ++i) { /* each metadata string missing or other */
+    p = sound();
+    p.metadata[i].value = "other";
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+    p.metadata[i].key = "other";
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  }
+  p = sound(); /* kind vector needs [N, 3, K] */
+  p.metadata[2].value = "vector";
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  p.tensors[3] = (supine_tensor){"coefficients", SUPINE_F32, 3, {4, 3, 1}, zeros};
+  assert_int_equal(open_parts(&p), SUPINE_OK);
+  p = sound(); /* no volumes at all is an open surface */
+  p.tensor_count = 6;
+  assert_int_equal(open_parts(&p), SUPINE_OK);
+  p.tensor_count = 7;
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+}
+
+static void test_open_too_many_modes_or_bands_refused(void **state) {
+  (void)state;
+  fixture *f = fixture_create(5, SUPINE_MODES_MAX, 0, 1, false, false, 1, 6);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_OK);
+  free(bytes);
+  fixture_destroy(f);
+  f = fixture_create(5, SUPINE_MODES_MAX + 1, 0, 1, false, false, 1, 6);
+  bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_ERROR_FORMAT);
+  free(bytes);
+  fixture_destroy(f);
+  f = fixture_create(5, 1, 64, 1, false, false, 1, 6);
+  bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_OK);
+  free(bytes);
+  fixture_destroy(f);
+  f = fixture_create(5, 1, 65, 1, false, false, 1, 6);
+  bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_ERROR_FORMAT);
+  free(bytes);
+  fixture_destroy(f);
+  f = fixture_create(17, 1, 0, 16, false, false, 1, 6);
+  bytes = fixture_bytes(f, &size);
+  assert_int_equal(open_copy(bytes, size, NULL), SUPINE_OK);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+static void test_open_foreign_files_refused(void **state) {
+  (void)state;
+  static const struct {
+    const char *text;
+    size_t size;
+  } cases[] = {
+      {"", 0},
+      {"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", 50},
+      {"solid lung\nendsolid lung\n", 25},
+      {"{\"json\": true}", 14},
+      {"\x02\0\0\0\0\0\0\0{}", 10},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_error error = {0};
+    assert_int_equal(open_copy((const unsigned char *)cases[i].text, cases[i].size, &error),
+                     SUPINE_ERROR_FORMAT);
+    assert_true(strlen(error.message) > 0);
+  }
+  supine_basis *basis = NULL;
+  supine_error error;
+  assert_int_equal(supine_basis_open("/nonexistent/basis", &basis, &error), SUPINE_ERROR_READ);
+  assert_non_null(strstr(error.message, "/nonexistent/basis"));
+  assert_int_equal(supine_basis_open("/tmp", &basis, &error), SUPINE_ERROR_READ);
+}
+
+static void test_weights_bad_gravity_refused(void **state) {
+  (void)state;
+  fixture *f = fixture_create(5, 2, 1, 1, false, false, 1, 6);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  double weights[2];
+  assert_int_equal(supine_basis_weights(basis, (double[]){0, 0, 0}, weights),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_basis_weights(basis, (double[]){0, (double)NAN, 0}, weights),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_basis_weights(basis, (double[]){0, 2.5, 0}, weights), SUPINE_OK);
+  /* Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), as DESIGN's convention lists them. */
+  const double y[4] = {0.28209479177387814, 0.48860251190291992, 0, 0};
+  for (size_t k = 0; k < 2; ++k) {
+    double want = 0;
+    for (size_t i = 0; i < 4; ++i) {
+      want += f->mode[4 * k + i] * y[i];
+    }
+    assert_true(fabs(weights[k] - want) <= 1e-15);
+  }
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_open_made_basis_holds_what_was_written),
+      cmocka_unit_test(test_open_every_truncation_refused),
+      cmocka_unit_test(test_open_every_flipped_bit_refused_or_same),
+      cmocka_unit_test(test_open_wrong_content_refused_with_reason),
+      cmocka_unit_test(test_open_wrong_structure_refused),
+      cmocka_unit_test(test_open_too_many_modes_or_bands_refused),
+      cmocka_unit_test(test_open_foreign_files_refused),
+      cmocka_unit_test(test_weights_bad_gravity_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,365 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Safetensors files: round trips, and everything that must be refused. */
+#include <inttypes.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/safetensors.h>
+
+#include "runtime_fixture.h"
+
+/* A file in memory of exactly its size, so that the address sanitizer sees any read past it. */
+static supine_status open_text(const char *header, size_t data_size, supine_error *error) {
+  const size_t length = strlen(header);
+  const size_t size = 8 + length + data_size;
+  unsigned char *bytes = malloc(size);
+  assert_non_null(bytes);
+  const uint64_t prefix = length;
+  memcpy(bytes, &prefix, 8);
+  memcpy(bytes + 8, header, length); /* NOLINT(bugprone-not-null-terminated-result) */
+  memset(bytes + 8 + length, 7, data_size);
+  supine_safetensors *file = NULL;
+  const supine_status status = supine_safetensors_open_memory(bytes, size, "text", &file, error);
+  assert_true((status == SUPINE_OK) == (file != NULL));
+  supine_safetensors_close(file);
+  free(bytes);
+  return status;
+}
+
+static const float four[] = {1.5F, -2.25F, 3.125F, 1e-30F};
+static const double two[] = {0.1, -1e300};
+static const unsigned char bytes3[] = {9, 8, 255};
+static const uint32_t words[] = {7, 4294967295U};
+
+static void write_sample(const char *path, const char *value) {
+  const supine_tensor tensors[] = {
+      {"bytes", SUPINE_U8, 1, {3}, bytes3},
+      {"four", SUPINE_F32, 2, {2, 2}, four},
+      {"none", SUPINE_F32, 2, {0, 3}, NULL},
+      {"two \"quoted\"\\\n", SUPINE_F64, 1, {2}, two},
+      {"words", SUPINE_U32, 4, {1, 2, 1, 1}, words},
+  };
+  const supine_metadata metadata[] = {{"key", value}, {"", "empty key"}};
+  supine_error error = {0};
+  assert_int_equal(supine_safetensors_write(path, tensors, 5, metadata, 2, &error), SUPINE_OK);
+}
+
+static void test_write_then_open_same_content(void **state) {
+  (void)state;
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a", folder);
+  const char *value = "tab\t quote\" slash\\ \xC3\xA9 \xF0\x9F\xAB\x81 end";
+  write_sample(path, value);
+  supine_safetensors *file = NULL;
+  assert_int_equal(supine_safetensors_open(path, &file, NULL), SUPINE_OK);
+  assert_string_equal(supine_safetensors_metadata(file, "key"), value);
+  assert_string_equal(supine_safetensors_metadata(file, ""), "empty key");
+  assert_null(supine_safetensors_metadata(file, "absent"));
+  assert_null(supine_safetensors_find(file, "absent"));
+  assert_int_equal(supine_safetensors_verify(file, NULL), SUPINE_OK);
+  const supine_tensor *tensor = supine_safetensors_find(file, "four");
+  assert_non_null(tensor);
+  assert_int_equal(tensor->dtype, SUPINE_F32);
+  assert_int_equal(tensor->rank, 2);
+  assert_int_equal(tensor->shape[0], 2);
+  assert_int_equal(tensor->shape[1], 2);
+  assert_memory_equal(tensor->data, four, sizeof four);
+  tensor = supine_safetensors_find(file, "two \"quoted\"\\\n");
+  assert_non_null(tensor);
+  assert_int_equal((uintptr_t)tensor->data % 8, 0);
+  assert_memory_equal(tensor->data, two, sizeof two);
+  tensor = supine_safetensors_find(file, "words");
+  assert_non_null(tensor);
+  assert_int_equal(tensor->rank, 4);
+  assert_memory_equal(tensor->data, words, sizeof words);
+  tensor = supine_safetensors_find(file, "bytes");
+  assert_non_null(tensor);
+  assert_memory_equal(tensor->data, bytes3, sizeof bytes3);
+  tensor = supine_safetensors_find(file, "none");
+  assert_non_null(tensor);
+  assert_int_equal(tensor->shape[0], 0);
+  supine_safetensors_close(file);
+  fixture_folder_remove(folder);
+}
+
+static void test_write_bytes_outside_utf8_become_question_marks(void **state) {
+  (void)state;
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a", folder);
+  write_sample(path, "a\xFF\xC3(\xED\xA0\x80z");
+  supine_safetensors *file = NULL;
+  assert_int_equal(supine_safetensors_open(path, &file, NULL), SUPINE_OK);
+  assert_string_equal(supine_safetensors_metadata(file, "key"), "a??"
+                                                                "(???z");
+  assert_int_equal(supine_safetensors_verify(file, NULL), SUPINE_OK);
+  supine_safetensors_close(file);
+  fixture_folder_remove(folder);
+}
+
+static void test_write_bad_arguments_refused(void **state) {
+  (void)state;
+  const supine_tensor good = {"a", SUPINE_U8, 1, {3}, bytes3};
+  const supine_tensor twice[] = {good, good};
+  const supine_tensor rank0 = {"a", SUPINE_U8, 0, {3}, bytes3};
+  const supine_tensor rank5 = {"a", SUPINE_U8, 5, {3}, bytes3};
+  const supine_tensor dtype = {"a", SUPINE_DTYPE_COUNT, 1, {3}, bytes3};
+  const supine_tensor huge = {"a", SUPINE_F64, 2, {SIZE_MAX / 8, 2}, bytes3};
+  const supine_tensor null = {"a", SUPINE_F64, 1, {2}, NULL};
+  const supine_tensor reserved = {"__metadata__", SUPINE_U8, 1, {3}, bytes3};
+  const supine_metadata checksum = {"checksum", "0"};
+  const supine_metadata keys[] = {{"k", "1"}, {"k", "2"}};
+  const char *path = "/nonexistent-folder/file";
+  const supine_status bad = SUPINE_ERROR_ARGUMENT;
+  assert_int_equal(supine_safetensors_write(path, twice, 2, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &rank0, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &rank5, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &dtype, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &huge, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &null, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &reserved, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &good, 1, &checksum, 1, NULL), bad);
+  assert_int_equal(supine_safetensors_write(path, &good, 1, keys, 2, NULL), bad);
+  supine_error error;
+  assert_int_equal(supine_safetensors_write(path, &good, 1, NULL, 0, &error), SUPINE_ERROR_WRITE);
+  assert_non_null(strstr(error.message, path));
+  assert_int_equal(supine_safetensors_write("/dev/full", &good, 1, NULL, 0, &error),
+                   SUPINE_ERROR_WRITE);
+}
+
+#define A8 "\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}"
+
+static void test_open_valid_headers_accepted(void **state) {
+  (void)state;
+  static const struct {
+    const char *header;
+    size_t data;
+  } cases[] = {
+      {"{}", 0},
+      {"{}   ", 0},
+      {"{" A8 "}", 2},
+      {"{ \n\t\"a\" : { \"shape\" : [ 2 ] , \"data_offsets\":[0, 2 ],\"dtype\":\"U8\"} }  ", 2},
+      {"{\"__metadata__\":{}," A8 "}", 2},
+      {"{\"__metadata__\":{\"\\u00e9\\ud83e\\udec1\\/\\b\\f\\n\\r\\t\":\"\"}," A8 "}", 2},
+      {"{\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[2,6]}," A8 "}",
+       6}, /* misaligned */
+      {"{\"e\":{\"dtype\":\"F64\",\"shape\":[0,9],\"data_offsets\":[2,2]}," A8 "}", 2},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_error error = {0};
+    if (open_text(cases[i].header, cases[i].data, &error) != SUPINE_OK) {
+      fail_msg("%s: %s", cases[i].header, error.message);
+    }
+  }
+}
+
+static void test_open_bad_headers_refused(void **state) {
+  (void)state;
+  static const struct {
+    const char *header;
+    size_t data;
+  } cases[] = {
+      {"[]", 0},
+      {" {}", 0},
+      {"{", 0},
+      {"{}x", 0},
+      {"{" A8 "}", 1},                                                               /* truncated */
+      {"{" A8 "}", 3},                                                               /* trailing */
+      {"{" A8 ",}", 2},                                                              /* comma */
+      {"{" A8 " " A8 "}", 2},                                                        /* no comma */
+      {"{" A8 "," A8 "}", 4},                                                        /* twice */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[1,3]}}", 3}, /* overlap */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[3,5]}}", 5}, /* hole */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}", 2}, /* shared */
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[2,0]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[3],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[],\"data_offsets\":[0,1]}}", 1},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[1,1,1,1,1],\"data_offsets\":[0,1]}}", 1},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"shape\":[2],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2],\"x\":1}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[02],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[+2],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2.0],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[-2],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2e0],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":[]}", 0},
+      {"{\"a\":{}}", 0},
+      {"{\"a\"}", 0},
+      {"{a:{}}", 0},
+      /* Sizes that overflow 64 bits, in one number and in a product. */
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[18446744073709551618],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,18446744073709551618]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[4294967296,4294967296],\"data_offsets\":[0,0]}}", 0},
+      {"{\"a\":{\"dtype\":\"F64\",\"shape\":[2305843009213693952],\"data_offsets\":[0,0]}}", 0},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[18446744073709551615],"
+       "\"data_offsets\":[0,18446744073709551615]}}",
+       2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[18446744073709551613,"
+       "18446744073709551615]}}",
+       2},
+      /* Strings. */
+      {"{\"__metadata__\":{\"k\":1}}", 0},
+      {"{\"__metadata__\":{\"k\":\"v\",}}", 0},
+      {"{\"__metadata__\":{\"k\":\"v\",\"k\":\"w\"}}", 0},
+      {"{\"__metadata__\":{},\"__metadata__\":{}}", 0},
+      {"{\"__metadata__\":[]}", 0},
+      {"{\"__metadata__\":{\"k\":\"v}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\", 0},
+      {"{\"__metadata__\":{\"k\":\"\\x\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\u0000\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\u12g4\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\u12", 0},
+      {"{\"__metadata__\":{\"k\":\"\\ud83e\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\ud83e\\u0041\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\\udec1\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"a\nb\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\xC0\x80\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\xE2\x82\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\xF5\x80\x80\x80\"}}", 0},
+      {"{\"__metadata__\":{\"k\":\"\xF0\x9F", 0},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_error error = {0};
+    if (open_text(cases[i].header, cases[i].data, &error) != SUPINE_ERROR_FORMAT) {
+      fail_msg("accepted: %s", cases[i].header);
+    }
+    assert_non_null(strstr(error.message, "text: "));
+  }
+}
+
+static void test_open_hostile_lengths_refused(void **state) {
+  (void)state;
+  static const uint64_t lengths[] = {0, 1, 3, 100, UINT64_C(1) << 32, UINT64_MAX - 7, UINT64_MAX};
+  for (size_t i = 0; i < sizeof lengths / sizeof *lengths; ++i) {
+    unsigned char *bytes = malloc(10);
+    assert_non_null(bytes);
+    memcpy(bytes, &lengths[i], 8);
+    bytes[8] = '{';
+    bytes[9] = '}';
+    supine_safetensors *file = NULL;
+    assert_int_equal(supine_safetensors_open_memory(bytes, 10, "x", &file, NULL),
+                     SUPINE_ERROR_FORMAT);
+    free(bytes);
+  }
+  supine_safetensors *file = NULL;
+  for (size_t size = 0; size < 10; ++size) {
+    unsigned char *bytes = calloc(size + 1, 1);
+    assert_non_null(bytes);
+    bytes[0] = 2;
+    assert_int_equal(supine_safetensors_open_memory(bytes, size, "x", &file, NULL),
+                     SUPINE_ERROR_FORMAT);
+    free(bytes);
+  }
+}
+
+static void test_open_unreadable_paths_report_read(void **state) {
+  (void)state;
+  supine_safetensors *file = NULL;
+  supine_error error;
+  assert_int_equal(supine_safetensors_open("/nonexistent", &file, &error), SUPINE_ERROR_READ);
+  assert_null(file);
+  assert_non_null(strstr(error.message, "/nonexistent"));
+  assert_int_equal(supine_safetensors_open("/tmp", &file, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_safetensors_open("/dev/null", &file, &error), SUPINE_ERROR_READ);
+  supine_safetensors_close(NULL);
+}
+
+static void test_open_memory_any_alignment_same_content(void **state) {
+  (void)state;
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a", folder);
+  write_sample(path, "v");
+  size_t size = 0;
+  unsigned char *bytes = fixture_read(path, &size);
+  for (size_t shift = 0; shift < 8; ++shift) {
+    unsigned char *moved = malloc(size + shift);
+    assert_non_null(moved);
+    memcpy(moved + shift, bytes, size);
+    supine_safetensors *file = NULL;
+    assert_int_equal(supine_safetensors_open_memory(moved + shift, size, "m", &file, NULL),
+                     SUPINE_OK);
+    const supine_tensor *tensor = supine_safetensors_find(file, "four");
+    assert_non_null(tensor);
+    assert_int_equal((uintptr_t)tensor->data % 4, 0);
+    assert_memory_equal(tensor->data, four, sizeof four);
+    assert_int_equal(supine_safetensors_verify(file, NULL), SUPINE_OK);
+    supine_safetensors_close(file);
+    free(moved);
+  }
+  free(bytes);
+  fixture_folder_remove(folder);
+}
+
+static void test_checksum_any_bit_or_order_noticed(void **state) {
+  (void)state;
+  /* Sizes around the block of 64 bytes; every bit of each. */
+  for (size_t size = 1; size <= 200; size += size < 130 ? 43 : 7) {
+    unsigned char data[256] = {0};
+    uint64_t random = size;
+    for (size_t i = 0; i < size; ++i) {
+      data[i] = (unsigned char)(128 * (1 + fixture_random(&random)));
+    }
+    const supine_tensor tensor = {"t", SUPINE_U8, 1, {size}, data};
+    const uint64_t before = supine_safetensors_checksum(&tensor, 1, NULL, 0);
+    for (size_t bit = 0; bit < 8 * size; ++bit) {
+      data[bit / 8] ^= (unsigned char)(1U << bit % 8);
+      assert_true(supine_safetensors_checksum(&tensor, 1, NULL, 0) != before);
+      data[bit / 8] ^= (unsigned char)(1U << bit % 8);
+    }
+    const supine_tensor shorter = {"t", SUPINE_U8, 1, {size - 1}, data};
+    assert_true(supine_safetensors_checksum(&shorter, 1, NULL, 0) != before);
+  }
+  const supine_tensor flat = {"a", SUPINE_F32, 1, {4}, four};
+  const supine_tensor square = {"a", SUPINE_F32, 2, {2, 2}, four};
+  const supine_tensor named = {"b", SUPINE_F32, 1, {4}, four};
+  const supine_tensor typed = {"a", SUPINE_U32, 1, {4}, four};
+  const uint64_t sum = supine_safetensors_checksum(&flat, 1, NULL, 0);
+  assert_true(supine_safetensors_checksum(&square, 1, NULL, 0) != sum);
+  assert_true(supine_safetensors_checksum(&named, 1, NULL, 0) != sum);
+  assert_true(supine_safetensors_checksum(&typed, 1, NULL, 0) != sum);
+  const supine_metadata pairs[] = {{"k", "v"}, {"checksum", "anything"}, {"v", "k"}};
+  assert_true(supine_safetensors_checksum(&flat, 1, pairs, 1) != sum);
+  assert_true(supine_safetensors_checksum(&flat, 1, pairs, 2) ==
+              supine_safetensors_checksum(&flat, 1, pairs, 1));
+  assert_true(supine_safetensors_checksum(&flat, 1, pairs, 3) !=
+              supine_safetensors_checksum(&flat, 1, pairs, 1));
+}
+
+/* Pins the format: a change of the hash would refuse every file that exists. */
+static void test_checksum_sample_literal(void **state) {
+  (void)state;
+  const supine_tensor tensor = {"four", SUPINE_F32, 2, {2, 2}, four};
+  const supine_metadata pair = {"key", "value"};
+  assert_true(supine_safetensors_checksum(&tensor, 1, &pair, 1) == UINT64_C(0xA0C3581784E54CAE));
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_write_then_open_same_content),
+      cmocka_unit_test(test_write_bytes_outside_utf8_become_question_marks),
+      cmocka_unit_test(test_write_bad_arguments_refused),
+      cmocka_unit_test(test_open_valid_headers_accepted),
+      cmocka_unit_test(test_open_bad_headers_refused),
+      cmocka_unit_test(test_open_hostile_lengths_refused),
+      cmocka_unit_test(test_open_unreadable_paths_report_read),
+      cmocka_unit_test(test_open_memory_any_alignment_same_content),
+      cmocka_unit_test(test_checksum_any_bit_or_order_noticed),
+      cmocka_unit_test(test_checksum_sample_literal),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
