@@ -22,7 +22,7 @@ static bool is_text(const mesh_file *file) {
   return memchr(file->bytes, '\0', head) == NULL;
 }
 
-static supine_status check_text(const mesh_file *file, supine_error *error) {
+static supine_status check_text(mesh_file *file, supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   mesh_text word;
@@ -46,6 +46,7 @@ static supine_status check_text(const mesh_file *file, supine_error *error) {
                             "%s: the STL text ends before its endsolid: the file is truncated",
                             file->path);
   }
+  file->faces = corners / 3;
   return SUPINE_OK;
 }
 
@@ -55,8 +56,11 @@ supine_status mesh_guard_stl(mesh_file *file, supine_error *error) {
   if (has_count && promised == file->size) {
     mesh_space_note(file, STL_HEADER);
     file->faces = binary_facets(file);
-    file->whole = file->faces > 0;
-    return SUPINE_OK;
+    file->whole = true;
+    return file->faces > 0
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_MESH,
+                                  "%s: no triangles: the STL file has 0 facets", file->path);
   }
   if (is_text(file)) {
     return mesh_guard_text(file, error) ? check_text(file, error) : SUPINE_ERROR_FORMAT;
