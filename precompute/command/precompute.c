@@ -25,7 +25,7 @@ static const char help[] =
     "                       --band 3 --modes harmonics\n"
     "  --route ROUTE        linear: a few solves for all directions, exact while --soften is 0\n"
     "                       (default there); sampled: a solve for each direction of a grid\n"
-    "  --held-out N         directions that the error is measured on; default 100\n"
+    "  --held-out N         directions that the error is measured on; default 100 to 1000\n"
     "\n";
 
 static const char examples[] =
