@@ -87,10 +87,11 @@ void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_wor
                             size_t fields, size_t stride, supine_sh_mode mode, double *north,
                             double *south, size_t row, size_t rows);
 
-/* block.c: coefficients of the fields from `begin` on. */
+/* block.c: coefficients of the fields from `begin` on. Storing may overwrite the spectra, which
+ * have at least as much space as the coefficients. */
 void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                           size_t begin, size_t fields, supine_sh_mode mode, const double *block,
-                           double *coefficients);
+                           size_t begin, size_t fields, supine_sh_mode mode,
+                           const supine_sh_workspace *work, double *coefficients);
 void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
                           size_t begin, size_t fields, const double *coefficients, double *block);
 
