@@ -14,13 +14,15 @@
 #define SUPINE_SH_INTERNAL_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include <fftw3.h>
 
 #include <supine/transform.h>
 
 /* Versions of a function for wider vector units, chosen when the program is loaded. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SUPINE_NO_CLONES)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
+    !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
 #define SUPINE_CLONES
