@@ -3,32 +3,35 @@
  * where the coefficients of a field lie together. */
 #include "internal.h"
 
-/* Eight fields at a time: a line of each row is read once, and what is written stays in cache. */
-static void turn(const supine_sh_transform *plan, const supine_sh_batch *batch, size_t fields,
-                 supine_sh_mode mode, const double *block, double *coefficients) {
+/* turned[field, (band + 1)^2] from the rows of a block; eight fields, a cache line, at a time. */
+static void turn(const supine_sh_transform *plan, size_t fields, const double *block,
+                 double *turned) {
   for (size_t f = 0; f < fields; f += 8) {
-    const size_t end = fields - f < 8 ? fields : f + 8;
     for (size_t i = 0; i < plan->count; ++i) {
-      const double *row = block + i * plan->width;
-      double *out = coefficients + plan->position[i];
-      for (size_t g = f; g < end; ++g) {
-        double *place = out + g * batch->field_stride;
-        *place = mode == SUPINE_SH_ADD ? *place + row[g] : row[g];
+      const double *row = block + i * plan->width + f;
+      double *out = turned + f * plan->count + plan->position[i];
+      for (size_t g = 0; g < 8; ++g) { /* width is a multiple of 8: past `fields` there is space */
+        out[g * plan->count] = row[g];
       }
     }
   }
 }
 
 void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                           size_t begin, size_t fields, supine_sh_mode mode, const double *block,
-                           double *coefficients) {
-  if (batch->field_stride != 1) {
-    turn(plan, batch, fields, mode, block, coefficients + begin * batch->field_stride);
+                           size_t begin, size_t fields, supine_sh_mode mode,
+                           const supine_sh_workspace *work, double *coefficients) {
+  const double *block = work->coefficients;
+  if (batch->field_stride == 1) {
+    for (size_t i = 0; i < plan->count; ++i) {
+      supine_sh_row_write(fields, mode, block + i * plan->width,
+                          coefficients + plan->position[i] * batch->coefficient_stride + begin);
+    }
     return;
   }
-  for (size_t i = 0; i < plan->count; ++i) {
-    supine_sh_row_write(fields, mode, block + i * plan->width,
-                        coefficients + plan->position[i] * batch->coefficient_stride + begin);
+  turn(plan, fields, block, work->spectra);
+  for (size_t f = 0; f < fields; ++f) {
+    supine_sh_row_write(plan->count, mode, work->spectra + f * plan->count,
+                        coefficients + (begin + f) * batch->field_stride);
   }
 }
 

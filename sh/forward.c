@@ -43,7 +43,7 @@ static void forward_block(const void *context, const supine_sh_workspace *work, 
   }
   sum_latitudes(plan, work, 0, plan->pairs);
   supine_sh_block_store(plan, &job->batch, begin, fields,
-                        supine_sh_row_mode(plan->count, job->batch.fields), work->coefficients,
+                        supine_sh_row_mode(plan->count, job->batch.fields), work,
                         job->coefficients);
 }
 
@@ -67,8 +67,7 @@ static void ring_block(const void *context, const supine_sh_workspace *work, siz
   supine_sh_ring_forward(plan, work, fields, job->batch.point_stride, north ? ring : NULL,
                          north ? NULL : ring, 0, 1);
   sum_latitudes(plan, work, north ? job->j : plan->latitudes - 1 - job->j, 1);
-  supine_sh_block_store(plan, &job->batch, begin, fields, SUPINE_SH_ADD, work->coefficients,
-                        job->coefficients);
+  supine_sh_block_store(plan, &job->batch, begin, fields, SUPINE_SH_ADD, work, job->coefficients);
 }
 
 supine_status supine_sh_forward_ring(const supine_sh_transform *plan, const supine_sh_batch *batch,

@@ -14,13 +14,15 @@
 #define SUPINE_SH_INTERNAL_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include <fftw3.h>
 
 #include <supine/transform.h>
 
 /* Versions of a function for wider vector units, chosen when the program is loaded. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SUPINE_NO_CLONES)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
+    !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
 #define SUPINE_CLONES
@@ -87,10 +89,11 @@ void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_wor
                             size_t fields, size_t stride, supine_sh_mode mode, double *north,
                             double *south, size_t row, size_t rows);
 
-/* block.c: coefficients of the fields from `begin` on. */
+/* block.c: coefficients of the fields from `begin` on. Storing may overwrite the spectra, which
+ * have at least as much space as the coefficients. */
 void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                           size_t begin, size_t fields, supine_sh_mode mode, const double *block,
-                           double *coefficients);
+                           size_t begin, size_t fields, supine_sh_mode mode,
+                           const supine_sh_workspace *work, double *coefficients);
 void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
                           size_t begin, size_t fields, const double *coefficients, double *block);
 
