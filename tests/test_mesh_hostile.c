@@ -237,18 +237,18 @@ static void test_ply_odd_but_legal_read(void **state) {
   }
 }
 
-/* Appends `size` bytes, reversed for a big-endian file. */
-static size_t append(unsigned char *bytes, size_t at, const void *value, size_t size, bool big) {
-  for (size_t k = 0; k < size; ++k) {
-    bytes[at + k] = ((const unsigned char *)value)[big ? size - 1 - k : k];
+/* Appends the four bytes of a value. */
+static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
+  for (size_t k = 0; k < 4; ++k) {
+    bytes[at + k] = (unsigned char)(bits >> (8 * (big ? 3 - k : k)));
   }
-  return at + size;
+  return at + 4;
 }
 
 /* A binary PLY whose first byte is LF, in both byte orders, with an element before and after. */
 static void test_ply_binary_first_byte_line_feed_read(void **state) {
   for (int big = 0; big < 2; ++big) {
-    unsigned char bytes[512];
+    unsigned char bytes[512] = {0};
     size_t at = (size_t)snprintf(
         (char *)bytes, sizeof bytes,
         "ply\nformat binary_%s_endian 1.0\nelement mark 1\nproperty list char short "
@@ -263,12 +263,14 @@ static void test_ply_binary_first_byte_line_feed_read(void **state) {
     float first = 0.0F;
     memcpy(&first, &line_feed, sizeof first);
     const float rows[9] = {first, 2, 3, 4, 5, 6, 7, 8, 10};
-    const int32_t face[4] = {3, 0, 1, 2};
+    const uint32_t face[4] = {3, 0, 1, 2};
     for (size_t i = 0; i < 9; ++i) {
-      at = append(bytes, at, &rows[i], 4, big);
+      uint32_t bits = 0;
+      memcpy(&bits, &rows[i], sizeof bits);
+      at = append(bytes, at, bits, big);
     }
     for (size_t i = 0; i < 4; ++i) {
-      at = append(bytes, at, &face[i], 4, big);
+      at = append(bytes, at, face[i], big);
     }
     memset(bytes + at, 0, 6);
     at += 6;
