@@ -27,7 +27,8 @@ const char supine_model_options_help[] =
     "Direction of displacement:\n"
     "  --direction MODEL    box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
     "  --constants C1,...,C6  of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to\n"
-    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law explains\n"
+    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law "
+    "explains\n"
     "                       61 to 87 % of the squared displacement. (The paper's own are lost.)\n"
     "\n"
     "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only ratios\n"
@@ -41,14 +42,19 @@ const char supine_model_options_help[] =
     "                       order of the vertices (left lung first, each as its file first names\n"
     "                       them: the order that 'supine solve' writes), or vertex,value counted\n"
     "                       from 0\n"
-    "  --lesion X,Y,Z,RADIUS,FACTOR   a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to half\n"
+    "  --lesion X,Y,Z,RADIUS,FACTOR   a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to "
+    "half\n"
     "                       of RADIUS (mm), less and less from there, and not at all from RADIUS\n"
-    "                       on. Above 1 stiffens: it moves less; 1 changes nothing. May be repeated\n"
-    "  --lung SIDE:SHARE    left or right lung collapsed (pneumothorax): its resting volume, and what\n"
-    "                       it takes of a breath, are SHARE (0 to 1) of what they were; a breath's\n"
+    "                       on. Above 1 stiffens: it moves less; 1 changes nothing. May be "
+    "repeated\n"
+    "  --lung SIDE:SHARE    left or right lung collapsed (pneumothorax): its resting volume, and "
+    "what\n"
+    "                       it takes of a breath, are SHARE (0 to 1) of what they were; a "
+    "breath's\n"
     "                       volume stays exact, the other lung takes the rest\n"
     "  --reach MM           forces spread over this length along the surface, whatever the mesh\n"
-    "                       (about exp(-r/MM)); default: over a few links, as in the paper, so that\n"
+    "                       (about exp(-r/MM)); default: over a few links, as in the paper, so "
+    "that\n"
     "                       a finer mesh spreads less\n";
 
 supine_model_options supine_model_options_default(void) {
@@ -130,8 +136,7 @@ static bool parse_lesion(const char *text, supine_model_options *options) {
       !(v[3] > 0.0) || !(v[4] > 0.0)) {
     return false;
   }
-  options->lesions[options->lesion_count++] =
-      (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
+  options->lesions[options->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
   return true;
 }
 
@@ -191,10 +196,11 @@ int supine_model_options_take(supine_model_options *options, const char *command
                  : "--constants takes six numbers, C1,C2,C3,C4,C5,C6";
     break;
   case OPTION_EXPANDABILITY:
-    wanted = parse_expandability(value, options)
-                 ? NULL
-                 : "--expandability takes uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS "
-                   "x, y or z and both ends above 0, or a file";
+    wanted =
+        parse_expandability(value, options)
+            ? NULL
+            : "--expandability takes uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS "
+              "x, y or z and both ends above 0, or a file";
     break;
   case OPTION_LESION:
     wanted = parse_lesion(value, options)
@@ -269,10 +275,9 @@ static supine_status set_expandability(supine_model_options *options, const supi
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   options->model.stiffness = a;
-  supine_status status =
-      options->expandability != NULL
-          ? supine_expandability_load(options->expandability, n, a, error)
-          : supine_expandability_regional(lungs, &options->law, a, error);
+  supine_status status = options->expandability != NULL
+                             ? supine_expandability_load(options->expandability, n, a, error)
+                             : supine_expandability_regional(lungs, &options->law, a, error);
   if (status == SUPINE_OK) {
     status = supine_expandability_stiffness(n, a, a, error);
   }
@@ -289,10 +294,11 @@ static supine_status set_lesions(const supine_model_options *options, const char
       return status;
     }
     if (reached == 0) {
-      supine_command_say(command,
-                         "warning: the lesion at %g,%g,%g is outside the lungs: no vertex within its "
-                         "%g mm, so it changes nothing",
-                         lesion->centre[0], lesion->centre[1], lesion->centre[2], lesion->radius);
+      supine_command_say(
+          command,
+          "warning: the lesion at %g,%g,%g is outside the lungs: no vertex within its "
+          "%g mm, so it changes nothing",
+          lesion->centre[0], lesion->centre[1], lesion->centre[2], lesion->radius);
     }
   }
   return SUPINE_OK;
