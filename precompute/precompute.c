@@ -10,7 +10,12 @@
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
-enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_SAMPLED_MAX = 300, HELD_OUT_WORK = 20000000 };
+enum {
+  HELD_OUT_MIN = 100,
+  HELD_OUT_MAX = 1000,
+  HELD_OUT_SAMPLED_MAX = 300,
+  HELD_OUT_WORK = 20000000
+};
 
 static const double reference_volume = 500.0; /* mL, that errors in mm are stated at */
 

@@ -18,7 +18,7 @@ static const char help[] =
     "OBJ, STL, OFF, ...). Closed surfaces can be asked for exact volumes later.\n"
     "\n"
     "  -o, --output FILE    basis file (safetensors)\n"
-    "  --band L             highest spherical-harmonic band, 0 to 64; default 15\n"
+    "  --band L             highest spherical-harmonic band, 0 to 64; default 23\n"
     "  --modes K|harmonics  functions of orientation, and so multiplications per vertex, at run\n"
     "                       time: the best K of the band (default 16, fewer where fewer do), or\n"
     "                       the (L+1)^2 harmonics themselves. The paper's form is\n"
@@ -71,7 +71,7 @@ int supine_command_precompute(int argc, char **argv) {
                                           {"help", no_argument, NULL, 'h'},
                                           {NULL, 0, NULL, 0}};
   supine_model_options model = supine_model_options_default();
-  supine_precompute_options wanted = {.band = 15, .modes = 16};
+  supine_precompute_options wanted = {.band = 23, .modes = 16};
   const char *path = NULL;
   char made_by[512];
   describe(argc, argv, made_by, sizeof made_by);
