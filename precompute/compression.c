@@ -113,3 +113,24 @@ void supine_compression_truncate(supine_compression *compression, size_t rank, s
     compression->mode_count = count; /* modes are rows: the first ones stand where they should */
   }
 }
+
+supine_status supine_compression_volume_forms(const supine_compression *compression,
+                                              const supine_lungs *lungs, const double *directions,
+                                              supine_volume_forms *forms, supine_error *error) {
+  const size_t count = compression->mode_count;
+  const size_t values = compression->vertex_count * count;
+  double *columns = malloc(values * sizeof *columns);
+  if (columns == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for volume forms of %zu modes",
+                            count);
+  }
+  for (size_t i = 0; i < values; ++i) {
+    columns[i] = (double)compression->coefficients[i];
+  }
+  const supine_status status =
+      directions != NULL
+          ? supine_volume_forms_create(lungs, directions, columns, count, forms, error)
+          : supine_volume_forms_create_vector(lungs, columns, count, forms, error);
+  free(columns);
+  return status;
+}

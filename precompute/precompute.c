@@ -6,6 +6,7 @@
 #include <supine/precompute.h>
 
 #include "basis_file.h"
+#include "compression.h"
 #include "held_out.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
@@ -121,18 +122,7 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
     }
     return status;
   }
-  const size_t values = field->vertex_count * field->mode_count;
-  double *columns = malloc(values * sizeof *columns);
-  if (columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for volume forms");
-  }
-  for (size_t i = 0; i < values; ++i) {
-    columns[i] = (double)field->coefficients[i];
-  }
-  const supine_status status = supine_volume_forms_create(p->lungs, p->directions, columns,
-                                                          field->mode_count, &p->forms, error);
-  free(columns);
-  return status;
+  return supine_compression_volume_forms(field, p->lungs, p->directions, &p->forms, error);
 }
 
 static size_t held_out_default(const pipeline *p) {
