@@ -10,15 +10,15 @@
 #include <supine/volume.h>
 
 #include "internal.h"
+#include "tally.h"
 
-/* Bins of a float's exponent and first 8 bits of mantissa: 0.4 % wide over its whole range. */
-enum { BIN_SHIFT = 15, BIN_COUNT = 1 << 16, BLOCK = 512, VOLUME_HALVINGS = 10 };
+enum { BLOCK = 512, VOLUME_HALVINGS = 10 };
 
 /* What one thread has seen. */
 typedef struct tally {
-  double error2, field2, max;  /* at one breath scale */
-  double error_mm2, max_mm;    /* at one volume */
-  uint32_t bins[2][BIN_COUNT]; /* of both errors */
+  double field2;
+  supine_tally error;    /* at one breath scale */
+  supine_tally error_mm; /* at one volume */
 } tally;
 
 typedef struct accuracy_work {
@@ -29,13 +29,6 @@ typedef struct accuracy_work {
   const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
   tally *tallies;           /* one a thread */
 } accuracy_work;
-
-static void count_error(tally *sums, size_t which, double error) {
-  const float value = (float)error;
-  uint32_t bits;
-  memcpy(&bits, &value, sizeof bits);
-  ++sums->bins[which][bits >> BIN_SHIFT];
-}
 
 /* F of the compression at direction `d` for a block of vertices. */
 SUPINE_CLONES static void compressed_block(const accuracy_work *work, size_t d, size_t begin,
@@ -81,19 +74,13 @@ static void compare_block(const accuracy_work *work, tally *sums, size_t begin, 
     true_block(work, d, begin, end, should);
     compressed_block(work, d, begin, end, is);
     for (size_t i = 0; i < end - begin; ++i) {
-      const double error = fabs(is[i] - should[i]) * length[i];
       const double field = should[i] * length[i];
-      sums->error2 += error * error;
       sums->field2 += field * field;
-      sums->max = fmax(sums->max, error);
-      count_error(sums, 0, error);
+      supine_tally_add(&sums->error, fabs(is[i] - should[i]) * length[i]);
     }
     for (size_t i = 0; work->scales != NULL && i < end - begin; ++i) {
       const double *s = work->scales + 2 * d;
-      const double error = fabs(s[1] * is[i] - s[0] * should[i]) * length[i];
-      sums->error_mm2 += error * error;
-      sums->max_mm = fmax(sums->max_mm, error);
-      count_error(sums, 1, error);
+      supine_tally_add(&sums->error_mm, fabs(s[1] * is[i] - s[0] * should[i]) * length[i]);
     }
   }
 }
@@ -103,30 +90,6 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   for (size_t first = begin; first < end; first += BLOCK) {
     compare_block(work, &work->tallies[thread], first, first + BLOCK < end ? first + BLOCK : end);
   }
-}
-
-/* The value that 95 % of the counts of all threads lie below: the upper edge of its bin. */
-static double percentile95(const tally *tallies, size_t threads, size_t which) {
-  uint64_t total = 0;
-  for (size_t b = 0; b < BIN_COUNT; ++b) {
-    for (size_t t = 0; t < threads; ++t) {
-      total += tallies[t].bins[which][b];
-    }
-  }
-  const uint64_t wanted = total - total / 20;
-  uint64_t seen = 0;
-  for (size_t b = 0; b < BIN_COUNT; ++b) {
-    for (size_t t = 0; t < threads; ++t) {
-      seen += tallies[t].bins[which][b];
-    }
-    if (seen >= wanted) {
-      const uint32_t bits = (uint32_t)(b + 1) << BIN_SHIFT;
-      float value;
-      memcpy(&value, &bits, sizeof value);
-      return (double)value;
-    }
-  }
-  return 0.0;
 }
 
 /* Breath scales at which both sides gain `volume`; false where some direction does not reach it. */
@@ -203,23 +166,20 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   accuracy_work work = {truth, compression, directions, weights, closed ? scales : NULL, tallies};
   supine_parallel_for(n, BLOCK, threads, compare_range, &work);
-  double error2 = 0.0;
-  double field2 = 0.0;
-  double error_mm2 = 0.0;
-  for (size_t t = 0; t < threads; ++t) {
-    error2 += tallies[t].error2;
-    field2 += tallies[t].field2;
-    error_mm2 += tallies[t].error_mm2;
-    made.relative_max = fmax(made.relative_max, tallies[t].max);
-    made.max_mm = fmax(made.max_mm, tallies[t].max_mm);
+  tally *all = &tallies[0];
+  for (size_t t = 1; t < threads; ++t) {
+    all->field2 += tallies[t].field2;
+    supine_tally_merge(&all->error, &tallies[t].error);
+    supine_tally_merge(&all->error_mm, &tallies[t].error_mm);
   }
   const double samples = (double)n * (double)count;
-  const double field = sqrt(field2 / samples);
-  made.relative_rms = sqrt(error2 / samples) / field;
-  made.relative_p95 = percentile95(tallies, threads, 0) / field;
-  made.relative_max /= field;
-  made.rms_mm = sqrt(error_mm2 / samples);
-  made.p95_mm = closed ? percentile95(tallies, threads, 1) : 0.0;
+  const double field = sqrt(all->field2 / samples);
+  made.relative_rms = sqrt(all->error.square_sum / samples) / field;
+  made.relative_p95 = supine_tally_percentile(&all->error, 0.95) / field;
+  made.relative_max = all->error.largest / field;
+  made.rms_mm = sqrt(all->error_mm.square_sum / samples);
+  made.p95_mm = supine_tally_percentile(&all->error_mm, 0.95);
+  made.max_mm = all->error_mm.largest;
   *accuracy = made;
 cleanup:
   free(weights);

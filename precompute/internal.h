@@ -3,15 +3,8 @@
 #ifndef SUPINE_PRECOMPUTE_INTERNAL_H
 #define SUPINE_PRECOMPUTE_INTERNAL_H
 
+#include <supine/clones.h>
 #include <supine/equilibrium.h>
-
-/* Hot loops are compiled for several instruction sets and chosen when the program starts. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SUPINE_NO_CLONES)
-#define SUPINE_CLONES                                                                              \
-  __attribute__((target_clones("default", "arch=haswell", "arch=skylake-avx512")))
-#else
-#define SUPINE_CLONES
-#endif
 
 /* Vertex adjacency in compressed rows: the links of vertex i are row_begin[i] <= s < row_begin[i +
  * 1]. */

@@ -182,9 +182,12 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  const char *over = getenv("OVER");
-  const size_t lat = (size_t)ceil((over ? atof(over) : 1.5) * (double)(band + 1));
-  status = supine_sh_grid_create(lat, 2 * lat, &grid);
+  size_t latitudes = 0;
+  size_t longitudes = 0;
+  status = supine_sh_grid_size(band, 0.0, &latitudes, &longitudes);
+  if (status == SUPINE_OK) {
+    status = supine_sh_grid_create(latitudes, longitudes, &grid);
+  }
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no grid for band %zu: %s", band,
                            supine_status_string(status));

@@ -37,6 +37,12 @@ supine_status supine_volume_forms_create(const supine_lungs *lungs, const double
                                          const double *columns, size_t count,
                                          supine_volume_forms *forms, supine_error *error);
 
+/** The same for vector fields, u_i = s sum over k of w_k c_ik with c_ik of three components.
+ * @param columns  [N, 3, count] */
+supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
+                                                size_t count, supine_volume_forms *forms,
+                                                supine_error *error);
+
 /** Forms for the columns c' = c x mix, mix [K, count].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const double *mix,

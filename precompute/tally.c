@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Percentiles of many numbers from a histogram. */
+#include <math.h>
+#include <string.h>
+
+#include "tally.h"
+
+enum { BIN_SHIFT = 15 };
+
+void supine_tally_add(supine_tally *tally, double value) {
+  const float single = (float)value;
+  uint32_t bits;
+  memcpy(&bits, &single, sizeof bits);
+  tally->square_sum += value * value;
+  tally->largest = fmax(tally->largest, value);
+  ++tally->count;
+  ++tally->bins[bits >> BIN_SHIFT];
+}
+
+void supine_tally_merge(supine_tally *tally, const supine_tally *other) {
+  tally->square_sum += other->square_sum;
+  tally->largest = fmax(tally->largest, other->largest);
+  tally->count += other->count;
+  for (size_t b = 0; b < SUPINE_TALLY_BINS; ++b) {
+    tally->bins[b] += other->bins[b];
+  }
+}
+
+double supine_tally_percentile(const supine_tally *tally, double share) {
+  const double wanted = share * (double)tally->count;
+  uint64_t seen = 0;
+  for (uint32_t b = 0; b < SUPINE_TALLY_BINS; ++b) {
+    seen += tally->bins[b];
+    if (seen > 0 && (double)seen >= wanted) {
+      const uint32_t bits = (b + 1) << BIN_SHIFT;
+      float edge;
+      memcpy(&edge, &bits, sizeof edge);
+      return (double)edge;
+    }
+  }
+  return 0.0;
+}
