@@ -50,7 +50,8 @@ double supine_basis_storage_error(const supine_basis *basis) {
   static const double distance = 20; /* mm, on an open surface */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
-    const double gravity[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
+    const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
+    const double gravity[3] = {cell[0], cell[1], cell[2]};
     double weights[SUPINE_MODES_MAX];
     double scale = 0;
     if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {

@@ -107,18 +107,18 @@ INLINE triples separate(triples t) {
  * fill an aligned line; where the array is not aligned, each line joins the end of one register to
  * the beginning of the next. */
 typedef struct writer {
+  __m512 last;  /* the register before this one */
+  __m512i join; /* permutation of (last, next) that makes the line */
   float *to;
-  bool stream;
-  __m512 last;   /* the register before this one */
-  __m512i join;  /* permutation of (last, next) that makes the line */
   size_t offset; /* numbers by which `to` is past an aligned line */
+  bool stream;
 } writer;
 
 INLINE writer writer_open(float *to, bool stream) {
   const size_t offset = (uintptr_t)to / sizeof *to % 16;
   const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  return (writer){to, stream, _mm512_setzero_ps(),
-                  _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)), offset};
+  return (writer){_mm512_setzero_ps(), _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
+                  to, offset, stream};
 }
 
 INLINE void writer_put(writer *w, __m512 next, bool first) {
@@ -169,11 +169,8 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
                        const supine_target *target, supine_storage storage, bool vector,
                        bool with_rest, bool joined) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
-  writer out[3] = {writer_open(target->x, target->stream)};
-  if (!joined) {
-    out[1] = writer_open(target->y, target->stream);
-    out[2] = writer_open(target->z, target->stream);
-  }
+  writer out[3] = {writer_open(target->x, target->stream), writer_open(target->y, target->stream),
+                   writer_open(target->z, target->stream)}; /* joined: the first alone */
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     for (size_t line = 0; line < tiles->stride; line += 64) {
       _mm_prefetch((const char *)tile + PREFETCH_BYTES + line, _MM_HINT_T0);

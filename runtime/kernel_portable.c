@@ -55,7 +55,7 @@ static void widen_numbers(const unsigned char *at, bool compact, uint32_t bias, 
 static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
                         bool rest, float *xyz) {
   const bool compact = supine_tiles_compact(tiles->storage);
-  float amount[3][TILE];
+  float amount[3][TILE] = {{0}};
   float p[TILE_NUMBERS] = {0};
   for (size_t axis = 0; axis < tiles->axes; ++axis) {
     dot(tiles, tile + axis * tiles->axis_bytes, w, amount[axis]);

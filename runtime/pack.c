@@ -227,7 +227,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   const size_t count = (basis->info.vertex_count + TILE - 1) / TILE;
   source *was = malloc(sizeof *was);
   source *is = malloc(sizeof *is);
-  units *u = malloc(sizeof *u);
+  units *u = calloc(1, sizeof *u);
   free(tiles->bytes);
   supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
   tiles->bytes = tiles_allocate(count * tiles->stride + 64); /* the kernels' last load */

@@ -2,6 +2,10 @@
 /* The layout of tiles, and the choice of the code that reads them. */
 #include "tiles.h"
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes, bool vector,
                          size_t count) {
   static const size_t word_bytes[SUPINE_STORAGE_COUNT] = {0, 4, 4, 2, 2};
@@ -21,8 +25,12 @@ void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t mod
 #if defined(__x86_64__)
 /* Asked of the processor and of the system, which must save the registers. */
 static bool has_avx2(void) {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-         __builtin_cpu_supports("f16c");
+  unsigned a = 0;
+  unsigned b = 0;
+  unsigned c = 0;
+  unsigned d = 0;
+  const bool f16c = __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
+  return f16c && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
 }
 static bool has_avx512(void) {
   return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
