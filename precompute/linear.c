@@ -11,7 +11,7 @@
 
 /* The functions of gravity have kinks where another vertex becomes the lowest or highest. Rules
  * much finer than the band keep the kinks from aliasing into it, and cost no solve. */
-enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 64 };
+enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {
   free(projection->columns);
