@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The basis file: tensors and metadata of a compressed field. */
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include <supine/disease.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
@@ -60,6 +63,19 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
 }
 
+/* How much of the lungs lesions changed, and how far. */
+static void add_lesions(entries *list, const supine_lungs *lungs) {
+  size_t changed = 0;
+  double low = 1.0;
+  double high = 1.0;
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    changed += lungs->lesions[i] != 1.0;
+    low = fmin(low, lungs->lesions[i]);
+    high = fmax(high, lungs->lesions[i]);
+  }
+  add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
+}
+
 static void add_fit(entries *list, const supine_fit_report *fit) {
   add(list, "directions", "%s", fit->grid ? "grid" : "scattered");
   add(list, "condition", "%.4g", fit->condition);
@@ -82,9 +98,22 @@ static void add_lungs(entries *list, const supine_lungs *lungs) {
                                 lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
                                 lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
       used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
-                       1e-3 * supine_mesh_volume(&part));
+                       1e-3 * lungs->share[lung] * supine_mesh_volume(&part));
     }
     add(list, "rest_volume_ml", "%s", text);
+  }
+  if (lungs->share[0] != 1.0 || lungs->share[1] != 1.0) {
+    if (lungs->lung_count == 2) {
+      add(list, "lung_share", "%.9g,%.9g", lungs->share[0], lungs->share[1]);
+    } else {
+      add(list, "lung_share", "%.9g", lungs->share[0]);
+    }
+  }
+  if (lungs->lesions != NULL) {
+    add_lesions(list, lungs);
+  }
+  if (lungs->reach > 0.0) {
+    add(list, "reach_mm", "%.9g", lungs->reach);
   }
 }
 
@@ -106,10 +135,20 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
   const size_t g = lungs->lung_count;
   supine_status status = SUPINE_OK;
   entries *list = calloc(1, sizeof *list);
-  float *vertices = to_float(lungs->mesh.vertices, 3 * n);
   const bool vector = content->directions == NULL;
-  float *directions = vector ? NULL : to_float(content->directions, 3 * n);
+  float *vertices = NULL;
+  float *directions = NULL;
+  double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
+  if (rest != NULL) { /* the surface at rest, then its directions */
+    supine_lungs_rest(lungs, rest);
+    vertices = to_float(rest, 3 * n);
+  }
+  if (rest != NULL && !vector) {
+    memcpy(rest, content->directions, 3 * n * sizeof *rest);
+    supine_lungs_rest_directions(lungs, rest);
+    directions = to_float(rest, 3 * n);
+  }
   if (list == NULL || vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
                               path, n);
@@ -161,6 +200,7 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
   status = supine_safetensors_write(path, tensors, count, list->metadata, list->count, error);
 cleanup:
   free(list);
+  free(rest);
   free(vertices);
   free(directions);
   free(lung);

@@ -63,7 +63,7 @@ supine_status supine_sampler_create(const supine_lungs *lungs, const supine_forc
   made->force = calloc(made->threads, sizeof(double *));
   made->softened = calloc(made->threads, sizeof(double *));
   bool whole = made->equilibria != NULL && made->force != NULL && made->softened != NULL &&
-               supine_network_create(&lungs->mesh, &lungs->topology, &made->network) == SUPINE_OK;
+               supine_lungs_network(lungs, &made->network) == SUPINE_OK;
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < made->threads && whole; ++t) {
     made->force[t] = malloc(n * sizeof(double));

@@ -131,7 +131,7 @@ static void forms_range_vector(void *context, size_t begin, size_t end, size_t t
 static void forms_collect(const forms_work *work, size_t threads, size_t lung,
                           supine_volume_forms *forms) {
   const size_t n = work->count;
-  const double unit = millilitres / 6.0;
+  const double unit = millilitres / 6.0 * work->lungs->share[lung];
   double *linear = forms->linear + lung * n;
   double *quadratic = forms->quadratic + lung * n * n;
   double *cubic = forms->cubic + lung * n * n * n;

@@ -233,5 +233,6 @@ int supine_command_precompute(int argc, char **argv) {
     }
   }
   supine_lungs_free(&lungs);
+  supine_model_options_free(&model);
   return result;
 }

@@ -41,7 +41,8 @@ void supine_solution_free(supine_solution *solution);
 /** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
 double supine_solution_largest(const supine_solution *solution);
 
-/** Positions p + s F d, [N, 3], mm. */
+/** Positions p + s F d, [N, 3], mm, from the surface at rest (disease.h: that of healthy lungs is
+ * their mesh). */
 void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
                            double *positions);
 

@@ -27,8 +27,8 @@ typedef struct supine_volume_forms {
 
 void supine_volume_forms_free(supine_volume_forms *forms);
 
-/** Forms of closed lungs.
- * @param directions  [N, 3] d, mm
+/** Forms of closed lungs; a collapsed lung's are its share of its healthy ones (disease.h).
+ * @param directions  [N, 3] d of the healthy shape, mm
  * @param columns     [N, count] c
  * Cost: count^3 multiplications a triangle. Uses all cores.
  * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
