@@ -28,67 +28,101 @@ typedef struct accuracy_work {
   const double *weights;    /* [D, K] */
   const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
   tally *tallies;           /* one a thread */
+  struct turned_block *blocks;
 } accuracy_work;
 
-/* F of the compression at direction `d` for a block of vertices. */
-SUPINE_CLONES static void compressed_block(const accuracy_work *work, size_t d, size_t begin,
-                                           size_t end, double *out) {
-  const size_t count = work->compression->mode_count;
-  const double *w = work->weights + d * count;
-  for (size_t i = begin; i < end; ++i) {
-    const float *c = work->compression->coefficients + i * count;
-    double sum = 0.0;
-    for (size_t k = 0; k < count; ++k) {
-      sum += w[k] * (double)c[k];
-    }
-    out[i - begin] = sum;
-  }
-}
+/* A block of vertices, turned so that vertices run along the rows: [rank or modes][BLOCK]. */
+typedef struct turned_block {
+  size_t count;
+  double length[BLOCK]; /* |d| */
+  double columns[SUPINE_FORCE_COLUMNS_MAX][BLOCK];
+  float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
+} turned_block;
 
-static void true_block(const accuracy_work *work, size_t d, size_t begin, size_t end, double *out) {
+static void turn_block(const accuracy_work *work, size_t begin, size_t count, turned_block *block) {
   const supine_truth *truth = work->truth;
-  if (truth->fields != NULL) {
-    memcpy(out, truth->fields + d * work->compression->vertex_count + begin,
-           (end - begin) * sizeof *out);
-    return;
-  }
-  const double *functions = truth->functions + d * truth->rank;
-  for (size_t i = begin; i < end; ++i) {
-    double sum = 0.0;
-    for (size_t r = 0; r < truth->rank; ++r) {
-      sum += truth->columns[i * truth->rank + r] * functions[r];
+  const size_t modes = work->compression->mode_count;
+  block->count = count;
+  for (size_t i = 0; i < count; ++i) {
+    const double *u = work->directions + 3 * (begin + i);
+    const float *c = work->compression->coefficients + (begin + i) * modes;
+    block->length[i] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    for (size_t k = 0; k < modes; ++k) {
+      block->coefficients[k][i] = c[k];
     }
-    out[i - begin] = sum;
+    for (size_t r = 0; truth->fields == NULL && r < truth->rank; ++r) {
+      block->columns[r][i] = truth->columns[(begin + i) * truth->rank + r];
+    }
   }
 }
 
-static void compare_block(const accuracy_work *work, tally *sums, size_t begin, size_t end) {
-  double length[BLOCK];
+/* F of the compression at one direction for the whole block. */
+SUPINE_CLONES static void compressed_block(const turned_block *block, size_t modes,
+                                           const double *weights, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t k = 0; k < modes; ++k) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += weights[k] * (double)block->coefficients[k][i];
+    }
+  }
+}
+
+SUPINE_CLONES static void true_block(const turned_block *block, size_t rank,
+                                     const double *functions, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t r = 0; r < rank; ++r) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += functions[r] * block->columns[r][i];
+    }
+  }
+}
+
+/* out = |s1 is - s0 should| length */
+SUPINE_CLONES static void miss_block(const double *is, const double *should, const double *length,
+                                     double s1, double s0, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = fabs(s1 * is[i] - s0 * should[i]) * length[i];
+  }
+}
+
+static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
+                          const turned_block *block) {
+  const supine_truth *truth = work->truth;
+  const size_t modes = work->compression->mode_count;
   double is[BLOCK];
   double should[BLOCK];
-  for (size_t i = begin; i < end; ++i) {
-    const double *u = work->directions + 3 * i;
-    length[i - begin] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-  }
-  for (size_t d = 0; d < work->truth->direction_count; ++d) {
-    true_block(work, d, begin, end, should);
-    compressed_block(work, d, begin, end, is);
-    for (size_t i = 0; i < end - begin; ++i) {
-      const double field = should[i] * length[i];
-      sums->field2 += field * field;
-      supine_tally_add(&sums->error, fabs(is[i] - should[i]) * length[i]);
+  double miss[BLOCK];
+  for (size_t d = 0; d < truth->direction_count; ++d) {
+    compressed_block(block, modes, work->weights + d * modes, is);
+    if (truth->fields != NULL) {
+      memcpy(should, truth->fields + d * work->compression->vertex_count + begin,
+             block->count * sizeof *should);
+    } else {
+      true_block(block, truth->rank, truth->functions + d * truth->rank, should);
     }
-    for (size_t i = 0; work->scales != NULL && i < end - begin; ++i) {
-      const double *s = work->scales + 2 * d;
-      supine_tally_add(&sums->error_mm, fabs(s[1] * is[i] - s[0] * should[i]) * length[i]);
+    for (size_t i = 0; i < block->count; ++i) {
+      const double field = should[i] * block->length[i];
+      sums->field2 += field * field;
+    }
+    miss_block(is, should, block->length, 1.0, 1.0, miss);
+    supine_tally_add(&sums->error, block->count, miss);
+    if (work->scales != NULL) {
+      miss_block(is, should, block->length, work->scales[2 * d + 1], work->scales[2 * d], miss);
+      supine_tally_add(&sums->error_mm, block->count, miss);
     }
   }
 }
 
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
+  turned_block *block = &work->blocks[thread];
   for (size_t first = begin; first < end; first += BLOCK) {
-    compare_block(work, &work->tallies[thread], first, first + BLOCK < end ? first + BLOCK : end);
+    turn_block(work, first, end - first < BLOCK ? end - first : BLOCK, block);
+    compare_block(work, &work->tallies[thread], first, block);
   }
 }
 
@@ -141,9 +175,10 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   double *weights = malloc(count * compression->mode_count * sizeof *weights);
   double *scales = malloc(2 * count * sizeof *scales);
   tally *tallies = calloc(threads, sizeof *tallies);
+  turned_block *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
   supine_status status = SUPINE_OK;
-  if (weights == NULL || scales == NULL || tallies == NULL) {
+  if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
   }
@@ -164,7 +199,8 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
       made.volume *= 0.5;
     }
   }
-  accuracy_work work = {truth, compression, directions, weights, closed ? scales : NULL, tallies};
+  accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
+                        tallies, blocks};
   supine_parallel_for(n, BLOCK, threads, compare_range, &work);
   tally *all = &tallies[0];
   for (size_t t = 1; t < threads; ++t) {
@@ -185,5 +221,6 @@ cleanup:
   free(weights);
   free(scales);
   free(tallies);
+  free(blocks);
   return status;
 }

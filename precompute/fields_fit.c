@@ -397,15 +397,16 @@ static supine_status cross_validate(const fitting *w, const supine_compression *
         for (size_t k = 0; k < modes; ++k) {
           evaluated += weights[k] * (double)field->coefficients[row * modes + k];
         }
-        const double miss = value - (evaluated - influence * residual);
-        square += miss * miss;
+        const double difference = value - (evaluated - influence * residual);
+        square += difference * difference;
       }
       if (w->options->scalar) { /* and what no magnitude along d can give */
         const double *u = w->fields->displacement + 3 * (d * n + i);
         const double along = w->values[d * n + i];
         square += fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - along * along, 0.0);
       }
-      supine_tally_add(tally, sqrt(square));
+      const double miss = sqrt(square);
+      supine_tally_add(tally, 1, &miss);
     }
   }
   const double samples = (double)m * (double)n;

@@ -7,14 +7,20 @@
 
 enum { BIN_SHIFT = 15 };
 
-void supine_tally_add(supine_tally *tally, double value) {
-  const float single = (float)value;
-  uint32_t bits;
-  memcpy(&bits, &single, sizeof bits);
-  tally->square_sum += value * value;
-  tally->largest = fmax(tally->largest, value);
-  ++tally->count;
-  ++tally->bins[bits >> BIN_SHIFT];
+void supine_tally_add(supine_tally *tally, size_t count, const double *values) {
+  double square_sum = 0.0;
+  double largest = tally->largest;
+  for (size_t i = 0; i < count; ++i) {
+    const float single = (float)values[i];
+    uint32_t bits;
+    memcpy(&bits, &single, sizeof bits);
+    square_sum += values[i] * values[i];
+    largest = values[i] > largest ? values[i] : largest;
+    ++tally->bins[bits >> BIN_SHIFT];
+  }
+  tally->square_sum += square_sum;
+  tally->largest = largest;
+  tally->count += count;
 }
 
 void supine_tally_merge(supine_tally *tally, const supine_tally *other) {

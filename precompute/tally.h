@@ -16,7 +16,7 @@ typedef struct supine_tally {
   uint32_t bins[SUPINE_TALLY_BINS];
 } supine_tally;
 
-void supine_tally_add(supine_tally *tally, double value);
+void supine_tally_add(supine_tally *tally, size_t count, const double *values);
 
 /* Adds one tally to another. */
 void supine_tally_merge(supine_tally *tally, const supine_tally *other);
