@@ -19,9 +19,10 @@
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band has to win by this factor, and there is nothing to win below rounding. */
+/* A higher band has to win by this factor, and there is nothing to win below the rounding of
+ * float coefficients. */
 static const double worthwhile = 0.99;
-static const double exact = 1e-9;
+static const double exact = 1e-6;
 
 /* What a weighted least-squares fit of one band is made of: with A = sqrt(W) Y = U S V^T,
  * C^T = V S^-1 U^T sqrt(W) F. On a product grid with its rule's weights A is orthonormal. */
