@@ -14,18 +14,6 @@
 /* Bins of a float's exponent and first 8 bits of mantissa: 0.4 % wide over its whole range. */
 enum { BIN_SHIFT = 15, BIN_COUNT = 1 << 16, BLOCK = 512, VOLUME_HALVINGS = 10 };
 
-void supine_held_out_directions(size_t count, double *directions) {
-  const double golden = M_PI * (3.0 - sqrt(5.0));
-  for (size_t i = 0; i < count; ++i) {
-    const double z = 1.0 - (2.0 * (double)i + 1.0) / (double)count;
-    const double radius = sqrt(1.0 - z * z);
-    const double longitude = golden * (double)i + 0.3;
-    directions[3 * i] = radius * cos(longitude);
-    directions[3 * i + 1] = radius * sin(longitude);
-    directions[3 * i + 2] = z;
-  }
-}
-
 /* What one thread has seen. */
 typedef struct tally {
   double error2, field2, max;  /* at one breath scale */

@@ -12,6 +12,7 @@ typedef struct supine_basis_content {
   const supine_compression *compression;
   const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
+  const char *route;   /* how the field was found */
   bool harmonics;      /* the modes are the harmonics themselves */
   const char *made_by; /* optional */
 } supine_basis_content;

@@ -34,7 +34,7 @@ SUPINE_CLONES static void mix_range(void *context, size_t begin, size_t end, siz
   const mix_work *work = context;
   const size_t rank = work->projection->rank;
   const size_t count = work->compression->mode_count;
-  double sums[256];
+  double sums[SUPINE_MODES_MADE_MAX];
   for (size_t i = begin; i < end; ++i) {
     const double *row = work->projection->columns + i * rank;
     for (size_t k = 0; k < count; ++k) {
@@ -82,11 +82,11 @@ static double function_at(const supine_projection *projection, size_t r, size_t 
 supine_status supine_compress_harmonics(const supine_projection *projection,
                                         supine_compression *compression, supine_error *error) {
   const size_t terms = supine_sh_count(projection->band);
-  if (terms > 256) {
+  if (terms > SUPINE_MODES_MADE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "band %zu has %zu harmonics, and a basis holds at most 256 functions: "
-                            "use modes",
-                            projection->band, terms);
+                            "band %zu has %zu harmonics, and a basis holds at most %d functions: "
+                            "ask for modes instead, or for band 7 or less",
+                            projection->band, terms, SUPINE_MODES_MADE_MAX);
   }
   supine_compression made;
   if (compression_create(projection, terms, &made) != SUPINE_OK) {
@@ -169,9 +169,9 @@ supine_status supine_compress_modes(const supine_projection *projection, const d
   const size_t rank = projection->rank;
   const size_t terms = supine_sh_count(projection->band);
   supine_status status = SUPINE_OK;
-  if (mode_max < 1 || mode_max > 256) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to 256 are possible",
-                            mode_max);
+  if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to %d are possible",
+                            mode_max, SUPINE_MODES_MADE_MAX);
   }
   gsl_matrix *gram = gsl_matrix_alloc(rank, rank);
   gsl_matrix *root = gsl_matrix_alloc(rank, rank);

@@ -27,7 +27,8 @@ const char supine_model_options_help[] =
     "Direction of displacement:\n"
     "  --direction MODEL    box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
     "  --constants C1,...,C6  of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to\n"
-    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law explains\n"
+    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law "
+    "explains\n"
     "                       61 to 87 % of the squared displacement. (The paper's own are lost.)\n";
 
 supine_model_options supine_model_options_default(void) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The options that choose the lungs and the model: the same for every command that runs the physics. */
+/* The options that choose the lungs and the model: the same for every command that runs the
+ * physics. */
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
@@ -22,14 +23,16 @@ enum {
 };
 
 #define SUPINE_MODEL_OPTIONS                                                                       \
-  {"axes", required_argument, NULL, OPTION_AXES}, {"units", required_argument, NULL, OPTION_UNITS},\
+  {"axes", required_argument, NULL, OPTION_AXES},                                                  \
+      {"units", required_argument, NULL, OPTION_UNITS},                                            \
       {"midline", required_argument, NULL, OPTION_MIDLINE},                                        \
       {"base", required_argument, NULL, OPTION_BASE},                                              \
       {"gain", required_argument, NULL, OPTION_GAIN},                                              \
       {"box-force", required_argument, NULL, OPTION_BOX_FORCE},                                    \
       {"soften", required_argument, NULL, OPTION_SOFTEN},                                          \
-      {"direction", required_argument, NULL, OPTION_DIRECTION},                                    \
-      {"constants", required_argument, NULL, OPTION_CONSTANTS}
+      {"direction", required_argument, NULL, OPTION_DIRECTION}, {                                  \
+    "constants", required_argument, NULL, OPTION_CONSTANTS                                         \
+  }
 
 /* What they add to a command's help. */
 extern const char supine_model_options_help[];

@@ -23,6 +23,9 @@ static const char help[] =
     "                       time: the best K of the band (default 16, fewer where fewer do), or\n"
     "                       the (L+1)^2 harmonics themselves. The paper's form is\n"
     "                       --band 3 --modes harmonics\n"
+    "  --route ROUTE        linear: a few solves for all directions, exact while --soften is 0\n"
+    "                       (default there); sampled: a solve for each direction of a grid\n"
+    "  --held-out N         directions that the error is measured on; default 100 to 1000\n"
     "\n";
 
 static const char examples[] =
@@ -46,8 +49,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
   const supine_accuracy *accuracy = &report->accuracy;
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s\n", path,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
-               options->band, report->mode_count,
-               options->modes == 0 ? "harmonics" : "modes");
+               options->band, report->mode_count, options->modes == 0 ? "harmonics" : "modes");
   (void)printf("error against the full solve, on %zu directions that no grid used:\n"
                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, 100.0 * accuracy->relative_rms,
@@ -59,10 +61,12 @@ static void report_result(const char *path, const supine_lungs *lungs,
 }
 
 int supine_command_precompute(int argc, char **argv) {
-  enum { BAND = OPTION_MODEL_END, MODES };
+  enum { BAND = OPTION_MODEL_END, MODES, ROUTE, HELD_OUT };
   static const struct option options[] = {{"output", required_argument, NULL, 'o'},
                                           {"band", required_argument, NULL, BAND},
                                           {"modes", required_argument, NULL, MODES},
+                                          {"route", required_argument, NULL, ROUTE},
+                                          {"held-out", required_argument, NULL, HELD_OUT},
                                           SUPINE_MODEL_OPTIONS,
                                           {"help", no_argument, NULL, 'h'},
                                           {NULL, 0, NULL, 0}};
@@ -89,9 +93,22 @@ int supine_command_precompute(int argc, char **argv) {
       if (strcmp(optarg, "harmonics") == 0) {
         wanted.modes = 0;
       } else if (!supine_parse_count(optarg, &wanted.modes) || wanted.modes < 1 ||
-                 wanted.modes > 256) {
-        result = supine_command_usage(name, "--modes takes 1 to 256 or 'harmonics', not '%s'",
-                                      optarg);
+                 wanted.modes > SUPINE_MODES_MADE_MAX) {
+        result = supine_command_usage(name, "--modes takes 1 to %d or 'harmonics', not '%s'",
+                                      SUPINE_MODES_MADE_MAX, optarg);
+      }
+      break;
+    case ROUTE:
+      if (strcmp(optarg, "linear") == 0 || strcmp(optarg, "sampled") == 0) {
+        wanted.route = optarg[0] == 'l' ? SUPINE_ROUTE_LINEAR : SUPINE_ROUTE_SAMPLED;
+      } else {
+        result = supine_command_usage(name, "--route takes linear or sampled, not '%s'", optarg);
+      }
+      break;
+    case HELD_OUT:
+      if (!supine_parse_count(optarg, &wanted.held_out) || wanted.held_out < 1 ||
+          wanted.held_out > 100000) {
+        result = supine_command_usage(name, "--held-out takes 1 to 100000, not '%s'", optarg);
       }
       break;
     case 'h':

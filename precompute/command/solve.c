@@ -115,8 +115,8 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   const supine_mesh_save_options save = {.rest = lungs->mesh.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
-    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm", wanted->path,
-                 g[0], g[1], g[2], scale, fabs(scale) * largest);
+    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
+                 wanted->path, g[0], g[1], g[2], scale, fabs(scale) * largest);
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",
                    1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&lungs->mesh)));

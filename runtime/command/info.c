@@ -16,11 +16,13 @@ static const char name[] = "info";
 static const char help[] =
     "Usage: supine info BASIS [--json]\n"
     "\n"
-    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, and\n"
+    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, "
+    "and\n"
     "its error, measured against the full solve on directions that no grid used.\n"
     "\n"
     "Energy per band is the share of the squared displacement, over all orientations, that the\n"
-    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands beyond\n"
+    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands "
+    "beyond\n"
     "l = 0 are what makes prone more than the reverse of supine.\n"
     "\n"
     "  --json               the same for programs\n";
@@ -71,12 +73,12 @@ static bool band_energy(const supine_safetensors *file, const supine_basis_info 
   return true;
 }
 
-static const char *const shown[] = {"force",        "direction",    "direction_constants",
-                                    "stiffness",    "midline_mm",   "rest_volume_ml",
+static const char *const shown[] = {"force",     "direction",  "direction_constants",
+                                    "stiffness", "midline_mm", "rest_volume_ml",
                                     "made_by"};
-static const char *const errors[] = {
-    "error_directions", "error_rms_percent", "error_p95_percent", "error_max_percent",
-    "error_volume_ml",  "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
+                                     "error_max_percent", "error_volume_ml",   "error_rms_mm",
+                                     "error_p95_mm",      "error_max_mm"};
 
 static const char *text_of(const supine_basis *basis, const char *key) {
   const char *value = supine_basis_metadata(basis, key);
@@ -90,11 +92,11 @@ static void print_text(const char *path, const supine_basis *basis, const double
                info->vector ? "vector" : "scalar");
   (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
                info->has_volume ? "closed: volumes are exact" : "open: no volumes");
-  (void)printf("  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
-               info->mode_count,
-               strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
-               info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
-               info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
+  (void)printf(
+      "  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
+      info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
+      info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
+      info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
   for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
     if (supine_basis_metadata(basis, shown[i]) != NULL) {
       (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
@@ -143,13 +145,13 @@ static bool print_json(const char *path, const supine_basis *basis, const double
       (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
     }
   }
-  json_t *root = json_pack(
-      "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
-      text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
-      (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
-      (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
-      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band", bands,
-      "error", error);
+  json_t *root =
+      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
+                text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
+                (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
+                (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
+                (int)info->has_volume, "kind", info->vector ? "vector" : "scalar",
+                "energy_per_band", bands, "error", error);
   bool good = root != NULL;
   for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
     const char *value = supine_basis_metadata(basis, shown[i]);

@@ -44,12 +44,20 @@ double supine_solution_largest(const supine_solution *solution);
 void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
                            double *positions);
 
+/** How the field over orientation is found. */
+typedef enum supine_route {
+  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it */
+  SUPINE_ROUTE_LINEAR,   /**< needs soften = 0 */
+  SUPINE_ROUTE_SAMPLED
+} supine_route;
+
 /** What a basis is made of. */
 typedef struct supine_precompute_options {
   supine_model model;
+  supine_route route;
   size_t band;                        /**< L */
-  size_t modes;                       /**< K; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;                    /**< directions that the error is measured on; 0: 100 */
+  size_t modes;                       /**< most modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;                    /**< directions that the error is measured on; 0: 100 to 1000 */
   const char *made_by;                /**< how it was made, for the file's metadata; optional */
   supine_progress_function *progress; /**< optional */
   void *progress_context;
@@ -57,8 +65,9 @@ typedef struct supine_precompute_options {
 
 /** What came of it. */
 typedef struct supine_precompute_report {
+  supine_route route;
   size_t mode_count;
-  size_t solve_count;
+  size_t solve_count; /**< right-hand sides or directions solved for the projection */
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
