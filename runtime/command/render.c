@@ -29,7 +29,9 @@ static const char help[] =
     "  --view LIST          anterior (default), posterior, left, right, lateral (from the left),\n"
     "                       head, feet, oblique; several come below each other\n"
     "  --colour WHAT        displacement (default: from rest), or difference:POSTURE\n"
-    "  --largest MM         end of the colour bar; default: the largest value shown\n"
+    "  --largest MM         end of the colour bar; default: what 95 % of the surface does not "
+    "exceed,\n"
+    "                       rounded up; a pointed end says that some values lie beyond\n"
     "  --theme light|dark   default light\n"
     "  --title TEXT         a heading\n"
     "\n";
@@ -93,12 +95,13 @@ static int find_state(const supine_basis *basis, const supine_compare *compare,
 
 /* What the colours show, and the words below the posture's name. */
 static void find_value(const supine_basis *basis, const supine_compare *compare,
-                       const state *reference, state *shown, double *largest) {
+                       const state *reference, state *shown, double *p95, double *largest) {
   supine_distance_statistics statistics;
   supine_compare_distances(compare, shown->weights, shown->scales,
                            reference != NULL ? reference->weights : NULL,
                            reference != NULL ? reference->scales : NULL, shown->value);
   supine_compare_statistics(compare, shown->value, &statistics);
+  *p95 = fmax(*p95, statistics.p95);
   *largest = fmax(*largest, statistics.max);
   size_t used = 0;
   if (supine_basis_get_info(basis)->has_volume) {
@@ -143,6 +146,7 @@ static int render(const supine_basis *basis, const request *wanted,
   supine_renderer *renderer = NULL;
   supine_panel panel[SUPINE_PANELS_MAX];
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  double p95 = 0.0;
   double largest = 0.0;
   char label[128];
   int result = SUPINE_EXIT_OK;
@@ -165,7 +169,8 @@ static int render(const supine_basis *basis, const request *wanted,
     goto cleanup;
   }
   for (size_t i = 0; i < count; ++i) {
-    find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &largest);
+    find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &p95,
+               &largest);
     panel[i] = (supine_panel){.title = postures->item[i].name,
                               .subtitle = states[i].subtitle,
                               .weights = states[i].weights,
@@ -182,8 +187,10 @@ static int render(const supine_basis *basis, const request *wanted,
                             .view_count = wanted->view_count,
                             .heading = wanted->title,
                             .bar_label = label,
-                            .largest = wanted->largest > 0.0 ? wanted->largest : largest,
+                            .largest =
+                                wanted->largest > 0.0 ? wanted->largest : supine_bar_end(p95),
                             .dark = wanted->dark};
+  picture.beyond = largest > picture.largest;
   choose_size(wanted, &picture);
   result = write_picture(wanted, renderer, &picture);
 cleanup:

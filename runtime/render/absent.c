@@ -19,6 +19,13 @@ void supine_renderer_destroy(supine_renderer *renderer) {
   (void)renderer;
 }
 
+void supine_renderer_extent(supine_renderer *renderer, const supine_scene *scene,
+                            double extent[4]) {
+  (void)renderer;
+  (void)scene;
+  (void)extent;
+}
+
 supine_status supine_renderer_draw(supine_renderer *renderer, const supine_scene *scene,
                                    uint32_t *pixels, supine_error *error) {
   (void)renderer;

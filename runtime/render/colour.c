@@ -22,23 +22,14 @@ static double encode(double x) {
   return clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * pow(clipped, 1 / 2.4) - 0.055;
 }
 
-/* Lightness rises and hue turns at constant rates; the chroma is one that sRGB holds all the way.
- */
+/* Lightness rises and hue turns at constant rates, within what sRGB holds. */
 void supine_colour(double t, double rgb[3]) {
   const double at = fmin(1, fmax(0, t));
-  const double lightness = 0.34 + 0.57 * at;
-  const double hue = (292 - 190 * at) * degree;
-  double chroma = 0.16;
+  const double lightness = 0.36 + 0.56 * at;
+  const double hue = (300 - 200 * at) * degree;
+  const double chroma = 0.1 + 0.05 * (2 * at - 0.85) * (2 * at - 0.85);
   double linear[3];
-  for (;;) {
-    linear_rgb(lightness, chroma * cos(hue), chroma * sin(hue), linear);
-    const double low = fmin(linear[0], fmin(linear[1], linear[2]));
-    const double high = fmax(linear[0], fmax(linear[1], linear[2]));
-    if (chroma < 0.01 || (low >= 0 && high <= 1)) {
-      break;
-    }
-    chroma -= 0.0005;
-  }
+  linear_rgb(lightness, chroma * cos(hue), chroma * sin(hue), linear);
   for (int i = 0; i < 3; ++i) {
     rgb[i] = encode(linear[i]);
   }

@@ -11,7 +11,8 @@
 enum { OVERSAMPLE = 2, SAMPLES = 4 };
 
 static const double distance_in_radii = 5.0; /* of the viewer */
-static const double margin = 1.12;           /* room for displacement around the resting lungs */
+static const double depth_in_radii = 3.0;    /* drawn, in front of the centre and behind */
+static const double margin = 1.03;
 
 /* The lungs that a scene shows. */
 static void shown_lungs(const supine_renderer *r, const supine_scene *scene, size_t *begin,
@@ -86,57 +87,77 @@ static void uniform(const supine_renderer *r, const char *name, size_t count,
   }
 }
 
-/* Camera: in perspective, the resting lungs in the middle and filling the picture, so that every
- * state of the same lungs is drawn to the same scale. */
-static void load_camera(const supine_renderer *r, const supine_scene *scene) {
+/* A viewer in front of the middle of the resting lungs, whatever their state. */
+typedef struct camera {
   double axes[3][3];
+  double centre[3];
+  double radius, away; /* mm: of the lungs, and how far the viewer is */
+} camera;
+
+static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
+  camera c = {.radius = 1e-3};
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   size_t first;
   size_t last;
-  supine_view_axes(scene->view, axes);
+  supine_view_axes(scene->view, c.axes);
   shown_lungs(r, scene, &first, &last);
-  const size_t begin = r->basis->lung_begin[first];
-  const size_t end = r->basis->lung_begin[last];
-  for (size_t i = 3 * begin; i < 3 * end; ++i) {
+  for (size_t i = 3 * r->basis->lung_begin[first]; i < 3 * r->basis->lung_begin[last]; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)r->basis->vertices[i]);
     high[i % 3] = fmax(high[i % 3], (double)r->basis->vertices[i]);
   }
-  double centre[3];
-  double radius = 1e-3;
   for (int axis = 0; axis < 3; ++axis) {
-    centre[axis] = (low[axis] + high[axis]) / 2;
-    radius = hypot(radius, (high[axis] - low[axis]) / 2);
+    c.centre[axis] = (low[axis] + high[axis]) / 2;
+    c.radius = hypot(c.radius, (high[axis] - low[axis]) / 2);
   }
-  const double away = distance_in_radii * radius;
-  double box[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-  for (size_t i = begin; i < end; ++i) {
+  c.away = distance_in_radii * c.radius;
+  return c;
+}
+
+void supine_renderer_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
+  const camera c = find_camera(r, scene);
+  const double closest = c.away - 0.98 * depth_in_radii * c.radius;
+  size_t first;
+  size_t last;
+  shown_lungs(r, scene, &first, &last);
+  supine_deform(r->basis, scene->weights, scene->scales, r->scratch);
+  for (size_t i = r->basis->lung_begin[first]; i < r->basis->lung_begin[last]; ++i) {
     double p[3] = {0, 0, 0};
-    for (int row = 0; row < 3; ++row) {
-      for (int axis = 0; axis < 3; ++axis) {
-        p[row] +=
-            axes[row][axis] * ((double)r->basis->vertices[3 * i + (size_t)axis] - centre[axis]);
+    for (size_t row = 0; row < 3; ++row) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        p[row] += c.axes[row][axis] * ((double)r->scratch[3 * i + axis] - c.centre[axis]);
       }
     }
     for (int side = 0; side < 2; ++side) {
-      const double at = p[side] * away / (away - p[2]);
-      box[side][0] = fmin(box[side][0], at);
-      box[side][1] = fmax(box[side][1], at);
+      const double at = p[side] * c.away / fmax(closest, c.away - p[2]);
+      extent[2 * side] = fmin(extent[2 * side], at);
+      extent[2 * side + 1] = fmax(extent[2 * side + 1], at);
     }
   }
-  const double half[2] = {fmax(1e-3, margin * (box[0][1] - box[0][0]) / 2),
-                          fmax(1e-3, margin * (box[1][1] - box[1][0]) / 2)};
+}
+
+/* The extent in the middle, filling the picture. */
+static void load_camera(supine_renderer *r, const supine_scene *scene) {
+  const camera c = find_camera(r, scene);
+  const double depth[2] = {c.away, depth_in_radii * c.radius};
+  double extent[4] = SUPINE_EXTENT_NONE;
+  if (scene->extent != NULL) {
+    memcpy(extent, scene->extent, sizeof extent);
+  } else {
+    supine_renderer_extent(r, scene, extent);
+  }
   const double aspect = (double)scene->width / (double)scene->height;
-  const double tall = fmax(half[1], half[0] / aspect);
-  const double frame[4] = {(box[0][0] + box[0][1]) / 2, (box[1][0] + box[1][1]) / 2,
+  const double wide = fmax(1e-3, margin * (extent[1] - extent[0]) / 2);
+  const double high = fmax(1e-3, margin * (extent[3] - extent[2]) / 2);
+  const double tall = fmax(high, wide / aspect);
+  const double frame[4] = {(extent[0] + extent[1]) / 2, (extent[2] + extent[3]) / 2,
                            1 / (tall * aspect), 1 / tall};
-  const double depth[2] = {away, 3 * radius};
   float columns[9];
   for (int i = 0; i < 9; ++i) {
-    columns[i] = (float)axes[i % 3][i / 3];
+    columns[i] = (float)c.axes[i % 3][i / 3];
   }
   glUniformMatrix3fv(glGetUniformLocation(r->program, "view"), 1, GL_FALSE, columns);
-  uniform(r, "centre", 3, centre);
+  uniform(r, "centre", 3, c.centre);
   uniform(r, "frame", 4, frame);
   uniform(r, "depth", 2, depth);
 }
@@ -257,8 +278,8 @@ supine_status supine_renderer_draw(supine_renderer *r, const supine_scene *scene
   glUseProgram(r->program);
   glBindVertexArray(r->array);
   glBindTexture(GL_TEXTURE_2D, r->colours);
-  load_state(r, scene);
   load_camera(r, scene);
+  load_state(r, scene);
   uniform(r, "largest", 1, &scene->largest);
   uniform(r, "line_step", 1, &scene->line_step);
   uniform(r, "dark", 1, &dark);

@@ -101,6 +101,7 @@ static void ground(cairo_t *cr, const supine_picture *picture, const theme *look
 /* An arrow from the centre of the ball; towards or away from the viewer: a dot or a cross. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
+  cairo_new_path(cr);
   colour(cr, accent);
   cairo_set_line_width(cr, radius * 0.13);
   if (flat < 0.35) {
@@ -173,7 +174,8 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
 
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
-                           double x, double y, double width, double height, supine_error *error) {
+                           double x, double y, double width, double height, const double *extent,
+                           supine_error *error) {
   const supine_scene scene = {.weights = panel->weights,
                               .scales = panel->scales,
                               .value = panel->value,
@@ -182,7 +184,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .view = view,
                               .dark = picture->dark,
                               .width = (size_t)width,
-                              .height = (size_t)height};
+                              .height = (size_t)height,
+                              .extent = extent};
   supine_status status = SUPINE_ERROR_MEMORY;
   cairo_surface_t *image =
       cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene.width, (int)scene.height);
@@ -206,7 +209,7 @@ cleanup:
 
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
-                          supine_error *error) {
+                          const double extent[4], supine_error *error) {
   const theme *look = &themes[picture->dark ? 1 : 0];
   const supine_panel *panel = &picture->panel[column];
   const supine_view view = picture->view[row];
@@ -215,7 +218,7 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   const double y = at->top + (double)row * (at->cell_height + gap);
   const double radius = at->strip * 0.4;
   const double words = x + 2 * radius + at->font * 1.5;
-  const double room = x + at->cell_width - words - at->font * 0.5;
+  const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
   colour(cr, look->card);
   cairo_fill_preserve(cr);
@@ -233,19 +236,8 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
               supine_view_name(view));
   return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->strip,
-               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, error);
-}
-
-/* A round number of which 4 to 8 make up the largest value. */
-static bar_scale make_bar(double largest) {
-  bar_scale bar = {1, 0.2};
-  if (largest > 0) {
-    const double power = pow(10, floor(log10(largest / 4)));
-    const double steps = largest / 4 / power;
-    bar.step = power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
-    bar.largest = largest;
-  }
-  return bar;
+               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, extent,
+               error);
 }
 
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
@@ -262,7 +254,12 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
     supine_colour(i / (double)STOPS, rgb);
     cairo_pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
   }
-  rounded(cr, x, y, width, height, height / 2);
+  cairo_rectangle(cr, x, y, width, height);
+  if (picture->beyond) {
+    cairo_move_to(cr, x + width, y);
+    cairo_line_to(cr, x + width + 0.9 * height, y + height / 2);
+    cairo_line_to(cr, x + width, y + height);
+  }
   cairo_set_source(cr, fade);
   cairo_fill(cr);
   cairo_pattern_destroy(fade);
@@ -305,7 +302,7 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                              supine_error *error) {
   const theme *look = &themes[picture->dark ? 1 : 0];
   const layout at = make_layout(picture);
-  const bar_scale bar = make_bar(picture->largest);
+  const bar_scale bar = {picture->largest, supine_bar_step(picture->largest)};
   supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(
@@ -319,8 +316,15 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                 (double)picture->width - 2.4 * at.margin, picture->heading);
   }
   for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
+    double extent[4] = SUPINE_EXTENT_NONE;
+    for (size_t column = 0; column < picture->panel_count; ++column) {
+      const supine_scene scene = {.weights = picture->panel[column].weights,
+                                  .scales = picture->panel[column].scales,
+                                  .view = picture->view[row]};
+      supine_renderer_extent(renderer, &scene, extent);
+    }
     for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
-      status = cell(cr, renderer, picture, &at, &bar, column, row, error);
+      status = cell(cr, renderer, picture, &at, &bar, column, row, extent, error);
     }
   }
   colour_bar(cr, picture, &at, &bar);

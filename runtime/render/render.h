@@ -6,6 +6,7 @@
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -60,7 +61,16 @@ typedef struct supine_scene {
   size_t lung;
   bool dark;            /**< lit for a dark page */
   size_t width, height; /**< pixels */
+  const double *extent; /**< [4] of supine_renderer_extent, or NULL: this scene's own */
 } supine_scene;
+
+/** Extent to begin supine_renderer_extent with. */
+#define SUPINE_EXTENT_NONE                                                                         \
+  { INFINITY, -INFINITY, INFINITY, -INFINITY }
+
+/** Widens an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
+ * so that several states can be drawn to one scale. The scenes must share view and lungs. */
+void supine_renderer_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
 /** Draws on a transparent ground.
  * @param pixels  [height, width] premultiplied ARGB as cairo has it, top row first; written
@@ -95,9 +105,15 @@ typedef struct supine_picture {
   const char *heading; /**< or NULL */
   const char *bar_label;
   double largest; /**< mm at the end of the colours */
+  bool beyond;    /**< some values are larger: the bar ends in a point */
   bool dark;
   size_t width, height; /**< pixels */
 } supine_picture;
+
+/** A round number of which 4 to 10 make up `value`: the ticks of a bar of colours. */
+double supine_bar_step(double value);
+/** The end of a bar whose values reach `value` in the main: rounded up to a tick. */
+double supine_bar_end(double value);
 
 /** Composes a picture and writes it as PNG.
  * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels

@@ -68,10 +68,10 @@ static const char fragment_main[] =
     "    float steps = v_value / line_step;\n"
     "    float away = abs(fract(steps - 0.5) - 0.5) / max(fwidth(steps), 1e-6);\n"
     "    float line = (1.0 - smoothstep(0.5, 1.7, away)) * step(0.5, steps);\n"
-    "    lit = mix(lit, lit * 0.45, 0.55 * line);\n"
+    "    lit = mix(lit, lit * 0.45, 0.4 * line);\n"
     "  }\n"
     "  float shine = pow(lambert(n, normalize(key) + eye), 48.0);\n"
-    "  lit += vec3(0.10 * shine);\n"
+    "  lit += vec3(0.08 * shine);\n"
     "  lit += dark * vec3(0.10, 0.14, 0.20) * pow(1.0 - facing, 3.0);\n"
     "  colour = vec4(pow(clamp(lit, 0.0, 1.0), vec3(1.0 / 2.2)), 1.0);\n"
     "}\n";
