@@ -115,7 +115,7 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
   return supine_compare_rms(c->compare, weights[0], scales[0], weights[1], scales[1]);
 }
 
-enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 60, MAP_TOP = 8 };
+enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
 /* The map's place of a direction: across, rolling from right over supine and left to prone; down,
  * tilting from head down to feet down. */

@@ -31,7 +31,7 @@ static const char style[] =
     ".matrix td.self{color:var(--faint)}\n"
     ".row{display:flex;flex-wrap:wrap;gap:18px}.row>*{flex:1 1 330px}\n"
     "figure{margin:0}svg{width:100%;height:auto;display:block}\n"
-    "svg text{fill:var(--text);font:12px system-ui,sans-serif}svg .faint{fill:var(--faint)}\n"
+    "svg text{fill:var(--text);font:12px system-ui,sans-serif}svg .faint{fill:var(--faint);font-size:12px}\n"
     "svg .grid{stroke:var(--grid)}\n"
     ".pictures{display:grid;gap:6px 14px;align-items:center}\n"
     ".pictures img{width:100%;height:auto;display:block}.pictures b{font-weight:600}\n"
