@@ -11,7 +11,7 @@
 /* Conjugate gradients in the form of Chronopoulos and Gear (1989): two passes over the vectors a
  * step instead of three, for the same iterates. */
 
-enum { ROWS_GRAIN = 4096, THREADS_MAX = 64, STEPS_MAX = 200 };
+enum { ROWS_GRAIN = 4096, THREADS_MAX = 64, STEPS_MAX = 200, STEPS_MAX_WITH_REACH = 20000 };
 
 static const double default_tolerance = 1e-14;
 
@@ -84,12 +84,12 @@ static void matrix_rows(void *context, size_t begin, size_t end, size_t thread) 
   const supine_network *net = eq->network;
   for (size_t i = begin; i < end; ++i) {
     const double own = eq->inner[i];
-    double diagonal = 1.0; /* Z_i / S_i - sum of k_ij */
+    double diagonal = net->own == NULL ? 1.0 : net->own[i]; /* Z_i / S_i - sum of k_ij */
     for (size_t s = net->row_begin[i]; s < net->row_begin[i + 1]; ++s) {
       const double other = eq->inner[net->neighbour[s]];
       const double d = net->distance[s];
       const double spring = 0.5 * (own + other);
-      const double k = spring / (d * (d * spring + 1.0 / own + 1.0 / other));
+      const double k = spring / (d * (net->spring_own * d * spring + 1.0 / own + 1.0 / other));
       eq->weight[s] = k;
       diagonal += own * spring / d - k;
     }
@@ -115,6 +115,9 @@ supine_status supine_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
       supine_stiffness_normalise(net->vertex_count, stiffness, equilibrium->stiffness, error);
   if (status != SUPINE_OK) {
     return status;
+  }
+  for (size_t i = 0; i < net->vertex_count && net->lesions != NULL; ++i) {
+    equilibrium->stiffness[i] *= net->lesions[i];
   }
   for (size_t i = 0; i < net->vertex_count; ++i) {
     equilibrium->inner[i] = equilibrium->stiffness[net->order[i]];
@@ -232,14 +235,15 @@ SUPINE_CLONES static void step_range(void *context, size_t begin, size_t end, si
   }
 }
 
-/* Right-hand side b = scale f / S in internal order, and a clean start. */
+/* Right-hand side b = scale own f / S in internal order, and a clean start. */
 static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const pass *work = context;
   supine_equilibrium *eq = work->eq;
   const size_t count = eq->count;
   for (size_t i = begin; i < end; ++i) {
-    const double factor = eq->scale[i] * eq->inner[i];
+    const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
+    const double factor = eq->scale[i] * eq->inner[i] * own;
     const double *force = work->force + (size_t)eq->network->order[i] * count;
     for (size_t r = 0; r < count; ++r) {
       const size_t at = i * count + r;
@@ -321,6 +325,7 @@ supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t c
   }
   const double wanted = tolerance > 0.0 ? tolerance : default_tolerance;
   const bool start = warm && eq->count == count;
+  const size_t steps_max = eq->network->reach > 0.0 ? STEPS_MAX_WITH_REACH : STEPS_MAX;
   double norm[SUPINE_RHS_MAX];
   double last_rr[SUPINE_RHS_MAX] = {0.0};
   bool done[SUPINE_RHS_MAX] = {false};
@@ -339,7 +344,7 @@ supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t c
   } else {
     memset(eq->solution, 0, eq->network->vertex_count * count * sizeof(double));
   }
-  for (made.iterations = 0; made.iterations <= STEPS_MAX; ++made.iterations) {
+  for (made.iterations = 0; made.iterations <= steps_max; ++made.iterations) {
     run(work, image_range);
     made.residual = 0.0;
     bool all = true;
@@ -359,7 +364,7 @@ supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t c
       work->alpha[r] = rr / (first ? rw : rw - work->beta[r] * rr / work->alpha[r]);
       last_rr[r] = rr;
     }
-    if (all || made.iterations == STEPS_MAX || !isfinite(made.residual)) {
+    if (all || made.iterations == steps_max || !isfinite(made.residual)) {
       break;
     }
     run(work, step_range);
@@ -390,11 +395,12 @@ void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
     }
     const double d = net->distance[s];
     const double spring = 0.5 * (eq->inner[i] + eq->inner[j]);
-    const double z = spring + (1.0 / eq->inner[i] + 1.0 / eq->inner[j]) / d;
+    const double own = net->spring_own * spring; /* S_e / D(e, e) */
+    const double z = own + (1.0 / eq->inner[i] + 1.0 / eq->inner[j]) / d;
     for (size_t r = 0; r < eq->count; ++r) { /* F_e = S_e x_e / Z_e, x_e = S_e (y_i + y_j) / D */
       const double y = eq->scale[i] * eq->solution[i * eq->count + r] +
                        eq->scale[j] * eq->solution[j * eq->count + r];
-      catch_[e * eq->count + r] = spring / z * spring / d * y;
+      catch_[e * eq->count + r] = own / z * spring / d * y;
     }
   }
 }

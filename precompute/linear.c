@@ -11,7 +11,7 @@
 
 /* The functions of gravity have kinks where another vertex becomes the lowest or highest. Rules
  * much finer than the band keep the kinks from aliasing into it, and cost no solve. */
-enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 64 };
+enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {
   free(projection->columns);
@@ -88,7 +88,7 @@ supine_status supine_project_linear(const supine_lungs *lungs, const supine_forc
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu is above %d", band,
                             SUPINE_SH_BAND_MAX);
   }
-  supine_status status = supine_network_create(&lungs->mesh, &lungs->topology, &network);
+  supine_status status = supine_lungs_network(lungs, &network);
   if (status == SUPINE_OK) {
     status = supine_equilibrium_create(network, rank, 0, &equilibrium);
   }

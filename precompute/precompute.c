@@ -6,11 +6,17 @@
 #include <supine/precompute.h>
 
 #include "basis_file.h"
+#include "compression.h"
 #include "held_out.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
-enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_SAMPLED_MAX = 300, HELD_OUT_WORK = 20000000 };
+enum {
+  HELD_OUT_MIN = 100,
+  HELD_OUT_MAX = 1000,
+  HELD_OUT_SAMPLED_MAX = 300,
+  HELD_OUT_WORK = 20000000
+};
 
 static const double reference_volume = 500.0; /* mL, that errors in mm are stated at */
 
@@ -116,18 +122,7 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
     }
     return status;
   }
-  const size_t values = field->vertex_count * field->mode_count;
-  double *columns = malloc(values * sizeof *columns);
-  if (columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for volume forms");
-  }
-  for (size_t i = 0; i < values; ++i) {
-    columns[i] = (double)field->coefficients[i];
-  }
-  const supine_status status = supine_volume_forms_create(p->lungs, p->directions, columns,
-                                                          field->mode_count, &p->forms, error);
-  free(columns);
-  return status;
+  return supine_compression_volume_forms(field, p->lungs, p->directions, &p->forms, error);
 }
 
 static size_t held_out_default(const pipeline *p) {

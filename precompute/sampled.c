@@ -63,7 +63,7 @@ supine_status supine_sampler_create(const supine_lungs *lungs, const supine_forc
   made->force = calloc(made->threads, sizeof(double *));
   made->softened = calloc(made->threads, sizeof(double *));
   bool whole = made->equilibria != NULL && made->force != NULL && made->softened != NULL &&
-               supine_network_create(&lungs->mesh, &lungs->topology, &made->network) == SUPINE_OK;
+               supine_lungs_network(lungs, &made->network) == SUPINE_OK;
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < made->threads && whole; ++t) {
     made->force[t] = malloc(n * sizeof(double));
@@ -182,9 +182,12 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  const char *over = getenv("OVER");
-  const size_t lat = (size_t)ceil((over ? atof(over) : 1.5) * (double)(band + 1));
-  status = supine_sh_grid_create(lat, 2 * lat, &grid);
+  size_t latitudes = 0;
+  size_t longitudes = 0;
+  status = supine_sh_grid_size(band, 0.0, &latitudes, &longitudes);
+  if (status == SUPINE_OK) {
+    status = supine_sh_grid_create(latitudes, longitudes, &grid);
+  }
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no grid for band %zu: %s", band,
                            supine_status_string(status));

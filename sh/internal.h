@@ -18,15 +18,8 @@
 
 #include <fftw3.h>
 
+#include <supine/clones.h>
 #include <supine/transform.h>
-
-/* Versions of a function for wider vector units, chosen when the program is loaded. */
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
-    !defined(SUPINE_NO_CLONES)
-#define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
-#else
-#define SUPINE_CLONES
-#endif
 
 enum {
   SUPINE_SH_LANES = 16,     /* fields that a kernel works on together; `width` is a multiple */

@@ -73,7 +73,7 @@ static supine_basis *open_basis(void) {
 /* Coefficients in the file against a direct factorisation over all nodes, one right-hand side a
  * harmonic, with the same quadrature of the force. */
 static void check_coefficients(const char *const *names, supine_axes axes) {
-  enum { BAND = 3, TERMS = 16, LATITUDES = 64 };
+  enum { BAND = 3, TERMS = 16, LATITUDES = 32 };
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, axes, &lungs)) {
     skip();

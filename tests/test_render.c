@@ -114,6 +114,9 @@ typedef struct made {
 enum { WIDTH = 120, HEIGHT = 100, PIXELS = WIDTH * HEIGHT };
 
 static void unmake(made *m) {
+  if (m->f == NULL) {
+    return;
+  }
   supine_renderer_destroy(m->renderer);
   supine_basis_close(m->basis);
   free(m->bytes);
@@ -137,6 +140,7 @@ static made make(fixture *f) {
   if (status == SUPINE_ERROR_UNSUPPORTED) {
     print_message("skipped: %s\n", error.message);
     unmake(&m);
+    m = (made){0};
     skip();
   }
   assert_int_equal(status, SUPINE_OK);

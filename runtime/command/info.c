@@ -73,9 +73,9 @@ static bool band_energy(const supine_safetensors *file, const supine_basis_info 
   return true;
 }
 
-static const char *const shown[] = {"force",     "direction",  "direction_constants",
-                                    "stiffness", "midline_mm", "rest_volume_ml",
-                                    "made_by"};
+static const char *const shown[] = {
+    "route",     "force",      "direction",      "direction_constants",
+    "stiffness", "midline_mm", "rest_volume_ml", "made_by"};
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rms_mm",
                                      "error_p95_mm",      "error_max_mm"};
@@ -103,15 +103,21 @@ static void print_text(const char *path, const supine_basis *basis, const double
     }
   }
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
-    (void)printf("\nError against the full solve, on %s directions that no grid used:\n"
+    (void)printf("\nError against the full fields, on %s directions%s:\n"
                  "             RMS   95th percentile   largest\n"
                  "  %%   %10s   %15s   %7s   of the RMS displacement\n",
-                 text_of(basis, "error_directions"), text_of(basis, "error_rms_percent"),
-                 text_of(basis, "error_p95_percent"), text_of(basis, "error_max_percent"));
-    if (supine_basis_metadata(basis, "error_volume_ml") != NULL) {
-      (void)printf("  mm  %10s   %15s   %7s   at %s mL\n", text_of(basis, "error_rms_mm"),
+                 text_of(basis, "error_directions"),
+                 supine_basis_metadata(basis, "error_method") != NULL
+                     ? ", each predicted from the others"
+                     : " that no grid used",
+                 text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
+                 text_of(basis, "error_max_percent"));
+    if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
+      const char *volume = supine_basis_metadata(basis, "error_volume_ml");
+      (void)printf("  mm  %10s   %15s   %7s   %s%s\n", text_of(basis, "error_rms_mm"),
                    text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"),
-                   text_of(basis, "error_volume_ml"));
+                   volume != NULL ? "mL: " : "of the fields as given",
+                   volume != NULL ? volume : "");
     }
   }
   (void)puts("\nEnergy per band:");

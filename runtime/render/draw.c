@@ -21,27 +21,6 @@ static void shown_lungs(const supine_renderer *r, const supine_scene *scene, siz
   *end = scene->one_lung ? scene->lung + 1 : r->basis->info.lung_count;
 }
 
-/* Area-weighted normals of the deformed surface into normals [N, 3]. */
-static void find_normals(const supine_basis *basis, const float *xyz, float *normals) {
-  memset(normals, 0, 3 * basis->info.vertex_count * sizeof *normals);
-  for (size_t t = 0; t < basis->info.triangle_count; ++t) {
-    const uint32_t *corner = basis->triangles + 3 * t;
-    const float *a = xyz + 3 * (size_t)corner[0];
-    float u[3];
-    float v[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      u[axis] = xyz[3 * (size_t)corner[1] + (size_t)axis] - a[axis];
-      v[axis] = xyz[3 * (size_t)corner[2] + (size_t)axis] - a[axis];
-    }
-    for (int j = 0; j < 3; ++j) {
-      float *n = normals + 3 * (size_t)corner[j];
-      n[0] += u[1] * v[2] - u[2] * v[1];
-      n[1] += u[2] * v[0] - u[0] * v[2];
-      n[2] += u[0] * v[1] - u[1] * v[0];
-    }
-  }
-}
-
 /* What changes with the state: normals, values and, where the GPU cannot displace, displacements.
  */
 static void load_state(supine_renderer *r, const supine_scene *scene) {
@@ -49,7 +28,7 @@ static void load_state(supine_renderer *r, const supine_scene *scene) {
   float *xyz = r->scratch;
   float *normals = r->scratch + 3 * n;
   supine_deform(r->basis, scene->weights, scene->scales, xyz);
-  find_normals(r->basis, xyz, normals);
+  supine_normals(r->basis, xyz, normals);
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[2]);
   glBufferSubData(GL_ARRAY_BUFFER, 0, (GLsizeiptr)(3 * n * sizeof *normals), normals);
   glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(3 * n * sizeof *normals),
