@@ -17,6 +17,8 @@ static const struct {
     {"precompute", supine_command_precompute, "turn lung surfaces into a basis file (offline)"},
     {"info", supine_command_info, "say what a basis file holds and how exact it is"},
     {"deform", supine_command_deform, "deform a basis for a posture and a volume"},
+    {"compare", supine_command_compare, "how far postures differ, and who ventilates where"},
+    {"render", supine_command_render, "draw the lungs: postures side by side, as PNG"},
     {"solve", supine_command_solve, "full physics for one posture: the reference"},
     {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
 };
