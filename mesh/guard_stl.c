@@ -22,7 +22,7 @@ static bool is_text(const mesh_file *file) {
   return memchr(file->bytes, '\0', head) == NULL;
 }
 
-static supine_status check_text(const mesh_file *file, supine_error *error) {
+static supine_status check_text(mesh_file *file, supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   mesh_text word;
@@ -46,6 +46,7 @@ static supine_status check_text(const mesh_file *file, supine_error *error) {
                             "%s: the STL text ends before its endsolid: the file is truncated",
                             file->path);
   }
+  file->faces = corners / 3;
   return SUPINE_OK;
 }
 
