@@ -8,7 +8,7 @@
 supine_status export_breath_set(const export_source *source, double volume, double largest,
                                 export_breath *breath, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
-  *breath = (export_breath){.volume = volume};
+  *breath = (export_breath){.volume = volume, .largest = largest};
   if (source->info->has_volume) {
     return SUPINE_OK;
   }

@@ -35,8 +35,9 @@ void export_field(const export_source *source, size_t vertex, size_t mode, doubl
 
 /** How deep a breath is. */
 typedef struct export_breath {
-  double volume; /**< mL above rest: where the surface is closed */
-  double scale;  /**< breath scale: where it is open */
+  double volume;  /**< mL above rest: where the surface is closed */
+  double largest; /**< mm, the largest displacement when supine: where it is open */
+  double scale;   /**< the breath scale that gives it */
 } export_breath;
 
 /** A breath of `volume` mL; on an open surface one whose largest displacement, supine, is

@@ -80,12 +80,13 @@ static json_t *describe(const page *p) {
     }
   }
   json_t *title = json_string(p->title);
-  return json_pack("{s:I, s:I, s:I, s:I, s:o, s:b, s:f, s:f, s:o, s:o}", "vertices",
+  return json_pack("{s:I, s:I, s:I, s:I, s:o, s:b, s:f, s:f, s:f, s:o, s:o}", "vertices",
                    (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
                    "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band,
                    "lungBegin", lungs, "hasVolume", (int)info->has_volume, "breathVolume",
-                   p->breath->volume, "breathScale", p->breath->scale, "metadata", metadata,
-                   "title", title != NULL ? title : json_string("lungs"));
+                   p->breath->volume, "breathLargest", p->breath->largest, "breathScale",
+                   p->breath->scale, "metadata", metadata, "title",
+                   title != NULL ? title : json_string("lungs"));
 }
 
 static void write_basis(const page *p) {

@@ -149,7 +149,7 @@ function momentFor(basis, gravity, depth) {
     scale = scaleForVolume(all, depth);
     gains = cubics.map((c) => cubicAt(c, scale));
   } else {
-    scale = (depth / basis.openDepth) * basis.breathScale;
+    scale = (depth / basis.breathLargest) * basis.breathScale;
   }
   return { gravity, scale, gains, weights: w.map((x) => x * scale) };
 }

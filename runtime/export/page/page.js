@@ -27,7 +27,6 @@ const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 25
 
 function start() {
   const basis = readBasis();
-  basis.openDepth = 10;
   const state = new State(basis);
   const canvas = $('picture');
   const picture = new Picture(canvas, basis);
@@ -43,6 +42,16 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
+  /** How far the lungs reach from their centre along gravity, mm. */
+  function lowest(gravity) {
+    let reach = 0;
+    const stride = 3 * Math.ceil(basis.vertices / 4000);
+    for (let i = 0; i < basis.rest.length; i += stride) {
+      reach = Math.max(reach, dot(gravity, [basis.rest[i] - centre[0], basis.rest[i + 1] - centre[1], basis.rest[i + 2] - centre[2]]));
+    }
+    return reach;
+  }
+
   function makeView() {
     const aspect = canvas.width / canvas.height;
     const fit = radius * 1.2 * Math.max(1, 0.86 / aspect);
@@ -50,9 +59,9 @@ function start() {
     const q = compose(cameraTurn(), modelTurn());
     const away = rotate(q, centre);
     const gravity = state.gravity;
-    const tail = rotate(q, gravity).map((x) => x * radius * 1.02);
+    const tail = rotate(q, gravity).map((x) => x * (lowest(gravity) + 0.08 * radius));
     const arrow = rigid(compose(q, arrowTurn(gravity)), [tail[0], tail[1], tail[2] - distance]);
-    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.3;
+    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.28;
     return {
       toEye: rigid(q, [-away[0], -away[1], -away[2] - distance]),
       projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - 2.5 * radius, distance * 0.02), distance + 2.5 * radius),

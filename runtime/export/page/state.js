@@ -37,7 +37,7 @@ class State {
     this.q = POSTURES[0].q;                        // as shown, on its way there
     this.turning = null;
     this.unit = basis.hasVolume ? 'mL' : 'mm';
-    this.tidal = basis.hasVolume ? basis.breathVolume : 10;
+    this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
     this.depth = this.tidal;
     this.depthMax = 2 * this.tidal;
     this.rate = 12;
