@@ -7,8 +7,9 @@ set -eu
 cd "$(dirname "$0")/.."
 
 # The one list of packages: what building needs, and what the tests need on top.
-build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev"
-tests="g++ libcmocka-dev libsuitesparse-dev libopenblas-dev python3-vtk9"
+build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
+  libopenblas-dev liblapacke-dev"
+tests="g++ libcmocka-dev libsuitesparse-dev python3-vtk9"
 
 install_missing() {
   missing=""

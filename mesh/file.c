@@ -59,7 +59,7 @@ static bool format_of_bytes(const unsigned char *bytes, size_t size, mesh_format
 }
 
 static supine_status read_bytes(FILE *stream, size_t size, mesh_file *file, supine_error *error) {
-  unsigned char *bytes = realloc(file->bytes, size);
+  unsigned char *bytes = realloc(file->bytes, size + 1);
   if (bytes == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu bytes",
                             file->path, size);

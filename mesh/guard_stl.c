@@ -56,8 +56,11 @@ supine_status mesh_guard_stl(mesh_file *file, supine_error *error) {
   if (has_count && promised == file->size) {
     mesh_space_note(file, STL_HEADER);
     file->faces = binary_facets(file);
-    file->whole = file->faces > 0;
-    return SUPINE_OK;
+    file->whole = true;
+    return file->faces > 0
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_MESH,
+                                  "%s: no triangles: the STL file has 0 facets", file->path);
   }
   if (is_text(file)) {
     return mesh_guard_text(file, error) ? check_text(file, error) : SUPINE_ERROR_FORMAT;

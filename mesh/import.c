@@ -26,7 +26,11 @@ static supine_status import_fail(const mesh_file *file, const char *words, supin
   for (; words != NULL && *words != '\0' && length < sizeof line - 1; ++words) {
     const bool blank = (unsigned char)*words <= ' ';
     if (!blank || (length > 0 && line[length - 1] != ' ')) {
-      line[length++] = blank ? ' ' : *words;
+      line[length] = *words;
+      if (blank) {
+        line[length] = ' ';
+      }
+      ++length;
     }
   }
   line[length] = '\0';
@@ -187,7 +191,7 @@ supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
   supine_mesh joined = {0};
   const struct aiScene *scene = NULL;
   supine_status status = read_scene(file, &scene, error);
-  if (status != SUPINE_OK) {
+  if (status != SUPINE_OK || scene == NULL) {
     goto cleanup;
   }
   bool polygons = false;

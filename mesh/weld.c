@@ -18,6 +18,10 @@ static uint64_t hash_position(const double position[3]) {
   return hash;
 }
 
+static bool same_position(const double a[3], const double b[3]) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
 /* Moves the vertices that are first at their position to the front; remap: old to new index. */
 static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t slot_count) {
   const size_t mask = slot_count - 1;
@@ -27,7 +31,7 @@ static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t s
     const double *position = vertices + 3 * i;
     size_t slot = hash_position(position) & mask;
     while (slots[slot] != free_slot &&
-           memcmp(vertices + 3 * (size_t)slots[slot], position, 3 * sizeof *vertices) != 0) {
+           !same_position(vertices + 3 * (size_t)slots[slot], position)) {
       slot = (slot + 1) & mask;
     }
     if (slots[slot] == free_slot) {

@@ -10,27 +10,15 @@
 #include <supine/volume.h>
 
 #include "internal.h"
+#include "tally.h"
 
-/* Bins of a float's exponent and first 8 bits of mantissa: 0.4 % wide over its whole range. */
-enum { BIN_SHIFT = 15, BIN_COUNT = 1 << 16, BLOCK = 512, VOLUME_HALVINGS = 10 };
-
-void supine_held_out_directions(size_t count, double *directions) {
-  const double golden = M_PI * (3.0 - sqrt(5.0));
-  for (size_t i = 0; i < count; ++i) {
-    const double z = 1.0 - (2.0 * (double)i + 1.0) / (double)count;
-    const double radius = sqrt(1.0 - z * z);
-    const double longitude = golden * (double)i + 0.3;
-    directions[3 * i] = radius * cos(longitude);
-    directions[3 * i + 1] = radius * sin(longitude);
-    directions[3 * i + 2] = z;
-  }
-}
+enum { BLOCK = 512, VOLUME_HALVINGS = 10 };
 
 /* What one thread has seen. */
 typedef struct tally {
-  double error2, field2, max;  /* at one breath scale */
-  double error_mm2, max_mm;    /* at one volume */
-  uint32_t bins[2][BIN_COUNT]; /* of both errors */
+  double field2;
+  supine_tally error;    /* at one breath scale */
+  supine_tally error_mm; /* at one volume */
 } tally;
 
 typedef struct accuracy_work {
@@ -40,105 +28,102 @@ typedef struct accuracy_work {
   const double *weights;    /* [D, K] */
   const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
   tally *tallies;           /* one a thread */
+  struct turned_block *blocks;
 } accuracy_work;
 
-static void count_error(tally *sums, size_t which, double error) {
-  const float value = (float)error;
-  uint32_t bits;
-  memcpy(&bits, &value, sizeof bits);
-  ++sums->bins[which][bits >> BIN_SHIFT];
-}
+/* A block of vertices, turned so that vertices run along the rows: [rank or modes][BLOCK]. */
+typedef struct turned_block {
+  size_t count;
+  double length[BLOCK]; /* |d| */
+  double columns[SUPINE_FORCE_COLUMNS_MAX][BLOCK];
+  float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
+} turned_block;
 
-/* F of the compression at direction `d` for a block of vertices. */
-SUPINE_CLONES static void compressed_block(const accuracy_work *work, size_t d, size_t begin,
-                                           size_t end, double *out) {
-  const size_t count = work->compression->mode_count;
-  const double *w = work->weights + d * count;
-  for (size_t i = begin; i < end; ++i) {
-    const float *c = work->compression->coefficients + i * count;
-    double sum = 0.0;
-    for (size_t k = 0; k < count; ++k) {
-      sum += w[k] * (double)c[k];
-    }
-    out[i - begin] = sum;
-  }
-}
-
-static void true_block(const accuracy_work *work, size_t d, size_t begin, size_t end, double *out) {
+static void turn_block(const accuracy_work *work, size_t begin, size_t count, turned_block *block) {
   const supine_truth *truth = work->truth;
-  if (truth->fields != NULL) {
-    memcpy(out, truth->fields + d * work->compression->vertex_count + begin,
-           (end - begin) * sizeof *out);
-    return;
-  }
-  const double *functions = truth->functions + d * truth->rank;
-  for (size_t i = begin; i < end; ++i) {
-    double sum = 0.0;
-    for (size_t r = 0; r < truth->rank; ++r) {
-      sum += truth->columns[i * truth->rank + r] * functions[r];
+  const size_t modes = work->compression->mode_count;
+  block->count = count;
+  for (size_t i = 0; i < count; ++i) {
+    const double *u = work->directions + 3 * (begin + i);
+    const float *c = work->compression->coefficients + (begin + i) * modes;
+    block->length[i] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    for (size_t k = 0; k < modes; ++k) {
+      block->coefficients[k][i] = c[k];
     }
-    out[i - begin] = sum;
+    for (size_t r = 0; truth->fields == NULL && r < truth->rank; ++r) {
+      block->columns[r][i] = truth->columns[(begin + i) * truth->rank + r];
+    }
   }
 }
 
-static void compare_block(const accuracy_work *work, tally *sums, size_t begin, size_t end) {
-  double length[BLOCK];
+/* F of the compression at one direction for the whole block. */
+SUPINE_CLONES static void compressed_block(const turned_block *block, size_t modes,
+                                           const double *weights, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t k = 0; k < modes; ++k) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += weights[k] * (double)block->coefficients[k][i];
+    }
+  }
+}
+
+SUPINE_CLONES static void true_block(const turned_block *block, size_t rank,
+                                     const double *functions, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t r = 0; r < rank; ++r) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += functions[r] * block->columns[r][i];
+    }
+  }
+}
+
+/* out = |s1 is - s0 should| length */
+SUPINE_CLONES static void miss_block(const double *is, const double *should, const double *length,
+                                     double s1, double s0, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = fabs(s1 * is[i] - s0 * should[i]) * length[i];
+  }
+}
+
+static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
+                          const turned_block *block) {
+  const supine_truth *truth = work->truth;
+  const size_t modes = work->compression->mode_count;
   double is[BLOCK];
   double should[BLOCK];
-  for (size_t i = begin; i < end; ++i) {
-    const double *u = work->directions + 3 * i;
-    length[i - begin] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-  }
-  for (size_t d = 0; d < work->truth->direction_count; ++d) {
-    true_block(work, d, begin, end, should);
-    compressed_block(work, d, begin, end, is);
-    for (size_t i = 0; i < end - begin; ++i) {
-      const double error = fabs(is[i] - should[i]) * length[i];
-      const double field = should[i] * length[i];
-      sums->error2 += error * error;
-      sums->field2 += field * field;
-      sums->max = fmax(sums->max, error);
-      count_error(sums, 0, error);
+  double miss[BLOCK];
+  for (size_t d = 0; d < truth->direction_count; ++d) {
+    compressed_block(block, modes, work->weights + d * modes, is);
+    if (truth->fields != NULL) {
+      memcpy(should, truth->fields + d * work->compression->vertex_count + begin,
+             block->count * sizeof *should);
+    } else {
+      true_block(block, truth->rank, truth->functions + d * truth->rank, should);
     }
-    for (size_t i = 0; work->scales != NULL && i < end - begin; ++i) {
-      const double *s = work->scales + 2 * d;
-      const double error = fabs(s[1] * is[i] - s[0] * should[i]) * length[i];
-      sums->error_mm2 += error * error;
-      sums->max_mm = fmax(sums->max_mm, error);
-      count_error(sums, 1, error);
+    for (size_t i = 0; i < block->count; ++i) {
+      const double field = should[i] * block->length[i];
+      sums->field2 += field * field;
+    }
+    miss_block(is, should, block->length, 1.0, 1.0, miss);
+    supine_tally_add(&sums->error, block->count, miss);
+    if (work->scales != NULL) {
+      miss_block(is, should, block->length, work->scales[2 * d + 1], work->scales[2 * d], miss);
+      supine_tally_add(&sums->error_mm, block->count, miss);
     }
   }
 }
 
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
+  turned_block *block = &work->blocks[thread];
   for (size_t first = begin; first < end; first += BLOCK) {
-    compare_block(work, &work->tallies[thread], first, first + BLOCK < end ? first + BLOCK : end);
+    turn_block(work, first, end - first < BLOCK ? end - first : BLOCK, block);
+    compare_block(work, &work->tallies[thread], first, block);
   }
-}
-
-/* The value that 95 % of the counts of all threads lie below: the upper edge of its bin. */
-static double percentile95(const tally *tallies, size_t threads, size_t which) {
-  uint64_t total = 0;
-  for (size_t b = 0; b < BIN_COUNT; ++b) {
-    for (size_t t = 0; t < threads; ++t) {
-      total += tallies[t].bins[which][b];
-    }
-  }
-  const uint64_t wanted = total - total / 20;
-  uint64_t seen = 0;
-  for (size_t b = 0; b < BIN_COUNT; ++b) {
-    for (size_t t = 0; t < threads; ++t) {
-      seen += tallies[t].bins[which][b];
-    }
-    if (seen >= wanted) {
-      const uint32_t bits = (uint32_t)(b + 1) << BIN_SHIFT;
-      float value;
-      memcpy(&value, &bits, sizeof value);
-      return (double)value;
-    }
-  }
-  return 0.0;
 }
 
 /* Breath scales at which both sides gain `volume`; false where some direction does not reach it. */
@@ -190,9 +175,10 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   double *weights = malloc(count * compression->mode_count * sizeof *weights);
   double *scales = malloc(2 * count * sizeof *scales);
   tally *tallies = calloc(threads, sizeof *tallies);
+  turned_block *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
   supine_status status = SUPINE_OK;
-  if (weights == NULL || scales == NULL || tallies == NULL) {
+  if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
   }
@@ -213,29 +199,28 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
       made.volume *= 0.5;
     }
   }
-  accuracy_work work = {truth, compression, directions, weights, closed ? scales : NULL, tallies};
+  accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
+                        tallies, blocks};
   supine_parallel_for(n, BLOCK, threads, compare_range, &work);
-  double error2 = 0.0;
-  double field2 = 0.0;
-  double error_mm2 = 0.0;
-  for (size_t t = 0; t < threads; ++t) {
-    error2 += tallies[t].error2;
-    field2 += tallies[t].field2;
-    error_mm2 += tallies[t].error_mm2;
-    made.relative_max = fmax(made.relative_max, tallies[t].max);
-    made.max_mm = fmax(made.max_mm, tallies[t].max_mm);
+  tally *all = &tallies[0];
+  for (size_t t = 1; t < threads; ++t) {
+    all->field2 += tallies[t].field2;
+    supine_tally_merge(&all->error, &tallies[t].error);
+    supine_tally_merge(&all->error_mm, &tallies[t].error_mm);
   }
   const double samples = (double)n * (double)count;
-  const double field = sqrt(field2 / samples);
-  made.relative_rms = sqrt(error2 / samples) / field;
-  made.relative_p95 = percentile95(tallies, threads, 0) / field;
-  made.relative_max /= field;
-  made.rms_mm = sqrt(error_mm2 / samples);
-  made.p95_mm = closed ? percentile95(tallies, threads, 1) : 0.0;
+  const double field = sqrt(all->field2 / samples);
+  made.relative_rms = sqrt(all->error.square_sum / samples) / field;
+  made.relative_p95 = supine_tally_percentile(&all->error, 0.95) / field;
+  made.relative_max = all->error.largest / field;
+  made.rms_mm = sqrt(all->error_mm.square_sum / samples);
+  made.p95_mm = supine_tally_percentile(&all->error_mm, 0.95);
+  made.max_mm = all->error_mm.largest;
   *accuracy = made;
 cleanup:
   free(weights);
   free(scales);
   free(tallies);
+  free(blocks);
   return status;
 }

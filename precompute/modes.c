@@ -1,273 +1,193 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From projected columns to the functions of orientation that run time evaluates. */
+/* The best functions of orientation: a singular value decomposition through small Gram matrices. */
+#include <cblas.h>
+#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_blas.h>
-#include <gsl/gsl_eigen.h>
-
-#include <supine/parallel.h>
-#include <supine/projection.h>
 #include <supine/sh.h>
 
-#include "internal.h"
+#include "compression.h"
 
-/* Singular values below this share of the first are rounding. */
+/* Singular values below this share of the first are rounding: the Gram matrix squares them. */
 static const double rank_tolerance = 1e-7;
 
-void supine_compression_free(supine_compression *compression) {
-  free(compression->coefficients);
-  free(compression->modes);
-  free(compression->mix);
-  *compression = (supine_compression){0};
-}
-
-typedef struct mix_work {
-  const supine_projection *projection;
-  supine_compression *compression;
-} mix_work;
-
-/* coefficients = columns x mix, row by row. */
-SUPINE_CLONES static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const mix_work *work = context;
-  const size_t rank = work->projection->rank;
-  const size_t count = work->compression->mode_count;
-  double sums[256];
-  for (size_t i = begin; i < end; ++i) {
-    const double *row = work->projection->columns + i * rank;
-    for (size_t k = 0; k < count; ++k) {
-      sums[k] = 0.0;
-    }
-    for (size_t r = 0; r < rank; ++r) {
-      const double *mix = work->compression->mix + r * count;
-      for (size_t k = 0; k < count; ++k) {
-        sums[k] += row[r] * mix[k];
-      }
-    }
-    float *out = work->compression->coefficients + i * count;
-    for (size_t k = 0; k < count; ++k) {
-      out[k] = (float)sums[k];
-    }
-  }
-}
-
-static supine_status compression_create(const supine_projection *projection, size_t mode_count,
-                                        supine_compression *made) {
-  *made = (supine_compression){
-      .vertex_count = projection->vertex_count, .band = projection->band, .mode_count = mode_count};
-  made->coefficients = malloc(projection->vertex_count * mode_count * sizeof(float));
-  made->modes = calloc(mode_count * supine_sh_count(projection->band), sizeof(double));
-  made->mix = calloc(projection->rank * mode_count, sizeof(double));
-  if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
-    supine_compression_free(made);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
-}
-
-static void mix_columns(const supine_projection *projection, supine_compression *made) {
-  mix_work work = {projection, made};
-  supine_parallel_for(projection->vertex_count, 1024, 0, mix_range, &work);
-}
-
-/* functions[r, t], which are the identity where they are not stored. */
-static double function_at(const supine_projection *projection, size_t r, size_t t) {
-  return projection->functions != NULL
-             ? projection->functions[r * supine_sh_count(projection->band) + t]
-             : (double)(r == t);
-}
-
-supine_status supine_compress_harmonics(const supine_projection *projection,
-                                        supine_compression *compression, supine_error *error) {
-  const size_t terms = supine_sh_count(projection->band);
-  if (terms > 256) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "band %zu has %zu harmonics, and a basis holds at most 256 functions: "
-                            "use modes",
-                            projection->band, terms);
-  }
-  supine_compression made;
-  if (compression_create(projection, terms, &made) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu harmonics", terms);
-  }
-  for (size_t t = 0; t < terms; ++t) {
-    made.modes[t * terms + t] = 1.0;
-    for (size_t r = 0; r < projection->rank; ++r) {
-      made.mix[r * terms + t] = function_at(projection, r, t);
-    }
-  }
-  mix_columns(projection, &made);
-  *compression = made;
-  return SUPINE_OK;
-}
-
-typedef struct gram_work {
-  const supine_projection *projection;
-  const double *weight;
-  double *partial; /* [threads, R, R] */
-} gram_work;
-
-/* Upper triangle of columns^T diag(weight) columns over a piece of the vertices. */
-SUPINE_CLONES static void gram_range(void *context, size_t begin, size_t end, size_t thread) {
-  const gram_work *work = context;
-  const size_t rank = work->projection->rank;
-  double *gram = work->partial + thread * rank * rank;
-  for (size_t i = begin; i < end; ++i) {
-    const double *row = work->projection->columns + i * rank;
-    const double weight = work->weight != NULL ? work->weight[i] : 1.0;
-    for (size_t a = 0; a < rank; ++a) {
-      const double scaled = weight * row[a];
-      for (size_t b = a; b < rank; ++b) {
-        gram[a * rank + b] += scaled * row[b];
-      }
-    }
-  }
-}
-
+/* gram = columns^T diag(weight) columns, [R, R], its lower triangle as LAPACK counts. */
 static supine_status gram_matrix(const supine_projection *projection, const double *weight,
-                                 gsl_matrix *gram) {
+                                 double *gram) {
+  enum { BLOCK = 1024 };
   const size_t rank = projection->rank;
-  const size_t threads = supine_thread_count();
-  gram_work work = {projection, weight, calloc(threads * rank * rank, sizeof(double))};
-  if (work.partial == NULL) {
+  double *block = malloc(BLOCK * rank * sizeof *block);
+  if (block == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_parallel_for(projection->vertex_count, 1024, threads, gram_range, &work);
-  for (size_t a = 0; a < rank; ++a) {
-    for (size_t b = a; b < rank; ++b) {
-      double sum = 0.0;
-      for (size_t t = 0; t < threads; ++t) {
-        sum += work.partial[(t * rank + a) * rank + b];
+  memset(gram, 0, rank * rank * sizeof *gram);
+  for (size_t first = 0; first < projection->vertex_count; first += BLOCK) {
+    const size_t left = projection->vertex_count - first;
+    const size_t count = left < BLOCK ? left : BLOCK;
+    for (size_t i = 0; i < count; ++i) {
+      const double root = weight != NULL ? sqrt(weight[first + i]) : 1.0;
+      for (size_t r = 0; r < rank; ++r) {
+        block[i * rank + r] = root * projection->columns[(first + i) * rank + r];
       }
-      gsl_matrix_set(gram, a, b, sum);
-      gsl_matrix_set(gram, b, a, sum);
     }
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)rank, (int)count, 1.0, block,
+                (int)rank, 1.0, gram, (int)rank);
   }
-  free(work.partial);
+  free(block);
   return SUPINE_OK;
 }
 
-/* Symmetric eigenproblem, eigenvalues falling; destroys `matrix`. */
-static int eigen(gsl_matrix *matrix, gsl_vector *values, gsl_matrix *vectors) {
-  gsl_eigen_symmv_workspace *workspace = gsl_eigen_symmv_alloc(matrix->size1);
-  if (workspace == NULL) {
-    return -1;
+supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
+                                        double *vectors) {
+  lapack_int found = 0;
+  lapack_int *support = malloc(2 * n * sizeof *support);
+  double *rising = malloc(n * count * sizeof *rising);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (support != NULL && rising != NULL) {
+    const lapack_int size = (lapack_int)n;
+    const lapack_int result = LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix, size,
+                                             0.0, 0.0, size - (lapack_int)count + 1, size, 0.0,
+                                             &found, values, rising, size, support);
+    status = result == 0 && (size_t)found == count ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
+    for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
+      memcpy(vectors + k * n, rising + (count - 1 - k) * n, n * sizeof *vectors);
+    }
+    for (size_t k = 0; k < count / 2 && status == SUPINE_OK; ++k) {
+      const double swap = values[k];
+      values[k] = values[count - 1 - k];
+      values[count - 1 - k] = swap;
+    }
   }
-  const int result = gsl_eigen_symmv(matrix, values, vectors, workspace);
-  gsl_eigen_symmv_free(workspace);
-  return result != 0 ? result : gsl_eigen_symmv_sort(values, vectors, GSL_EIGEN_SORT_VAL_DESC);
+  free(support);
+  free(rising);
+  return status;
 }
 
-/* With G = columns^T W columns = H H^T, the weighted coefficient matrix C = columns x functions has
- * the singular values of A = H^T functions and its right singular vectors. A has R rows only:
- * they come from the R x R eigenproblem of A A^T. */
+/* Squares of the singular values of C = sqrt(W) columns x functions and its right singular vectors
+ * [count, P], where the functions are stored: with H^T H = columns^T W columns, C has those of
+ * A = H functions, which has R rows only. They come from the R x R eigenproblem of A A^T. */
+static supine_status factored_modes(const supine_projection *projection, double *gram, size_t count,
+                                    double *values, double *modes, double *total) {
+  const size_t rank = projection->rank;
+  const size_t terms = supine_sh_count(projection->band);
+  double *vectors = malloc(rank * rank * sizeof *vectors);
+  double *reduced = malloc(rank * terms * sizeof *reduced);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (vectors == NULL || reduced == NULL) {
+    goto cleanup;
+  }
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  for (size_t k = 0; k < rank; ++k) { /* H: eigenvectors as rows, by the roots of their values */
+    cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
+  }
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)rank, (int)terms, (int)rank, 1.0,
+              vectors, (int)rank, projection->functions, (int)terms, 0.0, reduced, (int)terms);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)rank, (int)rank, (int)terms, 1.0,
+              reduced, (int)terms, reduced, (int)terms, 0.0, gram, (int)rank);
+  *total = 0.0;
+  for (size_t r = 0; r < rank; ++r) {
+    *total += gram[r * rank + r];
+  }
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* A^T U_k / sigma_k */
+    const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
+    cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
+                vectors + k * rank, 1, 0.0, modes + k * terms, 1);
+  }
+cleanup:
+  free(vectors);
+  free(reduced);
+  return status;
+}
+
+/* The same where the functions are the harmonics themselves: C = sqrt(W) columns. */
+static supine_status plain_modes(const supine_projection *projection, double *gram, size_t count,
+                                 double *values, double *modes, double *total) {
+  *total = 0.0;
+  for (size_t r = 0; r < projection->rank; ++r) {
+    *total += gram[r * projection->rank + r];
+  }
+  return supine_leading_eigenpairs(projection->rank, gram, count, values, modes);
+}
+
+/* mix = functions x modes^T, [R, K]. */
+static void find_mix(const supine_projection *projection, supine_compression *made) {
+  const int rank = (int)projection->rank;
+  const int terms = (int)supine_sh_count(projection->band);
+  const int count = (int)made->mode_count;
+  if (projection->functions != NULL) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, rank, count, terms, 1.0,
+                projection->functions, terms, made->modes, terms, 0.0, made->mix, count);
+    return;
+  }
+  for (size_t r = 0; r < projection->rank; ++r) {
+    for (size_t k = 0; k < made->mode_count; ++k) {
+      made->mix[r * made->mode_count + k] = made->modes[k * projection->rank + r];
+    }
+  }
+}
+
 supine_status supine_compress_modes(const supine_projection *projection, const double *weight,
                                     size_t mode_max, supine_compression *compression,
                                     double *singular, double *total, supine_error *error) {
   const size_t rank = projection->rank;
   const size_t terms = supine_sh_count(projection->band);
-  supine_status status = SUPINE_OK;
-  if (mode_max < 1 || mode_max > 256) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to 256 are possible",
-                            mode_max);
-  }
-  gsl_matrix *gram = gsl_matrix_alloc(rank, rank);
-  gsl_matrix *root = gsl_matrix_alloc(rank, rank);
-  gsl_matrix *vectors = gsl_matrix_alloc(rank, rank);
-  gsl_vector *values = gsl_vector_alloc(rank);
-  gsl_matrix *functions = gsl_matrix_alloc(rank, terms);
-  gsl_matrix *reduced = gsl_matrix_alloc(rank, terms);
+  const size_t most = mode_max < rank ? mode_max : rank;
+  const size_t kept = most < terms ? most : terms;
   supine_compression made = {0};
-  if (gram == NULL || root == NULL || vectors == NULL || values == NULL || functions == NULL ||
-      reduced == NULL || gram_matrix(projection, weight, gram) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for modes of band %zu",
-                              projection->band);
-    goto cleanup;
+  double energy = 0.0;
+  if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to %d are possible",
+                            mode_max, SUPINE_MODES_MADE_MAX);
   }
-  for (size_t r = 0; r < rank; ++r) {
-    for (size_t t = 0; t < terms; ++t) {
-      gsl_matrix_set(functions, r, t, function_at(projection, r, t));
-    }
+  double *gram = malloc(rank * rank * sizeof *gram);
+  double *values = malloc(rank * sizeof *values);
+  double *modes = malloc(kept * terms * sizeof *modes);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (gram != NULL && values != NULL && modes != NULL) {
+    status = gram_matrix(projection, weight, gram);
   }
-  if (eigen(gram, values, vectors) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "eigenvalues did not converge");
-    goto cleanup;
+  if (status == SUPINE_OK) {
+    status = projection->functions != NULL
+                 ? factored_modes(projection, gram, kept, values, modes, &energy)
+                 : plain_modes(projection, gram, kept, values, modes, &energy);
   }
-  for (size_t a = 0; a < rank; ++a) { /* H = vectors sqrt(values) */
-    for (size_t b = 0; b < rank; ++b) {
-      gsl_matrix_set(root, a, b,
-                     gsl_matrix_get(vectors, a, b) * sqrt(fmax(gsl_vector_get(values, b), 0.0)));
-    }
-  }
-  (void)gsl_blas_dgemm(CblasTrans, CblasNoTrans, 1.0, root, functions, 0.0, reduced);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasTrans, 1.0, reduced, reduced, 0.0, gram);
-  if (eigen(gram, values, vectors) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "eigenvalues did not converge");
-    goto cleanup;
-  }
-  const double first = gsl_vector_get(values, 0);
-  if (!(first > 0.0)) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "modes of band %zu: %s", projection->band,
+                           supine_status_string(status));
     goto cleanup;
   }
   size_t count = 0;
-  double sum = 0.0;
-  for (size_t k = 0; k < rank; ++k) {
-    const double value = gsl_vector_get(values, k);
-    sum += fmax(value, 0.0);
-    if (count == k && k < mode_max && k < terms &&
-        value > rank_tolerance * rank_tolerance * first) {
-      ++count;
-    }
+  while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
+    ++count;
   }
-  if (compression_create(projection, count, &made) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu modes", count);
+  if (count == 0) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
     goto cleanup;
   }
-  for (size_t k = 0; k < count; ++k) { /* V_k = A^T U_k / sigma_k */
-    double *mode = made.modes + k * terms;
-    gsl_vector_view out = gsl_vector_view_array(mode, terms);
-    gsl_vector_const_view u = gsl_matrix_const_column(vectors, k);
-    (void)gsl_blas_dgemv(CblasTrans, 1.0 / sqrt(gsl_vector_get(values, k)), reduced, &u.vector, 0.0,
-                         &out.vector);
-    for (size_t r = 0; r < rank; ++r) {
-      gsl_vector_const_view row = gsl_matrix_const_row(functions, r);
-      (void)gsl_blas_ddot(&row.vector, &out.vector, &made.mix[r * count + k]);
-    }
+  status = supine_compression_create(projection, count, &made);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory for %zu modes", count);
+    goto cleanup;
   }
-  mix_columns(projection, &made);
+  memcpy(made.modes, modes, count * terms * sizeof *modes);
+  find_mix(projection, &made);
+  supine_compression_mix(projection, &made);
   for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
-    singular[k] = k < count ? sqrt(gsl_vector_get(values, k)) : 0.0;
+    singular[k] = k < count ? sqrt(values[k]) : 0.0;
   }
   if (total != NULL) {
-    *total = sum;
+    *total = energy;
   }
   *compression = made;
 cleanup:
-  gsl_matrix_free(gram);
-  gsl_matrix_free(root);
-  gsl_matrix_free(vectors);
-  gsl_vector_free(values);
-  gsl_matrix_free(functions);
-  gsl_matrix_free(reduced);
+  free(gram);
+  free(values);
+  free(modes);
   return status;
-}
-
-/* Packs the first `count` of each row of `width` to the front. */
-static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
-  unsigned char *bytes = data;
-  for (size_t r = 1; r < rows; ++r) {
-    memmove(bytes + r * count * size, bytes + r * width * size, count * size);
-  }
-}
-
-void supine_compression_truncate(supine_compression *compression, size_t rank, size_t count) {
-  const size_t width = compression->mode_count;
-  if (count < width) {
-    keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
-    keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* modes are rows: the first ones stand where they should */
-  }
 }

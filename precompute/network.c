@@ -82,6 +82,7 @@ supine_status supine_network_create(const supine_mesh *mesh, const supine_topolo
     goto fail;
   }
   made->vertex_count = n;
+  made->spring_own = 1.0;
   made->row_begin = malloc((n + 1) * sizeof *made->row_begin);
   made->neighbour = malloc((links + 1) * sizeof *made->neighbour);
   made->distance = malloc((links + 1) * sizeof *made->distance);
@@ -128,6 +129,8 @@ void supine_network_destroy(supine_network *network) {
     free(network->distance);
     free(network->order);
     free(network->rank);
+    free(network->own);
+    free(network->lesions);
     free(network);
   }
 }

@@ -6,135 +6,227 @@
 #include <supine/precompute.h>
 
 #include "basis_file.h"
+#include "compression.h"
+#include "held_out.h"
 
-enum { HELD_OUT_DEFAULT = 100 };
+/* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
+ * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
+enum {
+  HELD_OUT_MIN = 100,
+  HELD_OUT_MAX = 1000,
+  HELD_OUT_SAMPLED_MAX = 300,
+  HELD_OUT_WORK = 20000000
+};
 
 static const double reference_volume = 500.0; /* mL, that errors in mm are stated at */
 
-/* Between the steps: has the caller had enough? */
-static supine_status report_progress(const supine_precompute_options *options, double fraction,
-                                     supine_error *error) {
-  if (options->progress != NULL && !options->progress(options->progress_context, fraction)) {
-    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-  }
-  return SUPINE_OK;
+/* Fewer modes are kept where the error stays within this factor of what the most would have. */
+static const double same_error = 1.01;
+
+/* Everything between the lungs and the file. */
+typedef struct pipeline {
+  const supine_lungs *lungs;
+  const supine_precompute_options *options;
+  bool linear;
+  double *directions; /* [N, 3] */
+  double *weight;     /* [N] |d|^2 */
+  supine_projection projection;
+  supine_volume_forms column_forms; /* linear route */
+  supine_compression compression;
+  double singular[SUPINE_MODES_MADE_MAX];
+  double energy; /* sum of the squares of all singular values */
+  supine_volume_forms forms;
+  supine_held_out held_out;
+  supine_accuracy accuracy;
+  supine_error_table table;
+} pipeline;
+
+static void pipeline_free(pipeline *p) {
+  free(p->directions);
+  free(p->weight);
+  supine_projection_free(&p->projection);
+  supine_volume_forms_free(&p->column_forms);
+  supine_compression_free(&p->compression);
+  supine_volume_forms_free(&p->forms);
+  supine_held_out_free(&p->held_out);
+  supine_error_table_free(&p->table);
 }
 
-/* The truth of the linear route at the held-out directions: functions [D, R] and, on closed lungs,
- * cubic [D, 3], from the forms of the projection's columns. */
-static supine_status linear_truth(const supine_lungs *lungs, const supine_force_law *law,
-                                  const supine_projection *projection,
-                                  const supine_volume_forms *forms, size_t count,
-                                  const double *directions, double *functions, double *cubic) {
-  double *range = malloc(2 * count * sizeof *range);
-  if (range == NULL) {
-    return SUPINE_ERROR_MEMORY;
+/* Progress of one stage, as a part of the whole. */
+typedef struct stage {
+  const supine_precompute_options *options;
+  double begin, end;
+} stage;
+
+static bool stage_progress(void *context, double fraction) {
+  const stage *part = context;
+  const supine_precompute_options *options = part->options;
+  return options->progress == NULL ||
+         options->progress(options->progress_context,
+                           part->begin + fraction * (part->end - part->begin));
+}
+
+static supine_status find_directions(pipeline *p, supine_error *error) {
+  const size_t n = p->lungs->mesh.vertex_count;
+  p->directions = malloc(3 * n * sizeof *p->directions);
+  p->weight = malloc(n * sizeof *p->weight);
+  if (p->directions == NULL || p->weight == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   const supine_status status =
-      supine_height_range(&lungs->mesh, count, directions, range, range + count);
-  for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
-    double *row = functions + d * projection->rank;
-    supine_force_functions(lungs, law, directions + 3 * d, range[d], range[count + d], row);
-    if (forms->linear != NULL) {
-      supine_volume_forms_contract(forms, row, cubic + 3 * d);
-    }
+      supine_directions(p->lungs, &p->options->model.direction, p->directions, error);
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    const double *d = p->directions + 3 * i;
+    p->weight[i] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
   }
-  free(range);
   return status;
+}
+
+static supine_status project(pipeline *p, supine_error *error) {
+  const supine_precompute_options *options = p->options;
+  const supine_model *model = &options->model;
+  stage part = {options, 0.0, 0.8};
+  if (!stage_progress(&part, 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  }
+  p->linear = options->route == SUPINE_ROUTE_LINEAR ||
+              (options->route == SUPINE_ROUTE_AUTO && model->force.soften == 0.0);
+  if (p->linear) {
+    return supine_project_linear(p->lungs, &model->force, model->stiffness, options->band,
+                                 &p->projection, error);
+  }
+  return supine_project_sampled(p->lungs, &model->force, model->stiffness, options->band, 0.0,
+                                stage_progress, &part, &p->projection, error);
+}
+
+static supine_status compress(pipeline *p, supine_error *error) {
+  return p->options->modes == 0
+             ? supine_compress_harmonics(&p->projection, &p->compression, error)
+             : supine_compress_modes(&p->projection, p->weight, p->options->modes, &p->compression,
+                                     p->singular, &p->energy, error);
+}
+
+/* Volume forms of the coefficients: of the linear route's few columns, carried along; else
+ * directly. */
+static supine_status find_forms(pipeline *p, supine_error *error) {
+  const supine_compression *field = &p->compression;
+  if (!p->lungs->topology.closed) {
+    return SUPINE_OK;
+  }
+  if (p->linear) {
+    supine_status status =
+        p->column_forms.linear != NULL
+            ? SUPINE_OK
+            : supine_volume_forms_create(p->lungs, p->directions, p->projection.columns,
+                                         p->projection.rank, &p->column_forms, error);
+    if (status == SUPINE_OK) {
+      status = supine_volume_forms_mix(&p->column_forms, field->mix, field->mode_count, &p->forms);
+    }
+    return status;
+  }
+  return supine_compression_volume_forms(field, p->lungs, p->directions, &p->forms, error);
+}
+
+static size_t held_out_default(const pipeline *p) {
+  const size_t most = p->linear ? HELD_OUT_MAX : HELD_OUT_SAMPLED_MAX;
+  const size_t count = HELD_OUT_WORK / p->lungs->mesh.vertex_count;
+  return count < HELD_OUT_MIN ? HELD_OUT_MIN : count > most ? most : count;
+}
+
+static supine_status hold_out(pipeline *p, supine_error *error) {
+  const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
+  if (p->linear) {
+    return supine_held_out_linear(p->lungs, &p->options->model.force, &p->projection,
+                                  p->lungs->topology.closed ? &p->column_forms : NULL, count,
+                                  &p->held_out, error);
+  }
+  return supine_held_out_sampled(p->lungs, &p->options->model, p->directions, count, &p->held_out,
+                                 error);
+}
+
+static supine_status measure(pipeline *p, supine_error *error) {
+  return supine_accuracy_measure(&p->held_out.truth, &p->compression, p->directions,
+                                 p->forms.linear != NULL ? &p->forms : NULL, reference_volume,
+                                 &p->accuracy, error);
+}
+
+/* The fewest modes whose error is the same, judged by what the ones left out would carry. */
+static size_t modes_needed(const pipeline *p) {
+  const size_t most = p->compression.mode_count;
+  const double limit = pow(same_error, 2.0) - 1.0;
+  const double error2 = p->accuracy.relative_rms * p->accuracy.relative_rms;
+  double dropped = 0.0;
+  size_t count = most;
+  while (count > 1) {
+    dropped += p->singular[count - 1] * p->singular[count - 1] / p->energy;
+    if (dropped > limit * error2) {
+      break;
+    }
+    --count;
+  }
+  return count;
+}
+
+/* Made before modes are dropped, so that it shows what more of them would bring. */
+static supine_status tabulate(pipeline *p, supine_error *error) {
+  const supine_status status = supine_error_table_create(&p->held_out.truth, &p->projection,
+                                                         &p->compression, p->directions, &p->table);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "no memory to tabulate the error");
+}
+
+/* Drops the modes that do not pay, and states the error of what is left. */
+static supine_status drop_modes(pipeline *p, supine_error *error) {
+  const size_t needed = modes_needed(p);
+  if (p->options->modes == 0 || needed == p->compression.mode_count) {
+    return SUPINE_OK;
+  }
+  supine_compression_truncate(&p->compression, p->projection.rank, needed);
+  supine_volume_forms_free(&p->forms);
+  const supine_status status = find_forms(p, error);
+  return status == SUPINE_OK ? measure(p, error) : status;
+}
+
+static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
+  const supine_basis_content content = {.lungs = p->lungs,
+                                        .model = &p->options->model,
+                                        .directions = p->directions,
+                                        .compression = &p->compression,
+                                        .forms = p->forms.linear != NULL ? &p->forms : NULL,
+                                        .accuracy = &p->accuracy,
+                                        .table = &p->table,
+                                        .route = p->linear ? "linear" : "sampled",
+                                        .harmonics = p->options->modes == 0,
+                                        .made_by = p->options->made_by};
+  stage part = {p->options, 0.9, 1.0};
+  if (!stage_progress(&part, 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  }
+  return supine_basis_file_write(path, &content, error);
 }
 
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error) {
-  const size_t n = lungs->mesh.vertex_count;
-  const size_t held_out = options->held_out > 0 ? options->held_out : HELD_OUT_DEFAULT;
-  supine_projection projection = {0};
-  supine_compression compression = {0};
-  supine_volume_forms column_forms = {0};
-  supine_volume_forms forms = {0};
-  supine_accuracy accuracy = {0};
-  double *functions = NULL;
-  double *directions = malloc(3 * n * sizeof *directions);
-  double *gravity = malloc(3 * held_out * sizeof *gravity);
-  double *cubic = malloc(3 * held_out * sizeof *cubic);
+  pipeline p = {.lungs = lungs, .options = options};
+  supine_status (*const steps[])(pipeline *, supine_error *) = {
+      find_directions, project, compress, find_forms, hold_out, measure, tabulate, drop_modes};
   supine_status status = SUPINE_OK;
-  if (directions == NULL || gravity == NULL || cubic == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-    goto cleanup;
-  }
-  status = supine_directions(lungs, &options->model.direction, directions, error);
-  if (status == SUPINE_OK) {
-    status = report_progress(options, 0.0, error);
+  for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
+    status = steps[i](&p, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_project_linear(lungs, &options->model.force, options->model.stiffness,
-                                   options->band, &projection, error);
+    status = write_file(&p, path, error);
   }
-  if (status == SUPINE_OK) {
-    status = options->modes == 0 ? supine_compress_harmonics(&projection, &compression, error)
-                                 : supine_compress_modes(&projection, NULL, options->modes,
-                                                         &compression, NULL, NULL, error);
+  if (status == SUPINE_OK && report != NULL) {
+    *report =
+        (supine_precompute_report){.route = p.linear ? SUPINE_ROUTE_LINEAR : SUPINE_ROUTE_SAMPLED,
+                                   .mode_count = p.compression.mode_count,
+                                   .solve_count = p.projection.solve_count,
+                                   .iterations = p.projection.iterations,
+                                   .residual = p.projection.residual,
+                                   .accuracy = p.accuracy};
   }
-  if (status == SUPINE_OK) {
-    status = report_progress(options, 0.4, error);
-  }
-  if (status == SUPINE_OK && lungs->topology.closed) {
-    status = supine_volume_forms_create(lungs, directions, projection.columns, projection.rank,
-                                        &column_forms, error);
-    if (status == SUPINE_OK) {
-      status =
-          supine_volume_forms_mix(&column_forms, compression.mix, compression.mode_count, &forms);
-    }
-  }
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  functions = malloc(held_out * projection.rank * sizeof *functions);
-  if (functions == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu directions", held_out);
-    goto cleanup;
-  }
-  supine_held_out_directions(held_out, gravity);
-  status = linear_truth(lungs, &options->model.force, &projection, &column_forms, held_out, gravity,
-                        functions, cubic);
-  if (status == SUPINE_OK) {
-    const bool closed = lungs->topology.closed;
-    const supine_truth truth = {.direction_count = held_out,
-                                .directions = gravity,
-                                .rank = projection.rank,
-                                .columns = projection.columns,
-                                .functions = functions,
-                                .cubic = closed ? cubic : NULL};
-    status = supine_accuracy_measure(&truth, &compression, directions, closed ? &forms : NULL,
-                                     reference_volume, &accuracy, error);
-  }
-  if (status == SUPINE_OK) {
-    status = report_progress(options, 0.8, error);
-  }
-  if (status == SUPINE_OK) {
-    const supine_basis_content content = {.lungs = lungs,
-                                          .model = &options->model,
-                                          .directions = directions,
-                                          .compression = &compression,
-                                          .forms = forms.linear != NULL ? &forms : NULL,
-                                          .accuracy = &accuracy,
-                                          .harmonics = options->modes == 0,
-                                          .made_by = options->made_by};
-    status = supine_basis_file_write(path, &content, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)report_progress(options, 1.0, NULL);
-    *report = (supine_precompute_report){compression.mode_count, projection.solve_count,
-                                         projection.iterations, projection.residual, accuracy};
-  }
-cleanup:
-  supine_projection_free(&projection);
-  supine_compression_free(&compression);
-  supine_volume_forms_free(&column_forms);
-  supine_volume_forms_free(&forms);
-  free(functions);
-  free(directions);
-  free(gravity);
-  free(cubic);
+  pipeline_free(&p);
   return status;
 }

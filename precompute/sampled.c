@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The sampled route: a full solve for every direction of a grid, then the transform of every vertex's field. */
+/* The sampled route: a full solve for every direction of a grid, then the transform of every
+ * vertex's field. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,7 +63,7 @@ supine_status supine_sampler_create(const supine_lungs *lungs, const supine_forc
   made->force = calloc(made->threads, sizeof(double *));
   made->softened = calloc(made->threads, sizeof(double *));
   bool whole = made->equilibria != NULL && made->force != NULL && made->softened != NULL &&
-               supine_network_create(&lungs->mesh, &lungs->topology, &made->network) == SUPINE_OK;
+               supine_lungs_network(lungs, &made->network) == SUPINE_OK;
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < made->threads && whole; ++t) {
     made->force[t] = malloc(n * sizeof(double));
@@ -118,11 +119,12 @@ static void sample_range(void *context, size_t begin, size_t end, size_t thread)
     supine_force(sampler->lungs, sampler->law, g, work->minimum[d], work->maximum[d],
                  sampler->force[thread]);
     supine_solve_report report;
-    work->statuses[thread] = supine_equilibrium_solve(
-        equilibrium, 1, sampler->force[thread], sampler->tolerance, d > begin,
-        work->fields + d * n, &report, &work->errors[thread]);
+    work->statuses[thread] =
+        supine_equilibrium_solve(equilibrium, 1, sampler->force[thread], sampler->tolerance,
+                                 d > begin, work->fields + d * n, &report, &work->errors[thread]);
     supine_solve_report *worst = &work->worst[thread];
-    worst->iterations = report.iterations > worst->iterations ? report.iterations : worst->iterations;
+    worst->iterations =
+        report.iterations > worst->iterations ? report.iterations : worst->iterations;
     worst->residual = fmax(worst->residual, report.residual);
   }
 }
@@ -142,8 +144,7 @@ supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const 
     (void)supine_error_set(error, status, "no memory to solve %zu directions", count);
     goto cleanup;
   }
-  sample_work work = {sampler,  directions, range,  range + count, fields,
-                      statuses, errors,     reports};
+  sample_work work = {sampler, directions, range, range + count, fields, statuses, errors, reports};
   supine_parallel_for(count, 1, threads, sample_range, &work);
   status = SUPINE_OK;
   for (size_t t = 0; t < threads; ++t) {
@@ -181,7 +182,12 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = supine_sh_grid_for_band(band, SUPINE_SH_OVERSAMPLING_DEFAULT, &grid);
+  size_t latitudes = 0;
+  size_t longitudes = 0;
+  status = supine_sh_grid_size(band, 0.0, &latitudes, &longitudes);
+  if (status == SUPINE_OK) {
+    status = supine_sh_grid_create(latitudes, longitudes, &grid);
+  }
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no grid for band %zu: %s", band,
                            supine_status_string(status));
@@ -203,7 +209,8 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   const supine_sh_batch batch = {.fields = n};
   for (size_t j = 0; j < grid->latitudes && status == SUPINE_OK; ++j) {
     if (progress != NULL && !progress(context, (double)j / (double)grid->latitudes)) {
-      status = supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
       break;
     }
     for (size_t k = 0; k < grid->longitudes; ++k) {

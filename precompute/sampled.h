@@ -17,7 +17,6 @@ void supine_sampler_destroy(supine_sampler *sampler);
 /* F for unit directions [count, 3] into fields [count, N]; `worst` (optional) is raised to the most
  * iterations and the largest residual. */
 supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const double *directions,
-                                   double *fields, supine_solve_report *worst,
-                                   supine_error *error);
+                                   double *fields, supine_solve_report *worst, supine_error *error);
 
 #endif

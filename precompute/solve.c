@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <supine/disease.h>
 #include <supine/precompute.h>
 
 supine_model supine_model_default(void) {
@@ -29,7 +30,7 @@ supine_status supine_solve(const supine_lungs *lungs, const supine_model *model,
   made.directions = malloc(3 * n * sizeof *made.directions);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
-      supine_network_create(&lungs->mesh, &lungs->topology, &network) != SUPINE_OK ||
+      supine_lungs_network(lungs, &network) != SUPINE_OK ||
       supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
       supine_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
@@ -58,6 +59,7 @@ supine_status supine_solve(const supine_lungs *lungs, const supine_model *model,
     }
     supine_volume_forms_contract(&forms, &one, made.cubic);
   }
+  supine_lungs_rest_directions(lungs, made.directions);
   *solution = made;
   made = (supine_solution){0};
 cleanup:

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include <supine/parallel.h>
+#include <supine/projection.h>
 #include <supine/volume.h>
 #include <supine/volume_forms.h>
 
@@ -87,11 +88,50 @@ SUPINE_CLONES static void forms_range(void *context, size_t begin, size_t end, s
   }
 }
 
+/* The same for columns of three components: a determinant for each choice of columns. */
+static void forms_range_vector(void *context, size_t begin, size_t end, size_t thread) {
+  const forms_work *work = context;
+  const size_t count = work->count;
+  double *linear = work->linear + thread * count;
+  double *quadratic = work->quadratic + thread * count * count;
+  double *cubic = work->cubic + thread * count * count * count;
+  for (size_t t = begin; t < end; ++t) {
+    const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
+    double p[3][3];
+    double c[3][SUPINE_MODES_MADE_MAX][3]; /* columns at the corners */
+    for (size_t v = 0; v < 3; ++v) {
+      for (size_t a = 0; a < 3; ++a) {
+        p[v][a] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + a] - work->centre[a];
+        for (size_t k = 0; k < count; ++k) {
+          c[v][k][a] = work->columns[(3 * (size_t)corner[v] + a) * count + k];
+        }
+      }
+    }
+    for (size_t k = 0; k < count; ++k) {
+      linear[k] += determinant(c[0][k], p[1], p[2]) + determinant(p[0], c[1][k], p[2]) +
+                   determinant(p[0], p[1], c[2][k]);
+      for (size_t l = 0; l < count; ++l) {
+        quadratic[k * count + l] += determinant(c[0][k], c[1][l], p[2]) +
+                                    determinant(c[0][k], p[1], c[2][l]) +
+                                    determinant(p[0], c[1][k], c[2][l]);
+        const double *a = c[0][k];
+        const double *b = c[1][l];
+        const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                                 a[0] * b[1] - a[1] * b[0]};
+        double *row = cubic + (k * count + l) * count;
+        for (size_t m = 0; m < count; ++m) {
+          row[m] += cross[0] * c[2][m][0] + cross[1] * c[2][m][1] + cross[2] * c[2][m][2];
+        }
+      }
+    }
+  }
+}
+
 /* Sums the threads' parts and makes the forms symmetric. */
 static void forms_collect(const forms_work *work, size_t threads, size_t lung,
                           supine_volume_forms *forms) {
   const size_t n = work->count;
-  const double unit = millilitres / 6.0;
+  const double unit = millilitres / 6.0 * work->lungs->share[lung];
   double *linear = forms->linear + lung * n;
   double *quadratic = forms->quadratic + lung * n * n;
   double *cubic = forms->cubic + lung * n * n * n;
@@ -114,9 +154,9 @@ static void forms_collect(const forms_work *work, size_t threads, size_t lung,
   }
 }
 
-supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
-                                         const double *columns, size_t count,
-                                         supine_volume_forms *forms, supine_error *error) {
+static supine_status create(const supine_lungs *lungs, const double *directions,
+                            const double *columns, size_t count, supine_volume_forms *forms,
+                            supine_error *error) {
   const size_t threads = supine_thread_count();
   forms_work work = {.lungs = lungs, .directions = directions, .columns = columns, .count = count};
   supine_volume_forms made = {0};
@@ -145,8 +185,8 @@ supine_status supine_volume_forms_create(const supine_lungs *lungs, const double
     memset(work.quadratic, 0, threads * count * count * sizeof(double));
     memset(work.cubic, 0, threads * count * count * count * sizeof(double));
     work.first = lungs->triangle_begin[lung];
-    supine_parallel_for(lungs->triangle_begin[lung + 1] - work.first, 1024, threads, forms_range,
-                        &work);
+    supine_parallel_for(lungs->triangle_begin[lung + 1] - work.first, 1024, threads,
+                        directions != NULL ? forms_range : forms_range_vector, &work);
     forms_collect(&work, threads, lung, &made);
   }
   *forms = made;
@@ -157,6 +197,18 @@ cleanup:
   free(work.quadratic);
   free(work.cubic);
   return status;
+}
+
+supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
+                                         const double *columns, size_t count,
+                                         supine_volume_forms *forms, supine_error *error) {
+  return create(lungs, directions, columns, count, forms, error);
+}
+
+supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
+                                                size_t count, supine_volume_forms *forms,
+                                                supine_error *error) {
+  return create(lungs, NULL, columns, count, forms, error);
 }
 
 /* out[a, j, b] = sum over i of in[a, i, b] mix[i, j]. */

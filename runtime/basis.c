@@ -222,9 +222,46 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Chooses the code and packs: AUTO is INT16 where that is accurate enough, else EXACT. */
+static supine_status prepare(const check *c, supine_basis *basis,
+                             const supine_basis_options *options) {
+  static const double error_limit = 0.005; /* mm */
+  supine_storage storage = options->storage;
+  supine_simd simd = options->simd;
+  if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
+      simd >= SUPINE_SIMD_COUNT) {
+    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "no such storage or code: %d, %d",
+                            (int)storage, (int)simd);
+  }
+  basis->kernels = supine_kernels_choose(&simd);
+  if (basis->kernels == NULL) {
+    return supine_error_set(c->error, SUPINE_ERROR_UNSUPPORTED,
+                            "this processor or build lacks the instructions asked for");
+  }
+  basis->info.simd = simd;
+  const bool choose = storage == SUPINE_STORAGE_AUTO;
+  supine_status status = supine_basis_pack(basis, choose ? SUPINE_STORAGE_INT16 : storage);
+  if (status == SUPINE_OK) {
+    basis->info.storage_error = supine_basis_storage_error(basis);
+    if (choose && !(basis->info.storage_error <= error_limit)) {
+      status = supine_basis_pack(basis, SUPINE_STORAGE_EXACT);
+      basis->info.storage_error =
+          status == SUPINE_OK ? supine_basis_storage_error(basis) : basis->info.storage_error;
+    }
+  }
+  if (status != SUPINE_OK) {
+    return supine_error_set(c->error, status, "%s: out of memory", c->name);
+  }
+  const double bytes = basis->info.bytes_per_vertex + 3 * sizeof(float);
+  basis->stream = (double)basis->info.vertex_count * bytes > STREAM_BYTES;
+  return SUPINE_OK;
+}
+
 /* Takes the file, whatever comes of it. */
-static supine_status open_file(supine_safetensors *file, const char *name, supine_basis **result,
+static supine_status open_file(supine_safetensors *file, const char *name,
+                               const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
+  static const supine_basis_options defaults = {SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO};
   const check c = {file, name, error};
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_basis *basis = calloc(1, sizeof *basis);
@@ -240,6 +277,9 @@ static supine_status open_file(supine_safetensors *file, const char *name, supin
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }
+  if (status == SUPINE_OK) {
+    status = prepare(&c, basis, options == NULL ? &defaults : options);
+  }
   if (status != SUPINE_OK) {
     supine_basis_close(basis);
     return status;
@@ -248,20 +288,31 @@ static supine_status open_file(supine_safetensors *file, const char *name, supin
   return SUPINE_OK;
 }
 
-supine_status supine_basis_open(const char *path, supine_basis **basis, supine_error *error) {
+supine_status supine_basis_open_with(const char *path, const supine_basis_options *options,
+                                     supine_basis **basis, supine_error *error) {
   supine_safetensors *file = NULL;
   *basis = NULL;
   const supine_status status = supine_safetensors_open(path, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, path, basis, error);
+  return status != SUPINE_OK ? status : open_file(file, path, options, basis, error);
 }
 
-supine_status supine_basis_open_memory(const void *bytes, size_t size, supine_basis **basis,
-                                       supine_error *error) {
+supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
+                                            const supine_basis_options *options,
+                                            supine_basis **basis, supine_error *error) {
   static const char name[] = "basis in memory";
   supine_safetensors *file = NULL;
   *basis = NULL;
   const supine_status status = supine_safetensors_open_memory(bytes, size, name, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, name, basis, error);
+  return status != SUPINE_OK ? status : open_file(file, name, options, basis, error);
+}
+
+supine_status supine_basis_open(const char *path, supine_basis **basis, supine_error *error) {
+  return supine_basis_open_with(path, NULL, basis, error);
+}
+
+supine_status supine_basis_open_memory(const void *bytes, size_t size, supine_basis **basis,
+                                       supine_error *error) {
+  return supine_basis_open_memory_with(bytes, size, NULL, basis, error);
 }
 
 void supine_basis_close(supine_basis *basis) {
@@ -269,6 +320,7 @@ void supine_basis_close(supine_basis *basis) {
     return;
   }
   supine_safetensors_close(basis->file);
+  free(basis->tiles.bytes);
   free(basis);
 }
 

@@ -1,52 +1,96 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformed positions: x_i = p_i + s (w . c_i) d_i. */
+/* Deformed positions x_i = p_i + s (w . c_i) d_i, in runs of whole tiles of one lung. */
+#include <string.h>
+
 #include "internal.h"
 
-static float dot(const float *weights, const float *coefficients, size_t count) {
-  float sum = 0;
-  for (size_t k = 0; k < count; ++k) {
-    sum += weights[k] * coefficients[k];
+/* Moves a target on by `count` vertices. */
+static supine_target target_after(const supine_target *target, size_t count) {
+  supine_target moved = *target;
+  moved.x += target->y == NULL ? 3 * count : count;
+  if (target->y != NULL) {
+    moved.y += count;
+    moved.z += count;
   }
-  return sum;
+  return moved;
 }
 
-/* Vertices of one lung; the breath scale is in the weights. */
-static void deform_part(const supine_basis *basis, const float *weights, size_t begin, size_t end,
-                        float *xyz) {
-  const size_t modes = basis->info.mode_count;
-  for (size_t i = begin; i < end; ++i, xyz += 3) {
-    const float *rest = basis->vertices + 3 * i;
-    if (basis->info.vector) {
-      const float *c = basis->coefficients + 3 * i * modes;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        xyz[axis] = rest[axis] + dot(weights, c + axis * modes, modes);
-      }
+/* Vertices begin <= i < end, all in one tile: the tile is evaluated aside and the part copied. */
+static void deform_part(const supine_basis *basis, const float *folded, size_t begin, size_t end,
+                        const supine_target *target) {
+  float aside[TILE_NUMBERS];
+  const bool joined = target->y == NULL;
+  const supine_target whole = {aside,
+                               joined ? NULL : aside + TILE,
+                               joined ? NULL : aside + (size_t)2 * TILE,
+                               target->rest,
+                               false,
+                               true};
+  basis->kernels->deform(&basis->tiles, folded, begin / TILE, 1, &whole);
+  const size_t first = begin % TILE;
+  const size_t count = end - begin;
+  if (joined) {
+    memcpy(target->x, aside + 3 * first, 3 * count * sizeof *aside);
+  } else {
+    memcpy(target->x, aside + first, count * sizeof *aside);
+    memcpy(target->y, whole.y + first, count * sizeof *aside);
+    memcpy(target->z, whole.z + first, count * sizeof *aside);
+  }
+}
+
+/* Vertices begin <= i < end of one lung. */
+static void deform_lung(const supine_basis *basis, const float *folded, size_t begin, size_t end,
+                        const supine_target *target) {
+  size_t at = begin;
+  while (at < end) {
+    const supine_target here = target_after(target, at - begin);
+    const size_t whole = at % TILE == 0 ? (end - at) / TILE : 0;
+    if (whole > 0) {
+      basis->kernels->deform(&basis->tiles, folded, at / TILE, whole, &here);
+      at += whole * TILE;
     } else {
-      const float *d = basis->direction + 3 * i;
-      const float amount = dot(weights, basis->coefficients + i * modes, modes);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        xyz[axis] = rest[axis] + amount * d[axis];
-      }
+      const size_t next = (at / TILE + 1) * TILE;
+      const size_t last = next < end ? next : end;
+      deform_part(basis, folded, at, last, &here);
+      at = last;
     }
   }
 }
 
-void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
-                         size_t begin, size_t end, float *xyz) {
-  float scaled[SUPINE_MODES_MAX];
+static void deform_lungs(const supine_basis *basis, const double *weights, const double *scales,
+                         size_t begin, size_t end, const supine_target *target) {
+  float folded[SUPINE_MODES_MAX];
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
-      for (size_t k = 0; k < basis->info.mode_count; ++k) {
-        scaled[k] = (float)(scales[lung] * weights[k]);
-      }
-      deform_part(basis, scaled, first, last, xyz + 3 * (first - begin));
+      const supine_target here = target_after(target, first - begin);
+      supine_fold(basis, weights, scales[lung], false, folded);
+      deform_lung(basis, folded, first, last, &here);
     }
   }
+  supine_stream_fence(target->stream);
+}
+
+void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
+                         size_t begin, size_t end, float *xyz) {
+  const supine_target target = {xyz, NULL, NULL, true, basis->stream, false};
+  deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
 void supine_deform(const supine_basis *basis, const double *weights, const double *scales,
                    float *xyz) {
   supine_deform_range(basis, weights, scales, 0, basis->info.vertex_count, xyz);
+}
+
+void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
+                            size_t begin, size_t end, float *x, float *y, float *z) {
+  const supine_target target = {x, y, z, true, basis->stream, false};
+  deform_lungs(basis, weights, scales, begin, end, &target);
+}
+
+void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
+                           size_t begin, size_t end, float *xyz) {
+  const supine_target target = {xyz, NULL, NULL, false, basis->stream, false};
+  deform_lungs(basis, weights, scales, begin, end, &target);
 }

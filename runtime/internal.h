@@ -7,6 +7,11 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
+#include "tiles.h"
+
+/** Tiles and positions larger than this pass through the caches rather than stay there. */
+enum { STREAM_BYTES = 1 << 22 };
+
 struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
@@ -19,6 +24,29 @@ struct supine_basis {
   const double *linear;      /**< [G, K], mL, or NULL; likewise: */
   const double *quadratic;   /**< [G, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
+
+  supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
+  const supine_kernels *kernels;
+  bool stream; /**< positions outgrow the cache: store past it */
+  /** Of mode k: what one unit of its packed coefficients stands for. */
+  double mode_scale[SUPINE_MODES_MAX];
+  double mode_error[SUPINE_MODES_MAX]; /**< largest error by packing, mm at weight and scale 1 */
+  double mode_size[SUPINE_MODES_MAX];  /**< largest displacement, mm at weight and scale 1 */
+  double rest_error;                   /**< largest error of a rest position, mm */
+  double rest_size;                    /**< largest distance of a rest position from 0, mm */
 };
+
+/** Packs the tensors into tiles of that storage (not AUTO), in place of those before.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
+
+/** supine_basis_info.storage_error of the tiles as they are. */
+double supine_basis_storage_error(const supine_basis *basis);
+
+/** What the kernels multiply by: weights times scale times the units of the packed numbers.
+ * @param widened  for tiles of the EXACT layout that supine_kernels.widen made
+ * @param folded   [K rounded up to even] */
+void supine_fold(const supine_basis *basis, const double *weights, double scale, bool widened,
+                 float *folded);
 
 #endif

@@ -7,6 +7,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <suitesparse/umfpack.h>
+
 #include <supine/mesh.h>
 
 typedef struct full_operator {
@@ -46,7 +48,8 @@ static inline full_operator full_operator_create(const supine_mesh *mesh,
     for (size_t side = 0; side < 2; ++side) {
       const size_t mass = topology->edges[2 * k + side];
       const double *p = mesh->vertices + 3 * mass;
-      const double d = fmax(1.0, hypot(hypot(p[0] - middle[0], p[1] - middle[1]), p[2] - middle[2]));
+      const double d =
+          fmax(1.0, hypot(hypot(p[0] - middle[0], p[1] - middle[1]), p[2] - middle[2]));
       op.row[at] = mass;
       op.column[at] = n + k;
       op.value[at++] = s[mass] / d;
@@ -73,6 +76,71 @@ static inline void full_operator_free(full_operator *op) {
   free(op->column);
   free(op->value);
   free(op->own);
+}
+
+
+/* A sparse direct factorisation of I - A. */
+typedef struct direct_solver {
+  int *ap, *ai;
+  double *ax, *right, *solution;
+  void *numeric;
+} direct_solver;
+
+static inline direct_solver direct_solver_create(const full_operator *op) {
+  const int nodes = (int)op->node_count;
+  const int entries = (int)(op->entry_count + op->node_count);
+  int *ti = malloc((size_t)entries * sizeof *ti);
+  int *tj = malloc((size_t)entries * sizeof *tj);
+  double *tx = malloc((size_t)entries * sizeof *tx);
+  direct_solver d = {malloc(((size_t)nodes + 1) * sizeof(int)),
+                     malloc((size_t)entries * sizeof(int)),
+                     malloc((size_t)entries * sizeof(double)),
+                     malloc((size_t)nodes * sizeof(double)),
+                     malloc((size_t)nodes * sizeof(double)), NULL};
+  for (size_t i = 0; i < op->entry_count; ++i) {
+    ti[i] = (int)op->row[i];
+    tj[i] = (int)op->column[i];
+    tx[i] = -op->value[i];
+  }
+  for (size_t j = 0; j < op->node_count; ++j) {
+    ti[op->entry_count + j] = tj[op->entry_count + j] = (int)j;
+    tx[op->entry_count + j] = 1.0;
+  }
+  void *symbolic = NULL;
+  if (umfpack_di_triplet_to_col(nodes, nodes, entries, ti, tj, tx, d.ap, d.ai, d.ax, NULL) != 0 ||
+      umfpack_di_symbolic(nodes, nodes, d.ap, d.ai, d.ax, &symbolic, NULL, NULL) != 0 ||
+      umfpack_di_numeric(d.ap, d.ai, d.ax, symbolic, &d.numeric, NULL, NULL) != 0) {
+    abort();
+  }
+  umfpack_di_free_symbolic(&symbolic);
+  free(ti);
+  free(tj);
+  free(tx);
+  return d;
+}
+
+/* F of the masses for one applied force. */
+static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
+                                       const double *force, double *caught) {
+  for (size_t j = 0; j < op->node_count; ++j) {
+    d->right[j] = j < masses ? force[j] : 0.0;
+  }
+  if (umfpack_di_solve(UMFPACK_A, d->ap, d->ai, d->ax, d->solution, d->right, d->numeric, NULL,
+                       NULL) != 0) {
+    abort();
+  }
+  for (size_t i = 0; i < masses; ++i) {
+    caught[i] = op->own[i] * d->solution[i];
+  }
+}
+
+static inline void direct_solver_free(direct_solver *d) {
+  umfpack_di_free_numeric(&d->numeric);
+  free(d->ap);
+  free(d->ai);
+  free(d->ax);
+  free(d->right);
+  free(d->solution);
 }
 
 #endif

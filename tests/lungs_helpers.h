@@ -21,7 +21,8 @@ static inline double helper_random(uint64_t *seed) {
   return 0.5 + 0.5 * random_signed(seed);
 }
 
-/* A closed surface of 10 f^2 + 2 vertices, lumpy, nowhere symmetric, about 200 mm across, centred at x. */
+/* A closed surface of 10 f^2 + 2 vertices, lumpy, nowhere symmetric, about 200 mm across, centred
+ * at x. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
   supine_mesh mesh = {.vertex_count = supine_geodesic_vertex_count(frequency),
                       .triangle_count = supine_geodesic_triangle_count(frequency)};
@@ -30,7 +31,8 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   supine_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
-    const double radius = 80.0 + 15.0 * p[0] * p[1] + 9.0 * p[2] * p[2] * p[0] + 0.5 * helper_random(&seed);
+    const double radius =
+        80.0 + 15.0 * p[0] * p[1] + 9.0 * p[2] * p[2] * p[0] + 0.5 * helper_random(&seed);
     p[0] = x + 0.7 * radius * p[0];
     p[1] = 3.1 + 1.1 * radius * p[1];
     p[2] = -40.7 + 1.6 * radius * p[2];

@@ -19,7 +19,8 @@
 static void test_lungs_two_files_any_order_left_first(void **state) {
   (void)state;
   for (int swap = 0; swap < 2; ++swap) {
-    supine_mesh lumps[2] = {helper_lump(5, swap ? -80.0 : 90.0, 3), helper_lump(6, swap ? 90.0 : -80.0, 4)};
+    supine_mesh lumps[2] = {helper_lump(5, swap ? -80.0 : 90.0, 3),
+                            helper_lump(6, swap ? 90.0 : -80.0, 4)};
     supine_lungs lungs = {0};
     assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
     assert_int_equal(lungs.lung_count, 2);
@@ -64,7 +65,7 @@ static void test_lungs_interleaved_file_is_grouped(void **state) {
   assert_memory_equal(lungs.mesh.vertices + 3 * n, lumps[0].vertices, 3 * n * sizeof(double));
   assert_true(lungs.topology.closed);
   assert_close(supine_mesh_volume(&lungs.mesh), supine_mesh_volume(&both),
-                      1e-12 * supine_mesh_volume(&both));
+               1e-12 * supine_mesh_volume(&both));
   supine_lungs_free(&lungs);
   supine_mesh_free(&both);
   supine_mesh_free(&lumps[0]);
@@ -85,9 +86,9 @@ static void test_lungs_one_file_midline_is_inner_face(void **state) {
     for (size_t i = 0; i < lump.vertex_count; ++i) {
       supine_lungs_box_coordinates(&lungs, i, box);
       assert_close(box[0],
-                          fabs(lump.vertices[3 * i] - lungs.midline) /
-                              (lungs.maximum[0] - lungs.minimum[0]),
-                          1e-14);
+                   fabs(lump.vertices[3 * i] - lungs.midline) /
+                       (lungs.maximum[0] - lungs.minimum[0]),
+                   1e-14);
     }
     supine_lungs_free(&lungs);
     supine_mesh_free(&lump);
@@ -209,7 +210,8 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   }
   supine_volume_forms forms = {0};
   supine_volume_forms mixed = {0};
-  assert_int_equal(supine_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL), SUPINE_OK);
+  assert_int_equal(supine_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL),
+                   SUPINE_OK);
   assert_int_equal(supine_volume_forms_mix(&forms, mix, MIXED, &mixed), SUPINE_OK);
   static const double weights[COLUMNS] = {0.7, -0.2, 0.9, 0.31, 0.11};
   double cubic[3];
@@ -224,8 +226,8 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
       mixed_direct += gained(&lungs, lung, d, mixed_columns, MIXED, weights, s);
     }
     assert_close(s * (cubic[0] + s * (cubic[1] + s * cubic[2])), direct, 1e-9 * 1e3);
-    assert_close(s * (mixed_cubic[0] + s * (mixed_cubic[1] + s * mixed_cubic[2])),
-                        mixed_direct, 1e-9 * 1e3);
+    assert_close(s * (mixed_cubic[0] + s * (mixed_cubic[1] + s * mixed_cubic[2])), mixed_direct,
+                 1e-9 * 1e3);
   }
   /* lung by lung, from its own forms */
   supine_volume_forms right = {1, COLUMNS, forms.linear + COLUMNS,
@@ -233,7 +235,7 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
                                forms.cubic + COLUMNS * COLUMNS * COLUMNS};
   supine_volume_forms_contract(&right, weights, cubic);
   assert_close(2.0 * (cubic[0] + 2.0 * (cubic[1] + 2.0 * cubic[2])),
-                      gained(&lungs, 1, d, columns, COLUMNS, weights, 2.0), 1e-9 * 1e3);
+               gained(&lungs, 1, d, columns, COLUMNS, weights, 2.0), 1e-9 * 1e3);
   supine_volume_forms_free(&forms);
   supine_volume_forms_free(&mixed);
   supine_lungs_free(&lungs);

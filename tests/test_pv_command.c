@@ -161,7 +161,7 @@ static void test_command_failures_have_their_exit_codes(void **state) {
   expect_printed("one file of samples");
   assert_int_equal(RUN(STDERR_FILENO, "fit", good, bad), 1);
   assert_int_equal(RUN(STDERR_FILENO, "draw", good), 1);
-  expect_printed("not draw");
+  expect_printed("not 'draw'");
   assert_int_equal(run(STDERR_FILENO, (const char *const[]){NULL}), 1);
   assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "1"), 1);
   assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "x"), 1);

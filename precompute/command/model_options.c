@@ -27,8 +27,35 @@ const char supine_model_options_help[] =
     "Direction of displacement:\n"
     "  --direction MODEL    box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
     "  --constants C1,...,C6  of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to\n"
-    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law explains\n"
-    "                       61 to 87 % of the squared displacement. (The paper's own are lost.)\n";
+    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law "
+    "explains\n"
+    "                       61 to 87 % of the squared displacement. (The paper's own are lost.)\n"
+    "\n"
+    "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only ratios\n"
+    "count: a = 2 beside a = 1 is twice as expandable, doubling all of them changes nothing.\n"
+    "  --expandability uniform   (default)\n"
+    "  --expandability linear:AXIS:FROM:TO, exp:AXIS:FROM:TO\n"
+    "                       a goes from FROM to TO in a straight line, or by equal ratios, along\n"
+    "                       AXIS: x from the midline outwards, y from the back to the front, z\n"
+    "                       from the apex to the base; linear:z:0.5:1.5 expands most at the base\n"
+    "  --expandability FILE a of every vertex, CSV: a header line, then one value a line in the\n"
+    "                       order of the vertices (left lung first, each as its file first names\n"
+    "                       them: the order that 'supine solve' writes), or vertex,value counted\n"
+    "                       from 0\n"
+    "  --lesion X,Y,Z,RADIUS,FACTOR   a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to "
+    "half\n"
+    "                       of RADIUS (mm), less and less from there, and not at all from RADIUS\n"
+    "                       on. Above 1 stiffens: it moves less; 1 changes nothing. May be "
+    "repeated\n"
+    "  --lung SIDE:SHARE    left or right lung collapsed (pneumothorax): its resting volume, and "
+    "what\n"
+    "                       it takes of a breath, are SHARE (0 to 1) of what they were; a "
+    "breath's\n"
+    "                       volume stays exact, the other lung takes the rest\n"
+    "  --reach MM           forces spread over this length along the surface, whatever the mesh\n"
+    "                       (about exp(-r/MM)); default: over a few links, as in the paper, so "
+    "that\n"
+    "                       a finer mesh spreads less\n";
 
 supine_model_options supine_model_options_default(void) {
   return (supine_model_options){.model = supine_model_default()};
@@ -68,6 +95,63 @@ static bool parse_direction(const char *text, supine_direction_model *model) {
     }
   }
   return false;
+}
+
+/* "linear:z:0.5:1.5"; anything without such a beginning names a file. False where the rest of it is
+ * not understood. */
+static bool parse_expandability(const char *text, supine_model_options *options) {
+  options->expandability = NULL;
+  options->law = (supine_expandability_law){0};
+  if (strcmp(text, "uniform") == 0) {
+    return true;
+  }
+  if (strncmp(text, "linear:", strlen("linear:")) == 0) {
+    options->law.shape = SUPINE_EXPANDABILITY_LINEAR;
+  } else if (strncmp(text, "exp:", strlen("exp:")) == 0) {
+    options->law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
+  } else {
+    options->expandability = text;
+    return true;
+  }
+  const char *at = strchr(text, ':') + 1;
+  if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
+    return false;
+  }
+  options->law.axis = at[0] - 'x';
+  char numbers[128];
+  (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
+  char *colon = strchr(numbers, ':');
+  if (colon == NULL) {
+    return false;
+  }
+  *colon = '\0';
+  return supine_parse_number(numbers, &options->law.from) &&
+         supine_parse_number(colon + 1, &options->law.to) && options->law.from > 0.0 &&
+         options->law.to > 0.0;
+}
+
+static bool parse_lesion(const char *text, supine_model_options *options) {
+  double v[5];
+  if (options->lesion_count == MODEL_LESIONS_MAX || !supine_parse_numbers(text, 5, v) ||
+      !(v[3] > 0.0) || !(v[4] > 0.0)) {
+    return false;
+  }
+  options->lesions[options->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
+  return true;
+}
+
+/* "left:0.3" */
+static bool parse_lung(const char *text, supine_model_options *options) {
+  const char *colon = strchr(text, ':');
+  const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
+  const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
+  double share;
+  if (!(left || right) || !supine_parse_number(colon + 1, &share) ||
+      !(share > 0.0 && share <= 1.0)) {
+    return false;
+  }
+  *(left ? &options->left_share : &options->right_share) = share;
+  return true;
 }
 
 int supine_model_options_take(supine_model_options *options, const char *command, int option,
@@ -110,6 +194,28 @@ int supine_model_options_take(supine_model_options *options, const char *command
     wanted = supine_parse_numbers(value, 6, options->model.direction.c)
                  ? NULL
                  : "--constants takes six numbers, C1,C2,C3,C4,C5,C6";
+    break;
+  case OPTION_EXPANDABILITY:
+    wanted =
+        parse_expandability(value, options)
+            ? NULL
+            : "--expandability takes uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS "
+              "x, y or z and both ends above 0, or a file";
+    break;
+  case OPTION_LESION:
+    wanted = parse_lesion(value, options)
+                 ? NULL
+                 : "--lesion (at most 64) takes X,Y,Z,RADIUS,FACTOR, the last two above 0";
+    break;
+  case OPTION_LUNG:
+    wanted = parse_lung(value, options)
+                 ? NULL
+                 : "--lung takes left:SHARE or right:SHARE, above 0 and at most 1";
+    break;
+  case OPTION_REACH:
+    wanted = supine_parse_number(value, &options->reach) && options->reach > 0.0
+                 ? NULL
+                 : "--reach takes a length in mm above 0";
     break;
   default:
     break;
@@ -157,7 +263,78 @@ static void mention(const char *command, const char *path, const supine_mesh_rep
   }
 }
 
-int supine_model_load(const supine_model_options *options, const char *command, char **paths,
+static supine_status set_expandability(supine_model_options *options, const supine_lungs *lungs,
+                                       supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->expandability == NULL && options->law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
+    return SUPINE_OK;
+  }
+  options->stiffness = malloc(n * sizeof *options->stiffness);
+  double *a = options->stiffness;
+  if (a == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  options->model.stiffness = a;
+  supine_status status = options->expandability != NULL
+                             ? supine_expandability_load(options->expandability, n, a, error)
+                             : supine_expandability_regional(lungs, &options->law, a, error);
+  if (status == SUPINE_OK) {
+    status = supine_expandability_stiffness(n, a, a, error);
+  }
+  return status;
+}
+
+static supine_status set_lesions(const supine_model_options *options, const char *command,
+                                 supine_lungs *lungs, supine_error *error) {
+  for (size_t l = 0; l < options->lesion_count; ++l) {
+    const supine_lesion *lesion = &options->lesions[l];
+    size_t reached = 0;
+    const supine_status status = supine_lungs_add_lesion(lungs, lesion, &reached, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    if (reached == 0) {
+      supine_command_say(
+          command,
+          "warning: the lesion at %g,%g,%g is outside the lungs: no vertex within its "
+          "%g mm, so it changes nothing",
+          lesion->centre[0], lesion->centre[1], lesion->centre[2], lesion->radius);
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status set_shares(const supine_model_options *options, supine_lungs *lungs,
+                                supine_error *error) {
+  static const char *const names[] = {"left", "right"};
+  const double shares[] = {options->left_share, options->right_share};
+  for (size_t side = 0; side < 2; ++side) {
+    size_t lung = 0;
+    while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
+      ++lung;
+    }
+    if (shares[side] == 0.0) {
+      continue;
+    }
+    if (lung == lungs->lung_count) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
+                              names[side], names[side]);
+    }
+    const supine_status status = supine_lungs_collapse(lungs, lung, shares[side], error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+  }
+  return SUPINE_OK;
+}
+
+void supine_model_options_free(supine_model_options *options) {
+  free(options->stiffness);
+  options->stiffness = NULL;
+  options->model.stiffness = NULL;
+}
+
+int supine_model_load(supine_model_options *options, const char *command, char **paths,
                       size_t count, supine_lungs *lungs) {
   int result = SUPINE_EXIT_OK;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
@@ -186,6 +363,12 @@ int supine_model_load(const supine_model_options *options, const char *command, 
                        "inconsistent edges): no volumes, only --scale",
                        lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
                        lungs->topology.inconsistent_edges);
+  }
+  lungs->reach = options->reach;
+  if (set_expandability(options, lungs, &error) != SUPINE_OK ||
+      set_lesions(options, command, lungs, &error) != SUPINE_OK ||
+      set_shares(options, lungs, &error) != SUPINE_OK) {
+    result = supine_command_fail(command, &error);
   }
 cleanup:
   for (size_t i = 0; work.meshes != NULL && i < count; ++i) {

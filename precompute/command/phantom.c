@@ -66,8 +66,9 @@ int supine_command_phantom(int argc, char **argv) {
   supine_mesh mesh = {0};
   supine_error error;
   int result = SUPINE_EXIT_OK;
-  const supine_mesh_save_options save = {.comment = "made lungs, mm; shape after Chaste's lung test "
-                                                    "data (BSD-3-Clause, University of Oxford)"};
+  const supine_mesh_save_options save = {.comment =
+                                             "made lungs, mm; shape after Chaste's lung test "
+                                             "data (BSD-3-Clause, University of Oxford)"};
   if (supine_phantom_create(vertices, volume, &mesh, &error) != SUPINE_OK ||
       supine_mesh_save(path, &mesh, &save, &error) != SUPINE_OK) {
     result = supine_command_fail(name, &error);

@@ -206,7 +206,8 @@ static int run_show(const char *path, const options *chosen) {
   if (status == SUPINE_OK) {
     status = print_row(&pv, high, &error);
   }
-  return status == SUPINE_OK ? supine_command_finish(command) : supine_command_fail(command, &error);
+  return status == SUPINE_OK ? supine_command_finish(command)
+                             : supine_command_fail(command, &error);
 }
 
 int supine_command_pv(int argc, char **argv) {
@@ -225,7 +226,8 @@ int supine_command_pv(int argc, char **argv) {
       break;
     case 'c':
       if (!parse_positive(optarg, &chosen.confidence) || chosen.confidence >= 1.0) {
-        return supine_command_usage(command, "--confidence wants a number between 0 and 1, not '%s'", optarg);
+        return supine_command_usage(
+            command, "--confidence wants a number between 0 and 1, not '%s'", optarg);
       }
       break;
     case 'j':
@@ -233,7 +235,8 @@ int supine_command_pv(int argc, char **argv) {
       break;
     case 's':
       if (!parse_positive(optarg, &chosen.step)) {
-        return supine_command_usage(command, "--step wants a positive number of cmH2O, not '%s'", optarg);
+        return supine_command_usage(command, "--step wants a positive number of cmH2O, not '%s'",
+                                    optarg);
       }
       break;
     case 'h':

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/disease.h>
 #include <supine/output.h>
 #include <supine/volume.h>
 
@@ -51,7 +52,7 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (column == NULL ||
-      supine_network_create(&lungs->mesh, &lungs->topology, &network) != SUPINE_OK ||
+      supine_lungs_network(lungs, &network) != SUPINE_OK ||
       supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
@@ -82,8 +83,10 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                                     const double g[3], supine_error *error) {
   supine_solution solution = {0};
   supine_mesh deformed = lungs->mesh;
+  supine_mesh rest = lungs->mesh;
   double scale = 1.0;
   deformed.vertices = NULL;
+  rest.vertices = NULL;
   supine_status status = supine_solve(lungs, &wanted->model.model, g, &solution, error);
   if (status != SUPINE_OK) {
     goto cleanup;
@@ -106,31 +109,34 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   }
   scale = wanted->has_scale ? wanted->scale / largest : scale;
   deformed.vertices = malloc(3 * deformed.vertex_count * sizeof(double));
-  if (deformed.vertices == NULL) {
+  rest.vertices = malloc(3 * rest.vertex_count * sizeof(double));
+  if (deformed.vertices == NULL || rest.vertices == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_solution_apply(&solution, &lungs->mesh, scale, deformed.vertices);
-  const supine_mesh_save_options save = {.rest = lungs->mesh.vertices};
+  supine_lungs_rest(lungs, rest.vertices);
+  supine_solution_apply(&solution, &rest, scale, deformed.vertices);
+  const supine_mesh_save_options save = {.rest = rest.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
-    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm", wanted->path,
-                 g[0], g[1], g[2], scale, fabs(scale) * largest);
+    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
+                 wanted->path, g[0], g[1], g[2], scale, fabs(scale) * largest);
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",
-                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&lungs->mesh)));
+                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
     }
     (void)printf("; %zu steps to residual %.1e\n", solution.report.iterations,
                  solution.report.residual);
   }
 cleanup:
   free(deformed.vertices);
+  free(rest.vertices);
   supine_solution_free(&solution);
   return status;
 }
 
-static int run(const request *wanted, char **paths, size_t count) {
+static int run(request *wanted, char **paths, size_t count) {
   double g[3] = {0.0, 0.0, 0.0};
   int result = SUPINE_EXIT_OK;
   if (!wanted->has_vertex) {
@@ -147,6 +153,7 @@ static int run(const request *wanted, char **paths, size_t count) {
     result = status == SUPINE_OK ? supine_command_finish(name) : supine_command_fail(name, &error);
   }
   supine_lungs_free(&lungs);
+  supine_model_options_free(&wanted->model);
   return result;
 }
 

@@ -57,7 +57,8 @@ bool supine_parse_numbers(const char *text, size_t count, double *values);
 const char *supine_suggest(const char *text, const char *const *candidates, size_t count);
 
 /* The value that follows option `name`, or a usage error that names what is missing is printed by
- * getopt_long itself: commands pass ":" first in their short options and call this on '?' and ':'. */
+ * getopt_long itself: commands pass ":" first in their short options and call this on '?' and ':'.
+ */
 int supine_command_bad_option(const char *command, const struct option *options, int result,
                               char **argv);
 

@@ -29,7 +29,8 @@ static const char examples[] =
     "\n"
     "Examples:\n"
     "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
-    "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 -o out.ply\n";
+    "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 -o "
+    "out.ply\n";
 
 typedef struct request {
   supine_orientation orientation;
@@ -130,12 +131,10 @@ cleanup:
 
 int supine_command_deform(int argc, char **argv) {
   enum { VOLUME = OPTION_ORIENTATION_END, SCALE };
-  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                          {"volume", required_argument, NULL, VOLUME},
-                                          {"scale", required_argument, NULL, SCALE},
-                                          SUPINE_ORIENTATION_OPTIONS,
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
+  static const struct option options[] = {
+      {"output", required_argument, NULL, 'o'},  {"volume", required_argument, NULL, VOLUME},
+      {"scale", required_argument, NULL, SCALE}, SUPINE_ORIENTATION_OPTIONS,
+      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
   request wanted = {0};
   int option;
   opterr = 0;
@@ -190,9 +189,10 @@ int supine_command_deform(int argc, char **argv) {
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
+  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT}; /* one frame, for a file */
   supine_basis *basis = NULL;
   supine_error error;
-  if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
+  if (supine_basis_open_with(argv[optind], &exact, &basis, &error) != SUPINE_OK) {
     return supine_command_fail(name, &error);
   }
   result = deform(basis, &wanted, gravity);

@@ -16,11 +16,13 @@ static const char name[] = "info";
 static const char help[] =
     "Usage: supine info BASIS [--json]\n"
     "\n"
-    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, and\n"
+    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, "
+    "and\n"
     "its error, measured against the full solve on directions that no grid used.\n"
     "\n"
     "Energy per band is the share of the squared displacement, over all orientations, that the\n"
-    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands beyond\n"
+    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands "
+    "beyond\n"
     "l = 0 are what makes prone more than the reverse of supine.\n"
     "\n"
     "  --json               the same for programs\n";
@@ -71,12 +73,12 @@ static bool band_energy(const supine_safetensors *file, const supine_basis_info 
   return true;
 }
 
-static const char *const shown[] = {"force",        "direction",    "direction_constants",
-                                    "stiffness",    "midline_mm",   "rest_volume_ml",
-                                    "made_by"};
-static const char *const errors[] = {
-    "error_directions", "error_rms_percent", "error_p95_percent", "error_max_percent",
-    "error_volume_ml",  "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+static const char *const shown[] = {
+    "route",     "force",      "direction",      "direction_constants",
+    "stiffness", "midline_mm", "rest_volume_ml", "made_by"};
+static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
+                                     "error_max_percent", "error_volume_ml",   "error_rms_mm",
+                                     "error_p95_mm",      "error_max_mm"};
 
 static const char *text_of(const supine_basis *basis, const char *key) {
   const char *value = supine_basis_metadata(basis, key);
@@ -90,26 +92,32 @@ static void print_text(const char *path, const supine_basis *basis, const double
                info->vector ? "vector" : "scalar");
   (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
                info->has_volume ? "closed: volumes are exact" : "open: no volumes");
-  (void)printf("  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
-               info->mode_count,
-               strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
-               info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
-               info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
+  (void)printf(
+      "  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
+      info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
+      info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
+      info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
   for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
     if (supine_basis_metadata(basis, shown[i]) != NULL) {
       (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
     }
   }
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
-    (void)printf("\nError against the full solve, on %s directions that no grid used:\n"
+    (void)printf("\nError against the full fields, on %s directions%s:\n"
                  "             RMS   95th percentile   largest\n"
                  "  %%   %10s   %15s   %7s   of the RMS displacement\n",
-                 text_of(basis, "error_directions"), text_of(basis, "error_rms_percent"),
-                 text_of(basis, "error_p95_percent"), text_of(basis, "error_max_percent"));
-    if (supine_basis_metadata(basis, "error_volume_ml") != NULL) {
-      (void)printf("  mm  %10s   %15s   %7s   at %s mL\n", text_of(basis, "error_rms_mm"),
+                 text_of(basis, "error_directions"),
+                 supine_basis_metadata(basis, "error_method") != NULL
+                     ? ", each predicted from the others"
+                     : " that no grid used",
+                 text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
+                 text_of(basis, "error_max_percent"));
+    if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
+      const char *volume = supine_basis_metadata(basis, "error_volume_ml");
+      (void)printf("  mm  %10s   %15s   %7s   %s%s%s\n", text_of(basis, "error_rms_mm"),
                    text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"),
-                   text_of(basis, "error_volume_ml"));
+                   volume != NULL ? "at " : "of the fields as given", volume != NULL ? volume : "",
+                   volume != NULL ? " mL" : "");
     }
   }
   (void)puts("\nEnergy per band:");
@@ -125,12 +133,53 @@ static void print_text(const char *path, const supine_basis *basis, const double
   (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
 }
 
+/* A tensor of errors in the file, or NULL. */
+static const double *error_list(const supine_safetensors *file, const char *key, size_t *count) {
+  const supine_tensor *tensor = supine_safetensors_find(file, key);
+  if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {
+    *count = 0;
+    return NULL;
+  }
+  *count = tensor->shape[0];
+  return tensor->data;
+}
+
+/* Error against the number of functions of orientation, each a multiplication per vertex. */
+static void print_table(const supine_safetensors *file) {
+  size_t bands;
+  size_t modes;
+  const double *harmonics = error_list(file, "error_harmonics", &bands);
+  const double *best = error_list(file, "error_modes", &modes);
+  if (harmonics == NULL || best == NULL) {
+    return;
+  }
+  (void)puts("\nRMS error against the number of multiplications:\n"
+             "             first harmonics     best modes");
+  for (size_t k = 1, l = 0; k <= modes || (l < bands && (l + 1) * (l + 1) <= 64); ++k) {
+    const bool square = l < bands && (l + 1) * (l + 1) == k;
+    if (square || k <= modes) {
+      (void)printf("  %4zu + 3  ", k);
+      if (square) {
+        (void)printf("  %8.3f %% (l <= %zu)", 100.0 * harmonics[l], l);
+        ++l;
+      } else {
+        (void)printf("%22s", "");
+      }
+      if (k <= modes) {
+        (void)printf("  %7.3f %%", 100.0 * best[k - 1]);
+      }
+      (void)putchar('\n');
+    }
+  }
+}
+
 static json_t *number_or_text(const char *text) {
   double value;
   return supine_parse_number(text, &value) ? json_real(value) : json_string(text);
 }
 
-static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
+static bool print_json(const char *path, const supine_basis *basis, const supine_safetensors *file,
+                       const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   json_t *bands = json_array();
   json_t *error = json_object();
@@ -143,17 +192,27 @@ static bool print_json(const char *path, const supine_basis *basis, const double
       (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
     }
   }
-  json_t *root = json_pack(
-      "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
-      text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
-      (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
-      (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
-      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band", bands,
-      "error", error);
+  json_t *root =
+      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
+                text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
+                (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
+                (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
+                (int)info->has_volume, "kind", info->vector ? "vector" : "scalar",
+                "energy_per_band", bands, "error", error);
   bool good = root != NULL;
   for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
     const char *value = supine_basis_metadata(basis, shown[i]);
     good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
+  }
+  for (size_t i = 0; good && i < 2; ++i) {
+    static const char *const keys[] = {"error_harmonics", "error_modes"};
+    size_t count;
+    const double *values = error_list(file, keys[i], &count);
+    json_t *list = json_array();
+    for (size_t k = 0; values != NULL && k < count; ++k) {
+      (void)json_array_append_new(list, json_real(values[k]));
+    }
+    good = json_object_set_new(root, keys[i], list) == 0;
   }
   good = good && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
   (void)putchar('\n');
@@ -199,13 +258,14 @@ int supine_command_info(int argc, char **argv) {
     result = SUPINE_EXIT_NUMERICAL;
     goto cleanup;
   }
-  if (json && !print_json(path, basis, energy)) {
+  if (json && !print_json(path, basis, file, energy)) {
     supine_command_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
   if (!json) {
     print_text(path, basis, energy);
+    print_table(file);
   }
   result = supine_command_finish(name);
 cleanup:

@@ -9,11 +9,14 @@
 
 const char supine_orientation_help[] =
     "Where gravity points (one of the first three):\n"
-    "  --posture NAME       supine, prone, left, right (lying on that side), upright, inverted, or\n"
+    "  --posture NAME       supine, prone, left, right (lying on that side), upright, inverted, "
+    "or\n"
     "                       a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR\n"
-    "  --gravity X,Y,Z      a direction in body axes: x to the left, y to the back, z to the head;\n"
+    "  --gravity X,Y,Z      a direction in body axes: x to the left, y to the back, z to the "
+    "head;\n"
     "                       supine is 0,1,0\n"
-    "  --quaternion W,X,Y,Z rotation from body axes to a world whose z points up; 1,0,0,0 is upright\n"
+    "  --quaternion W,X,Y,Z rotation from body axes to a world whose z points up; 1,0,0,0 is "
+    "upright\n"
     "  --tilt DEGREES       turns gravity in the sagittal plane from the back towards the head:\n"
     "                       from supine, 15 is Trendelenburg, head down\n";
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The options that say where gravity points: the same for every command that needs one direction. */
+/* The options that say where gravity points: the same for every command that needs one direction.
+ */
 #ifndef SUPINE_ORIENTATION_H
 #define SUPINE_ORIENTATION_H
 
@@ -17,8 +18,9 @@ enum {
 #define SUPINE_ORIENTATION_OPTIONS                                                                 \
   {"posture", required_argument, NULL, OPTION_POSTURE},                                            \
       {"gravity", required_argument, NULL, OPTION_GRAVITY},                                        \
-      {"quaternion", required_argument, NULL, OPTION_QUATERNION},                                  \
-      {"tilt", required_argument, NULL, OPTION_TILT}
+      {"quaternion", required_argument, NULL, OPTION_QUATERNION}, {                                \
+    "tilt", required_argument, NULL, OPTION_TILT                                                   \
+  }
 
 /* What they add to a command's help. */
 extern const char supine_orientation_help[];
@@ -37,8 +39,8 @@ int supine_orientation_take(supine_orientation *orientation, const char *command
 /* Reads a posture's name; unknown ones are answered with the nearest. */
 int supine_orientation_posture(const char *command, const char *name, double gravity[3]);
 
-/* The unit direction of gravity, tilt included; supine where only a tilt was given. Where nothing was given at
- * all: a usage error. */
+/* The unit direction of gravity, tilt included; supine where only a tilt was given. Where nothing
+ * was given at all: a usage error. */
 int supine_orientation_finish(const supine_orientation *orientation, const char *command,
                               double gravity[3]);
 

@@ -41,7 +41,7 @@ typedef struct supine_mesh_load_options {
 /** What loading found and did. */
 typedef struct supine_mesh_report {
   size_t file_vertices;         /**< vertices as the importer gave them */
-  size_t file_faces;            /**< faces as the importer gave them */
+  size_t file_faces;            /**< faces as the importer gave them, polygons cut to triangles */
   size_t welded_vertices;       /**< vertices that joined an earlier one at the same position */
   size_t degenerate_faces;      /**< faces dropped: two corners at one vertex, or not a triangle */
   size_t unreferenced_vertices; /**< vertices dropped: no triangle names them */
@@ -55,6 +55,11 @@ typedef struct supine_mesh_report {
 /** Reads one surface: everything that assimp reads; polygons are cut into triangles, all nodes of
  * a scene are joined, vertices at the same position are welded in order of first appearance.
  *
+ * PLY, STL, OBJ and OFF files are checked against their own counts first, so that a truncated or
+ * hostile one is refused; other formats are as safe as assimp's importers. Positions are float32,
+ * as assimp reads them. A name without a known ending is read as PLY, STL or OFF where it begins
+ * with that word.
+ *
  * @param path     file
  * @param options  NULL: defaults
  * @param mesh     zero-initialised; written on success alone
@@ -62,8 +67,10 @@ typedef struct supine_mesh_report {
  * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
  * @retval SUPINE_ERROR_FORMAT  empty, truncated or malformed, or no importer for it
  * @retval SUPINE_ERROR_MESH    no triangles, a coordinate that is not finite (vertex named)
+ * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit negative or not finite
  * @retval SUPINE_ERROR_MEMORY
- * Thread-safe: several files can load at once. */
+ * Thread-safe: several files can be under way at once. Binary PLY and STL are parsed at the same
+ * time, other formats one at a time, as assimp has one error string for the whole process. */
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
@@ -80,21 +87,24 @@ typedef struct supine_topology {
   size_t component_count;    /**< connected components, over shared vertices */
   uint32_t *component;       /**< [vertex_count] component of each vertex, 0 the first to appear */
   long euler_characteristic; /**< V - E + F */
-  long genus;  /**< (2 * components - euler_characteristic) / 2 where closed, else -1 */
+  long genus;  /**< (2 * components - euler_characteristic) / 2 where closed, else -1; -1 also where
+                    parts touch in single vertices so that this is no whole number >= 0 */
   bool closed; /**< every edge joins exactly two triangles, consistently */
 } supine_topology;
 
-/** Finds edges and components. Linear in time and memory but for the sort of the edges.
+/** Finds edges and components. Linear in time and memory but for the sort of a vertex's edges.
  * @param topology  zero-initialised; written on success alone
+ * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or one that is not there (load
+ *                                gives no such mesh), or more than 2^31 - 1 vertices
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_topology_free(supine_topology *topology);
 
 /** Enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed, positive where
- * the triangles face outwards; meaningful on closed surfaces alone. */
+ * the triangles face outwards; meaningful on closed surfaces alone; 0 where there is nothing. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Axis-aligned box, mm. */
+/** Axis-aligned box, mm; zeros where there is no vertex. */
 void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
 /** One third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
@@ -110,7 +120,9 @@ typedef struct supine_mesh_save_options {
 
 /** Writes the surface as the name's ending says: .ply (binary), .obj, .stl (binary), .vtp.
  * The file appears whole or not at all: written to a temporary name beside it, then renamed.
- * @retval SUPINE_ERROR_ARGUMENT  an ending that is none of these
+ * @param options  NULL: LPS, no displacement, no comment
+ * @retval SUPINE_ERROR_ARGUMENT  an ending that is none of these, or too large for the formats
+ * @retval SUPINE_ERROR_MESH      a coordinate that is not finite (vertex named)
  * @retval SUPINE_ERROR_WRITE     no such folder, no permission, full disk */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);

@@ -17,13 +17,24 @@
  * a symmetric positive definite system of small condition number, solved by conjugate gradients
  * with Jacobi scaling.
  *
+ * The transfer spreads over links, and the share that a mass catches falls with its number of
+ * links, so results drift as links shrink. A reach R in mm takes the drift away. It is the same
+ * transfer with other link weights: a mass's weight to itself, above 1 / D(j, j) = 1, is its area
+ * over the mean area, own_j; a spring's is 0; and 1 / D(j, l) is
+ *
+ *     w = 4 (R^2 / mean area) a / h^2      a: a third of the link's triangles' area, h its length
+ *
+ * Columns still sum to 1, the matrix stays symmetric positive definite, and for E = 1 it is a
+ * discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance decays as exp(-r / R)
+ * whatever the mesh. What balances is then own F: sum of own_i F_i = sum of own_i f_i.
+ *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
  * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf. Technol.
  * Biomed. 12(2), 2008. */
 #ifndef SUPINE_EQUILIBRIUM_H
 #define SUPINE_EQUILIBRIUM_H
 
-#include <supine/mesh.h>
+#include <supine/lungs.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -43,6 +54,11 @@ typedef struct supine_network supine_network;
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_network_create(const supine_mesh *mesh, const supine_topology *topology,
                                     supine_network **network);
+
+/** The network of lungs as they are, with their lesions and their reach: what solves are set up
+ * with. The number of steps of a solve grows as R over the links' length.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **network);
 void supine_network_destroy(supine_network *network);
 size_t supine_network_vertex_count(const supine_network *network);
 
@@ -76,14 +92,14 @@ typedef struct supine_solve_report {
  * @param catch_     [N, count] F, written
  * @param report     optional
  * @retval SUPINE_ERROR_ARGUMENT   count out of range
- * @retval SUPINE_ERROR_NUMERICAL  200 steps did not reach the tolerance */
+ * @retval SUPINE_ERROR_NUMERICAL  200 steps (20,000 with a reach) did not reach the tolerance */
 supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                        const double *force, double tolerance, bool warm,
                                        double *catch_, supine_solve_report *report,
                                        supine_error *error);
 
 /** What the spring nodes caught in the last solve, [edge_count, count] in the topology's order:
- * with the masses' catch it sums to the sum of f. */
+ * with the masses' catch it sums to the sum of f. 0 with a reach. */
 void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
                                      const supine_topology *topology, double *catch_);
 

@@ -5,6 +5,7 @@
 #define SUPINE_PRECOMPUTE_H
 
 #include <supine/accuracy.h>
+#include <supine/fields.h>
 #include <supine/force.h>
 #include <supine/projection.h>
 
@@ -40,25 +41,35 @@ void supine_solution_free(supine_solution *solution);
 /** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
 double supine_solution_largest(const supine_solution *solution);
 
-/** Positions p + s F d, [N, 3], mm. */
+/** Positions p + s F d, [N, 3], mm, from the surface at rest (disease.h: that of healthy lungs is
+ * their mesh). */
 void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
                            double *positions);
+
+/** How the field over orientation is found. */
+typedef enum supine_route {
+  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it */
+  SUPINE_ROUTE_LINEAR,   /**< needs soften = 0 */
+  SUPINE_ROUTE_SAMPLED
+} supine_route;
 
 /** What a basis is made of. */
 typedef struct supine_precompute_options {
   supine_model model;
-  size_t band;                        /**< L */
-  size_t modes;                       /**< K; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;                    /**< directions that the error is measured on; 0: 100 */
-  const char *made_by;                /**< how it was made, for the file's metadata; optional */
+  supine_route route;
+  size_t band;         /**< L */
+  size_t modes;        /**< most modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;     /**< directions that the error is measured on; 0: 100 to 1000 */
+  const char *made_by; /**< how it was made, for the file's metadata; optional */
   supine_progress_function *progress; /**< optional */
   void *progress_context;
 } supine_precompute_options;
 
 /** What came of it. */
 typedef struct supine_precompute_report {
+  supine_route route;
   size_t mode_count;
-  size_t solve_count;
+  size_t solve_count; /**< right-hand sides or directions solved for the projection */
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
@@ -69,6 +80,14 @@ typedef struct supine_precompute_report {
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
+
+/** The same from another simulator's fields: fits, compresses, cross-validates, writes. Breath scale 1
+ * gives the fields as they were; closed surfaces can be asked for volumes.
+ * @param made_by  how, for the file's metadata; optional */
+supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
+                                       const supine_fit_options *options, const char *made_by,
+                                       const char *path, supine_fit_report *report,
+                                       size_t *mode_count, supine_error *error);
 
 #ifdef __cplusplus
 }

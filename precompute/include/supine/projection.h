@@ -42,6 +42,28 @@ supine_status supine_project_linear(const supine_lungs *lungs, const supine_forc
                                     const double *stiffness, size_t band,
                                     supine_projection *projection, supine_error *error);
 
+/** The same with a rule of latitudes x longitudes directions instead of the default, which is eight
+ * times finer than the band. */
+supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
+                                         const double *stiffness, size_t band, size_t latitudes,
+                                         size_t longitudes, supine_projection *projection,
+                                         supine_error *error);
+
+/** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
+ * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
+ * coefficients themselves; memory is one ring of fields and those.
+ * @param tolerance  relative residual of each solve; 0: the solver's default
+ * @param progress   optional
+ * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+supine_status supine_project_sampled(const supine_lungs *lungs, const supine_force_law *law,
+                                     const double *stiffness, size_t band, double tolerance,
+                                     supine_progress_function *progress, void *context,
+                                     supine_projection *projection, supine_error *error);
+
+/** Most functions of orientation that a basis is made with. */
+enum { SUPINE_MODES_MADE_MAX = 64 };
+
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */
 typedef struct supine_compression {
@@ -56,6 +78,7 @@ typedef struct supine_compression {
 void supine_compression_free(supine_compression *compression);
 
 /** The harmonics themselves as modes: K = (band + 1)^2, the paper's form.
+ * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_compress_harmonics(const supine_projection *projection,
                                         supine_compression *compression, supine_error *error);
@@ -64,7 +87,8 @@ supine_status supine_compress_harmonics(const supine_projection *projection,
  * coefficient matrix, from the Gram matrix of the columns.
  *
  * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
- * @param mode_max   most modes, 1 to 256; fewer come back where the matrix has lower rank
+ * @param mode_max   most modes, 1 to SUPINE_MODES_MADE_MAX; fewer come back where the matrix has
+ * lower rank
  * @param singular   [mode_max] singular values of the modes that came back, falling, 0 beyond;
  * optional
  * @param total      sum of the squares of all singular values; optional

@@ -27,8 +27,8 @@ typedef struct supine_volume_forms {
 
 void supine_volume_forms_free(supine_volume_forms *forms);
 
-/** Forms of closed lungs.
- * @param directions  [N, 3] d, mm
+/** Forms of closed lungs; a collapsed lung's are its share of its healthy ones (disease.h).
+ * @param directions  [N, 3] d of the healthy shape, mm
  * @param columns     [N, count] c
  * Cost: count^3 multiplications a triangle. Uses all cores.
  * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
@@ -36,6 +36,12 @@ void supine_volume_forms_free(supine_volume_forms *forms);
 supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
                                          const double *columns, size_t count,
                                          supine_volume_forms *forms, supine_error *error);
+
+/** The same for vector fields, u_i = s sum over k of w_k c_ik with c_ik of three components.
+ * @param columns  [N, 3, count] */
+supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
+                                                size_t count, supine_volume_forms *forms,
+                                                supine_error *error);
 
 /** Forms for the columns c' = c x mix, mix [K, count].
  * @retval SUPINE_ERROR_MEMORY */

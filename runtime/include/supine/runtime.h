@@ -3,8 +3,7 @@
  * The run-time library: open a basis file, then deform its lungs for any direction of gravity and
  * any volume.
  *
- *     u_i = s * (sum over k of w_k(g) c_ik) * d_i          w_k(g) = sum over lm of modes[k, lm]
- * Y_lm(g)
+ *     u_i = s (sum over k of w_k(g) c_ik) d_i        w_k(g) = sum over lm of modes[k, lm] Y_lm(g)
  *
  * Nothing allocates, reads files or locks after opening; any number of threads may use one basis.
  * Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0),
@@ -29,6 +28,31 @@ enum { SUPINE_LUNGS_MAX = 16 };
 
 typedef struct supine_basis supine_basis;
 
+/** How an open basis keeps its numbers in memory. The file always has float32. */
+typedef enum supine_storage {
+  SUPINE_STORAGE_AUTO = 0, /**< INT16 where its error is at most 0.005 mm, else EXACT */
+  SUPINE_STORAGE_EXACT,    /**< everything as in the file */
+  SUPINE_STORAGE_FLOAT32,  /**< float32 coefficients; compact directions and rest positions */
+  SUPINE_STORAGE_FLOAT16,  /**< IEEE half-precision coefficients, scaled; the rest as above */
+  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients, a scale for each mode; the rest as above */
+  SUPINE_STORAGE_COUNT
+} supine_storage;
+
+/** Which code evaluates. All give the same positions within supine_basis_error. */
+typedef enum supine_simd {
+  SUPINE_SIMD_AUTO = 0, /**< the widest that this processor has */
+  SUPINE_SIMD_PORTABLE, /**< C alone */
+  SUPINE_SIMD_AVX2,     /**< AVX2, FMA and F16C */
+  SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
+  SUPINE_SIMD_COUNT
+} supine_simd;
+
+/** How to open a basis; zeros are the defaults. */
+typedef struct supine_basis_options {
+  supine_storage storage;
+  supine_simd simd;
+} supine_basis_options;
+
 /** What a basis holds. */
 typedef struct supine_basis_info {
   size_t vertex_count;
@@ -39,12 +63,30 @@ typedef struct supine_basis_info {
   const size_t *lung_begin; /**< [G + 1] */
   bool vector;     /**< three coefficients per vertex and mode instead of one and a direction */
   bool has_volume; /**< the surface is closed: volumes can be asked for */
+  supine_storage storage;  /**< as chosen, never AUTO */
+  supine_simd simd;        /**< as chosen, never AUTO */
+  double bytes_per_vertex; /**< that an evaluation reads */
+  /** Bound, in mm, on the error of storage and rounding at a breath of 500 mL (on an open surface:
+   * where the largest displacement is 20 mm), over the 26 directions of the faces, edges and
+   * corners of a cube. supine_basis_error gives it for any other. */
+  double storage_error;
 } supine_basis_info;
 
-/** Opens and fully validates a basis file, or one in memory (which must outlive the basis).
+/** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
+ * packs it for evaluation. `options` may be NULL.
  * @retval SUPINE_ERROR_READ    missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  truncated, corrupted, or not a basis file (detail in `error`)
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_ARGUMENT     an option out of range
+ * @retval SUPINE_ERROR_UNSUPPORTED  this processor, or this build, lacks the code asked for
+ * @retval SUPINE_ERROR_MEMORY
+ * Cost: a few passes over the file; memory of bytes_per_vertex besides the mapped file. */
+SUPINE_API supine_status supine_basis_open_with(const char *path,
+                                                const supine_basis_options *options,
+                                                supine_basis **basis, supine_error *error);
+SUPINE_API supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
+                                                       const supine_basis_options *options,
+                                                       supine_basis **basis, supine_error *error);
+/** The same with default options. */
 SUPINE_API supine_status supine_basis_open(const char *path, supine_basis **basis,
                                            supine_error *error);
 SUPINE_API supine_status supine_basis_open_memory(const void *bytes, size_t size,
@@ -83,15 +125,85 @@ SUPINE_API supine_status supine_basis_lung_scale(const supine_basis *basis, size
                                                  const double *weights, double volume,
                                                  double *scale, supine_error *error);
 
-/** Deformed positions of vertices begin <= i < end into xyz[0 .. 3 (end - begin)).
- * @param scales  [G] breath scale of each lung
- * Cost per vertex: K + 3 multiplications and K + 2 additions. */
+/** Bound, in mm, on the distance of any deformed vertex from exact arithmetic on the numbers of the
+ * file: what storage and rounding may cost at these weights and scales. */
+SUPINE_API double supine_basis_error(const supine_basis *basis, const double *weights,
+                                     const double *scales);
+
+/** Deformed positions of every vertex, in the caller's thread.
+ *
+ *     x_i = p_i + s (w . c_i) d_i         s: the scale of the lung of i
+ *
+ * @param weights  [K] of supine_basis_weights
+ * @param scales   [G] breath scale of each lung
+ * @param xyz      [N, 3], written, mm, LPS; any alignment of a float
+ * Cost per vertex: K + 3 multiplications and K + 2 additions (16 modes: 19 and 18). Where positions
+ * outgrow the cache they are stored past it, fastest where `xyz` is aligned to 64 bytes. */
+SUPINE_API void supine_deform(const supine_basis *basis, const double *weights,
+                              const double *scales, float *xyz);
+
+/** supine_deform of vertices begin <= i < end into xyz [end - begin, 3]: a thread's share. Shares
+ * that begin at multiples of 16 are fastest. */
 SUPINE_API void supine_deform_range(const supine_basis *basis, const double *weights,
                                     const double *scales, size_t begin, size_t end, float *xyz);
 
-/** Deformed positions of every vertex, xyz [N, 3], mm, LPS, in the caller's thread. */
-SUPINE_API void supine_deform(const supine_basis *basis, const double *weights,
-                              const double *scales, float *xyz);
+/** supine_deform_range into three arrays [end - begin]. */
+SUPINE_API void supine_deform_separate(const supine_basis *basis, const double *weights,
+                                       const double *scales, size_t begin, size_t end, float *x,
+                                       float *y, float *z);
+
+/** supine_deform_range for many orientations or volumes at once, at about the speed of a matrix
+ * product: each vertex is read once.
+ *
+ * @param count    orientations
+ * @param weights  [count, K]
+ * @param scales   [count, G]
+ * @param xyz      [count, end - begin, 3], written */
+SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count, const double *weights,
+                                    const double *scales, size_t begin, size_t end, float *xyz);
+
+/** Displacements s (w . c_i) d_i of vertices begin <= i < end, mm, without the rest positions: what
+ * supine_step adds. Every vertex's displacement is linear in the scales. */
+SUPINE_API void supine_displace_range(const supine_basis *basis, const double *weights,
+                                      const double *scales, size_t begin, size_t end, float *xyz);
+
+/** One step of a breath at a frozen orientation, three additions a vertex [Santhanam2008] (III-B):
+ *
+ *     xyz += step
+ *
+ * @param count  vertices
+ * @param step   [count, 3] displacement of one step, of supine_displace_range with the scales of
+ * one step; subtract a step by displacing with its negative
+ * @param xyz    [count, 3], positions before and after; must not overlap `step`
+ * Rounding accumulates: at most 2^-24 of the coordinate a step. Begin each breath from
+ * supine_deform. */
+SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
+
+/** Unit normals of a deformed surface at its vertices: the mean of the triangles' normals, weighted
+ * by their areas.
+ *
+ * @param xyz      [N, 3] positions of every vertex
+ * @param normals  [N, 3], written; 0 where a vertex has no triangle of positive area
+ * Cost: one pass over the triangles, in the caller's thread. */
+SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
+
+/** Modes that the GPU form has room for, and floats of one vertex's attributes. */
+enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 22 };
+
+/** Attributes of vertices begin <= i < end for supine.glsl, as one vertex buffer has them:
+ *
+ *     rest vec3 (offset 0), direction vec3 (offset 12), coefficients four vec4 (offset 24)
+ *
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS], written; 88 bytes a vertex
+ * @retval SUPINE_ERROR_UNSUPPORTED  more than 16 modes, or a vector field */
+SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
+                                        float *attributes);
+
+/** The uniform supine_weights of supine.glsl, for lungs at one breath scale.
+ * @param uniforms  [SUPINE_GL_MODES], written, for glUniform4fv(location, 4, uniforms)
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
+SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
+                                           double scale, float *uniforms);
 
 #ifdef __cplusplus
 }

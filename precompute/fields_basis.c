@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A basis of another simulator's fields: fit, volumes, file. */
+#include <stdlib.h>
+
+#include <supine/precompute.h>
+
+#include "basis_file.h"
+#include "compression.h"
+
+supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
+                                       const supine_fit_options *options, const char *made_by,
+                                       const char *path, supine_fit_report *report,
+                                       size_t *mode_count, supine_error *error) {
+  supine_compression field = {0};
+  supine_volume_forms forms = {0};
+  supine_status status = SUPINE_OK;
+  double *directions = NULL;
+  if (options->scalar) {
+    directions = malloc(3 * lungs->mesh.vertex_count * sizeof *directions);
+    if (directions == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              lungs->mesh.vertex_count);
+    }
+  }
+  status = supine_fields_fit(fields, options, directions, &field, report, error);
+  if (status == SUPINE_OK && lungs->topology.closed) {
+    status = supine_compression_volume_forms(&field, lungs, directions, &forms, error);
+  }
+  if (status == SUPINE_OK) {
+    const supine_basis_content content = {.lungs = lungs,
+                                          .fit = report,
+                                          .directions = directions,
+                                          .compression = &field,
+                                          .forms = forms.linear != NULL ? &forms : NULL,
+                                          .accuracy = &report->accuracy,
+                                          .route = "fields",
+                                          .harmonics = options->modes == 0,
+                                          .made_by = made_by};
+    status = supine_basis_file_write(path, &content, error);
+  }
+  if (mode_count != NULL) {
+    *mode_count = field.mode_count;
+  }
+  supine_compression_free(&field);
+  supine_volume_forms_free(&forms);
+  free(directions);
+  return status;
+}

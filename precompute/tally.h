@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Sum of squares, largest and percentiles of many non-negative numbers that are not kept. */
+#ifndef SUPINE_TALLY_H
+#define SUPINE_TALLY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Bins of a float's exponent and first 8 bits of mantissa: 0.4 % wide over its whole range. */
+enum { SUPINE_TALLY_BINS = 1 << 16 };
+
+typedef struct supine_tally {
+  double square_sum;
+  double largest;
+  uint64_t count;
+  uint32_t bins[SUPINE_TALLY_BINS];
+} supine_tally;
+
+void supine_tally_add(supine_tally *tally, size_t count, const double *values);
+
+/* Adds one tally to another. */
+void supine_tally_merge(supine_tally *tally, const supine_tally *other);
+
+/* The value that a share (0 to 1) of the numbers lies below: the upper edge of its bin. */
+double supine_tally_percentile(const supine_tally *tally, double share);
+
+#endif

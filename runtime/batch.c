@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: MIT */
+/* Many orientations at once: a block of tiles is widened to floats once and stays in the cache
+ * while every orientation reads it. */
+#include <string.h>
+
+#include "internal.h"
+
+enum {
+  BLOCK_TILES = 16,
+  BLOCK_BYTES = 32768,  /* of widened tiles, less than a first-level cache */
+  WEIGHT_NUMBERS = 4096 /* folded weights of a group of orientations */
+};
+
+typedef struct block {
+  _Alignas(64) unsigned char bytes[BLOCK_BYTES];
+  float folded[WEIGHT_NUMBERS];
+} block;
+
+/* Whole tiles of one lung; `positions` is orientation 0's first, `apart` numbers to the next. */
+static void batch_tiles(const supine_basis *basis, size_t count, const float *folded,
+                        supine_tiles *wide, size_t first, size_t tiles, float *positions,
+                        size_t apart, bool stream) {
+  const size_t fit = BLOCK_BYTES / wide->stride;
+  const size_t step = fit < BLOCK_TILES ? fit : BLOCK_TILES;
+  for (size_t t = 0; t < tiles; t += step) {
+    const size_t here = tiles - t < step ? tiles - t : step;
+    basis->kernels->widen(&basis->tiles, first + t, here, wide);
+    for (size_t j = 0; j < count; ++j) {
+      const supine_target target = {
+          positions + j * apart + t * TILE_NUMBERS, NULL, NULL, true, stream, true};
+      basis->kernels->deform(wide, folded + j * basis->info.mode_count, 0, here, &target);
+    }
+  }
+}
+
+void supine_deform_batch(const supine_basis *basis, size_t count, const double *weights,
+                         const double *scales, size_t begin, size_t end, float *xyz) {
+  block scratch;
+  supine_tiles wide = {0};
+  const size_t modes = basis->info.mode_count;
+  const size_t lungs = basis->info.lung_count;
+  const size_t apart = 3 * (end - begin);
+  const size_t group = WEIGHT_NUMBERS / modes;
+  const double bytes = (double)count * (double)apart * sizeof *xyz;
+  const bool stream = basis->stream || bytes > STREAM_BYTES;
+  supine_tiles_layout(&wide, SUPINE_STORAGE_EXACT, modes, basis->info.vector, BLOCK_TILES);
+  wide.bytes = scratch.bytes;
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
+    const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
+    if (first >= last) {
+      continue;
+    }
+    /* Whole tiles in blocks; what is before and after them one orientation at a time, and all of
+     * it where one tile alone outgrows the block. */
+    size_t from = (first + TILE - 1) / TILE * TILE;
+    size_t to = last / TILE * TILE;
+    if (from >= to || wide.stride > BLOCK_BYTES) {
+      from = to = last;
+    }
+    for (size_t j = 0; j < count; j += group) {
+      const size_t here = count - j < group ? count - j : group;
+      for (size_t i = 0; i < here; ++i) {
+        supine_fold(basis, weights + (j + i) * modes, scales[(j + i) * lungs + lung], true,
+                    scratch.folded + i * modes);
+      }
+      batch_tiles(basis, here, scratch.folded, &wide, from / TILE, (to - from) / TILE,
+                  xyz + j * apart + 3 * (from - begin), apart, stream);
+    }
+    for (size_t j = 0; j < count; ++j) {
+      const double *w = weights + j * modes;
+      const double *s = scales + j * lungs;
+      float *positions = xyz + j * apart;
+      supine_deform_range(basis, w, s, first, from, positions + 3 * (first - begin));
+      supine_deform_range(basis, w, s, to, last, positions + 3 * (to - begin));
+    }
+  }
+  supine_stream_fence(stream);
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/* What storage and rounding may cost, in mm. */
+#include <math.h>
+
+#include "internal.h"
+
+double supine_basis_error(const supine_basis *basis, const double *weights, const double *scales) {
+  const double unit = 0x1p-24; /* half a unit in the last place of a float */
+  const size_t modes = basis->info.mode_count;
+  double stored = 0;
+  double moved = 0;
+  for (size_t k = 0; k < modes; ++k) {
+    stored += fabs(weights[k]) * basis->mode_error[k];
+    moved += fabs(weights[k]) * basis->mode_size[k];
+  }
+  double scale = 0;
+  for (size_t i = 0; i < basis->info.lung_count; ++i) {
+    scale = fmax(scale, fabs(scales[i]));
+  }
+  /* Folding and the sum over modes round K + 4 times; the last addition rounds each coordinate. */
+  const double rounding =
+      ((double)modes + 4) * unit * scale * moved + unit * (basis->rest_size + scale * moved);
+  return 1.001 * (scale * stored + basis->rest_error + rounding);
+}
+
+/* The largest displacement at scale 1. */
+static double largest_displacement(const supine_basis *basis, const double *weights) {
+  enum { BLOCK = 1024 };
+  float xyz[3 * BLOCK];
+  double scales[SUPINE_LUNGS_MAX];
+  for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
+    scales[i] = 1;
+  }
+  const size_t n = basis->info.vertex_count;
+  float top = 0;
+  for (size_t begin = 0; begin < n; begin += BLOCK) {
+    const size_t end = n - begin < BLOCK ? n : begin + BLOCK;
+    supine_displace_range(basis, weights, scales, begin, end, xyz);
+    for (size_t i = 0; i < end - begin; ++i) {
+      const float *u = xyz + 3 * i;
+      const float square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+      top = square > top ? square : top;
+    }
+  }
+  return sqrt((double)top);
+}
+
+double supine_basis_storage_error(const supine_basis *basis) {
+  static const double volume = 500;  /* mL */
+  static const double distance = 20; /* mm, on an open surface */
+  double worst = 0;
+  for (int number = 0; number < 27; ++number) {
+    const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
+    const double gravity[3] = {cell[0], cell[1], cell[2]};
+    double weights[SUPINE_MODES_MAX];
+    double scale = 0;
+    if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {
+      continue; /* the centre of the cube */
+    }
+    if (basis->info.has_volume) {
+      if (supine_basis_scale(basis, weights, volume, &scale, NULL) != SUPINE_OK) {
+        continue; /* no such breath in this direction */
+      }
+    } else {
+      const double largest = largest_displacement(basis, weights);
+      scale = largest > 0 ? distance / largest : 0;
+    }
+    double scales[SUPINE_LUNGS_MAX];
+    for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
+      scales[i] = scale;
+    }
+    worst = fmax(worst, supine_basis_error(basis, weights, scales));
+  }
+  return worst;
+}

@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: MIT */
+/* Evaluating tiles with AVX2, FMA and F16C: two registers for the 16 vertices. */
+#include "tiles.h"
+
+#if defined(__AVX2__) && defined(__FMA__) && defined(__F16C__)
+#include <immintrin.h>
+
+#define INLINE static inline __attribute__((always_inline))
+
+/* Coefficient k of vertices 8 half to 8 half + 7; float and half storage. */
+INLINE __m256 coefficient(const unsigned char *at, size_t k, size_t half, supine_storage storage) {
+  return storage == SUPINE_STORAGE_FLOAT16
+             ? _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)))
+             : _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+}
+
+typedef struct halves {
+  __m256 v[2];
+} halves;
+
+/* Adds pair k of vertices 8 half to 8 half + 7, times the weights of the pair. */
+INLINE __m256 add_pair(const unsigned char *at, const float *w, size_t k, size_t half, __m256 sum) {
+  const __m256i word = _mm256_load_si256((const __m256i *)(at + 32 * k + 32 * half));
+  const __m256 low = _mm256_cvtepi32_ps(_mm256_slli_epi32(word, 16));
+  sum = k == 0 ? _mm256_mul_ps(_mm256_broadcast_ss(w), _mm256_cvtepi32_ps(word))
+               : _mm256_fmadd_ps(_mm256_broadcast_ss(w + k), _mm256_cvtepi32_ps(word), sum);
+  return _mm256_fmadd_ps(_mm256_broadcast_ss(w + k + 1), low, sum);
+}
+
+/* sum over k of w_k c_k: K multiplications, K - 1 additions (int16: K rounded up to even). */
+INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
+  halves sum;
+  if (storage == SUPINE_STORAGE_INT16) {
+    const __m256 zero = _mm256_setzero_ps();
+    sum = (halves){{add_pair(at, w, 0, 0, zero), add_pair(at, w, 0, 1, zero)}};
+    for (size_t k = 2; k < modes; k += 2) {
+      sum.v[0] = add_pair(at, w, k, 0, sum.v[0]);
+      sum.v[1] = add_pair(at, w, k, 1, sum.v[1]);
+    }
+    return sum;
+  }
+  const __m256 first = _mm256_broadcast_ss(w);
+  sum = (halves){{_mm256_mul_ps(first, coefficient(at, 0, 0, storage)),
+                  _mm256_mul_ps(first, coefficient(at, 0, 1, storage))}};
+  for (size_t k = 1; k < modes; ++k) {
+    const __m256 weight = _mm256_broadcast_ss(w + k);
+    sum.v[0] = _mm256_fmadd_ps(weight, coefficient(at, k, 0, storage), sum.v[0]);
+    sum.v[1] = _mm256_fmadd_ps(weight, coefficient(at, k, 1, storage), sum.v[1]);
+  }
+  return sum;
+}
+
+/* Numbers 8 j to 8 j + 7 of a direction or rest position. Compact: 24 bytes (the loads take 4 more,
+ * which lie in the tile or in the padding behind the last), four numbers to each half of a
+ * register, each number to the upper three bytes of a word; then the exponent moves to its place.
+ */
+INLINE __m256 numbers(const unsigned char *at, size_t j, bool compact, __m256i bias) {
+  if (!compact) {
+    return _mm256_load_ps((const float *)(const void *)(at + 32 * j));
+  }
+  const __m256i spread = _mm256_broadcastsi128_si256(
+      _mm_setr_epi8(-1, 0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11));
+  const __m128i first = _mm_loadu_si128((const __m128i *)(at + 24 * j));
+  const __m128i second = _mm_loadu_si128((const __m128i *)(at + 24 * j + 12));
+  __m256i word = _mm256_inserti128_si256(_mm256_castsi128_si256(first), second, 1);
+  word = _mm256_srai_epi32(_mm256_shuffle_epi8(word, spread), 3);
+  word = _mm256_and_si256(word, _mm256_set1_epi32((int)0x8FFFFFFFU));
+  return _mm256_castsi256_ps(_mm256_add_epi32(word, bias));
+}
+
+/* 48 numbers in order. */
+typedef struct triples {
+  __m256 v[6];
+} triples;
+
+/* a's lane of vertex i at numbers 3 i, 3 i + 1, 3 i + 2. */
+INLINE triples spread_amount(halves a) {
+  const __m256i lane[3] = {_mm256_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2),
+                           _mm256_setr_epi32(2, 3, 3, 3, 4, 4, 4, 5),
+                           _mm256_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7)};
+  triples t;
+  for (size_t j = 0; j < 6; ++j) {
+    t.v[j] = _mm256_permutevar8x32_ps(a.v[j / 3], lane[j % 3]);
+  }
+  return t;
+}
+
+/* Eight of x, y, z to x y z x y z ...: each of the three is put in place, then blended. */
+INLINE void interleave8(__m256 x, __m256 y, __m256 z, __m256 *out) {
+  const __m256i lane[3] = {_mm256_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2),
+                           _mm256_setr_epi32(2, 3, 3, 3, 4, 4, 4, 5),
+                           _mm256_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7)};
+  __m256 part[3][3];
+  for (size_t j = 0; j < 3; ++j) {
+    part[j][0] = _mm256_permutevar8x32_ps(x, lane[j]);
+    part[j][1] = _mm256_permutevar8x32_ps(y, lane[j]);
+    part[j][2] = _mm256_permutevar8x32_ps(z, lane[j]);
+  }
+  /* Bit b of a mask: lane b from the second. x y z x y z x y | z x y z x y z x | y z x y z x y z */
+  out[0] = _mm256_blend_ps(_mm256_blend_ps(part[0][0], part[0][1], 0x92), part[0][2], 0x24);
+  out[1] = _mm256_blend_ps(_mm256_blend_ps(part[1][0], part[1][1], 0x24), part[1][2], 0x49);
+  out[2] = _mm256_blend_ps(_mm256_blend_ps(part[2][0], part[2][1], 0x49), part[2][2], 0x92);
+}
+
+/* Where the array is aligned to 16 bytes, as malloc gives it, a store past the cache goes in
+ * halves: the processor joins them to lines. */
+INLINE void put(float *to, __m256 v, bool stream) {
+  if (!stream || (uintptr_t)to % 16 != 0) {
+    _mm256_storeu_ps(to, v);
+  } else if ((uintptr_t)to % 32 == 0) {
+    _mm256_stream_ps(to, v);
+  } else {
+    _mm_stream_ps(to, _mm256_castps256_ps128(v));
+    _mm_stream_ps(to + 4, _mm256_extractf128_ps(v, 1));
+  }
+}
+
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
+                           bool with_rest, supine_storage storage, bool vector) {
+  const bool compact = supine_tiles_compact(storage);
+  const __m256i direction_bias = _mm256_set1_epi32((int)tiles->direction_bias);
+  const __m256i rest_bias = _mm256_set1_epi32((int)tiles->rest_bias);
+  const unsigned char *direction = tile + tiles->direction_begin;
+  const unsigned char *rest = tile + tiles->rest_begin;
+  triples result;
+  if (vector) {
+    const halves x = dot(tile, w, tiles->modes, storage);
+    const halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
+    const halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
+    interleave8(x.v[0], y.v[0], z.v[0], result.v);
+    interleave8(x.v[1], y.v[1], z.v[1], result.v + 3);
+    for (size_t j = 0; j < 6 && with_rest; ++j) {
+      result.v[j] = _mm256_add_ps(result.v[j], numbers(rest, j, compact, rest_bias));
+    }
+    return result;
+  }
+  const triples amount = spread_amount(dot(tile, w, tiles->modes, storage));
+  for (size_t j = 0; j < 6; ++j) {
+    const __m256 d = numbers(direction, j, compact, direction_bias);
+    result.v[j] = with_rest ? _mm256_fmadd_ps(amount.v[j], d, numbers(rest, j, compact, rest_bias))
+                            : _mm256_mul_ps(amount.v[j], d);
+  }
+  return result;
+}
+
+/* Numbers of three arrays; this form is not worth shuffles of its own. */
+INLINE void put_separate(const triples *t, const supine_target *target, size_t at) {
+  float xyz[TILE_NUMBERS];
+  for (size_t j = 0; j < 6; ++j) {
+    _mm256_storeu_ps(xyz + 8 * j, t->v[j]);
+  }
+  for (size_t v = 0; v < TILE; ++v) {
+    target->x[at + v] = xyz[3 * v];
+    target->y[at + v] = xyz[3 * v + 1];
+    target->z[at + v] = xyz[3 * v + 2];
+  }
+}
+
+INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                       const supine_target *target, supine_storage storage, bool vector) {
+  const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  const size_t fetched = target->near ? 0 : tiles->stride;
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    const char *ahead = (const char *)tile + PREFETCH_BYTES;
+    for (size_t line = 0; line < fetched; line += 64) {
+      if (target->stream) { /* used once a frame: leave the caches alone */
+        _mm_prefetch(ahead + line, _MM_HINT_NTA);
+      } else {
+        _mm_prefetch(ahead + line, _MM_HINT_T0);
+      }
+    }
+    const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
+    if (target->y != NULL) {
+      put_separate(&xyz, target, t * TILE);
+      continue;
+    }
+    for (size_t j = 0; j < 6; ++j) {
+      put(target->x + t * TILE_NUMBERS + 8 * j, xyz.v[j], target->stream);
+    }
+  }
+}
+
+INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
+                           size_t count, const supine_target *target, supine_storage storage) {
+  if (tiles->axes == 3) {
+    deform_all(tiles, weights, first, count, target, storage, true);
+  } else {
+    deform_all(tiles, weights, first, count, target, storage, false);
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                   const supine_target *target) {
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_EXACT:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
+    break;
+  case SUPINE_STORAGE_FLOAT32:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
+    break;
+  default:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
+  for (size_t k = 0; k < tiles->modes; ++k) {
+    for (size_t h = 0; h < 2; ++h) {
+      float *to = c + 16 * k + 8 * h;
+      if (tiles->storage == SUPINE_STORAGE_INT16) {
+        const __m256i word = _mm256_load_si256((const __m256i *)(at + 64 * (k / 2) + 32 * h));
+        const __m256i low = _mm256_srai_epi32(_mm256_slli_epi32(word, 16), 16);
+        const __m256i high = _mm256_srai_epi32(_mm256_sub_epi32(word, low), 16);
+        _mm256_store_ps(to, _mm256_cvtepi32_ps(k % 2 == 0 ? high : low));
+      } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
+        _mm256_store_ps(to, coefficient(at, k, h, SUPINE_STORAGE_FLOAT16));
+      } else {
+        _mm256_store_ps(to, coefficient(at, k, h, SUPINE_STORAGE_FLOAT32));
+      }
+    }
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  const __m256i direction_bias = _mm256_set1_epi32((int)tiles->direction_bias);
+  const __m256i rest_bias = _mm256_set1_epi32((int)tiles->rest_bias);
+  const bool compact = supine_tiles_compact(tiles->storage);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    unsigned char *wide = to->bytes + t * to->stride;
+    float *d = (float *)(void *)(wide + to->direction_begin);
+    float *p = (float *)(void *)(wide + to->rest_begin);
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
+                         (float *)(void *)(wide + axis * to->axis_bytes));
+    }
+    for (size_t j = 0; j < 6; ++j) {
+      if (tiles->axes == 1) {
+        _mm256_store_ps(d + 8 * j,
+                        numbers(tile + tiles->direction_begin, j, compact, direction_bias));
+      }
+      _mm256_store_ps(p + 8 * j, numbers(tile + tiles->rest_begin, j, compact, rest_bias));
+    }
+  }
+}
+
+const supine_kernels supine_kernels_avx2 = {deform, widen};
+#else
+const supine_kernels supine_kernels_avx2 = {NULL, NULL};
+#endif

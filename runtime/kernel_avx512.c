@@ -1,0 +1,325 @@
+/* SPDX-License-Identifier: MIT */
+/* Evaluating tiles with AVX-512 F and BW: one register for the 16 vertices. */
+#include "tiles.h"
+
+#if defined(__AVX512F__) && defined(__AVX512BW__)
+#include <immintrin.h>
+
+#define INLINE static inline __attribute__((always_inline))
+/* Where the trip count is known, all of it, so that an array of registers is one. */
+#if defined(__clang__)
+#define UNROLL _Pragma("clang loop unroll_count(16)")
+#else
+#define UNROLL _Pragma("GCC unroll 16")
+#endif
+
+enum { COMMON_MODES = 16 }; /* whose weights stay in registers */
+
+/* Weight k in every lane: from a register where the number of modes is the common one. */
+typedef struct weights16 {
+  const float *at;
+  __m512 v[COMMON_MODES];
+} weights16;
+
+INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
+  return common ? w->v[k] : _mm512_set1_ps(w->at[k]);
+}
+
+/* Coefficient k of 16 vertices; float and half storage. */
+INLINE __m512 coefficient(const unsigned char *at, size_t k, supine_storage storage) {
+  return storage == SUPINE_STORAGE_FLOAT16
+             ? _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(at + 32 * k)))
+             : _mm512_loadu_ps(at + 64 * k);
+}
+
+/* sum over k of w_k c_k: K multiplications, K - 1 additions (INT16: K rounded up to even), in two
+ * chains. */
+INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, bool common,
+                  supine_storage storage) {
+  if (storage == SUPINE_STORAGE_INT16) {
+    __m512i word = _mm512_loadu_si512(at);
+    __m512 high = _mm512_mul_ps(weight(w, 0, common), _mm512_cvtepi32_ps(word));
+    __m512 low =
+        _mm512_mul_ps(weight(w, 1, common), _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)));
+    UNROLL for (size_t k = 2; k < modes; k += 2) {
+      word = _mm512_loadu_si512(at + 32 * k);
+      high = _mm512_fmadd_ps(weight(w, k, common), _mm512_cvtepi32_ps(word), high);
+      low = _mm512_fmadd_ps(weight(w, k + 1, common),
+                            _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)), low);
+    }
+    return _mm512_add_ps(high, low);
+  }
+  __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, storage));
+  if (modes == 1) {
+    return even;
+  }
+  __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 1, storage));
+  size_t k = 2;
+  UNROLL for (; k + 1 < modes; k += 2) {
+    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
+    odd = _mm512_fmadd_ps(weight(w, k + 1, common), coefficient(at, k + 1, storage), odd);
+  }
+  if (k < modes) {
+    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
+  }
+  return _mm512_add_ps(even, odd);
+}
+
+/* Numbers 16 j to 16 j + 15 of a direction or rest position. Compact: 48 bytes (the load takes 16
+ * more, which lie in the tile or in the padding behind the last), four numbers to each quarter of a
+ * register, each number to the upper three bytes of a word; then the exponent moves to its place.
+ */
+INLINE __m512 numbers(const unsigned char *at, size_t j, bool compact, __m512i bias) {
+  if (!compact) {
+    return _mm512_loadu_ps(at + 64 * j);
+  }
+  const __m512i quarters = _mm512_setr_epi32(0, 1, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 10, 11, 12);
+  const __m512i spread =
+      _mm512_broadcast_i32x4(_mm_setr_epi8(-1, 0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11));
+  __m512i word = _mm512_permutexvar_epi32(quarters, _mm512_loadu_si512(at + 48 * j));
+  word = _mm512_srai_epi32(_mm512_shuffle_epi8(word, spread), 3);
+  word = _mm512_and_si512(word, _mm512_set1_epi32((int)0x8FFFFFFFU));
+  return _mm512_castsi512_ps(_mm512_add_epi32(word, bias));
+}
+
+/* v0 of vertices 0 to 5, v1 of 5 to 10, v2 of 10 to 15: a's lane of vertex i at numbers 3 i ... */
+typedef struct triples {
+  __m512 v[3];
+} triples;
+
+INLINE triples spread_amount(__m512 a) {
+  const __m512i lane0 = _mm512_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5);
+  const __m512i lane1 = _mm512_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10);
+  const __m512i lane2 =
+      _mm512_setr_epi32(10, 11, 11, 11, 12, 12, 12, 13, 13, 13, 14, 14, 14, 15, 15, 15);
+  return (triples){{_mm512_permutexvar_ps(lane0, a), _mm512_permutexvar_ps(lane1, a),
+                    _mm512_permutexvar_ps(lane2, a)}};
+}
+
+/* Three registers of x, y and z into x y z x y z ...; lane + 16 takes from the second of a pair. */
+INLINE triples interleave(__m512 x, __m512 y, __m512 z) {
+  const __m512i xy0 = _mm512_setr_epi32(0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5);
+  const __m512i xy1 = _mm512_setr_epi32(21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26);
+  const __m512i xy2 = _mm512_setr_epi32(0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0);
+  const __m512i z0 = _mm512_setr_epi32(0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15);
+  const __m512i z1 = _mm512_setr_epi32(0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15);
+  const __m512i z2 = _mm512_setr_epi32(26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31);
+  return (triples){{_mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy0, y), z0, z),
+                    _mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy1, y), z1, z),
+                    _mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy2, y), z2, z)}};
+}
+
+/* The reverse. */
+INLINE triples separate(triples t) {
+  const __m512i x01 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+  const __m512i y01 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+  const __m512i z01 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+  const __m512i x2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+  const __m512i y2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+  const __m512i z2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+  return (triples){
+      {_mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], x01, t.v[1]), x2, t.v[2]),
+       _mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], y01, t.v[1]), y2, t.v[2]),
+       _mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], z01, t.v[1]), z2, t.v[2])}};
+}
+
+/* An array that is written in order, past the cache where `stream`. A store past the cache must
+ * fill an aligned line; where the array is not aligned, each line joins the end of one register to
+ * the beginning of the next. */
+typedef struct writer {
+  __m512 last;  /* the register before this one */
+  __m512i join; /* permutation of (last, next) that makes the line */
+  float *to;
+  size_t offset; /* numbers by which `to` is past an aligned line */
+  bool stream;
+} writer;
+
+INLINE writer writer_open(float *to, bool stream) {
+  const size_t offset = (uintptr_t)to / sizeof *to % 16;
+  const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  return (writer){_mm512_setzero_ps(), _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
+                  to, offset, stream};
+}
+
+INLINE void writer_put(writer *w, __m512 next, bool first) {
+  if (w->stream && !first) {
+    _mm512_stream_ps(w->to - w->offset, _mm512_permutex2var_ps(w->last, w->join, next));
+  } else {
+    _mm512_storeu_ps(w->to, next);
+  }
+  w->last = next;
+  w->to += 16;
+}
+
+/* What of the last register no full line has taken. */
+INLINE void writer_close(const writer *w) {
+  if (w->stream) {
+    _mm512_storeu_ps(w->to - 16, w->last);
+  }
+}
+
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
+                           bool with_rest, bool common, supine_storage storage, bool vector) {
+  const size_t modes = common ? COMMON_MODES : tiles->modes;
+  const bool compact = supine_tiles_compact(storage);
+  const __m512i direction_bias = _mm512_set1_epi32((int)tiles->direction_bias);
+  const __m512i rest_bias = _mm512_set1_epi32((int)tiles->rest_bias);
+  const unsigned char *direction = tile + tiles->direction_begin;
+  const unsigned char *rest = tile + tiles->rest_begin;
+  triples result;
+  if (vector) {
+    const __m512 x = dot(tile, w, modes, common, storage);
+    const __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
+    const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
+    result = interleave(x, y, z);
+    for (size_t j = 0; j < 3 && with_rest; ++j) {
+      result.v[j] = _mm512_add_ps(result.v[j], numbers(rest, j, compact, rest_bias));
+    }
+    return result;
+  }
+  const triples amount = spread_amount(dot(tile, w, modes, common, storage));
+  for (size_t j = 0; j < 3; ++j) {
+    const __m512 d = numbers(direction, j, compact, direction_bias);
+    result.v[j] = with_rest ? _mm512_fmadd_ps(amount.v[j], d, numbers(rest, j, compact, rest_bias))
+                            : _mm512_mul_ps(amount.v[j], d);
+  }
+  return result;
+}
+
+/* What a caller's constants make of one loop. */
+typedef struct form {
+  supine_storage storage;
+  bool vector, rest, joined;
+  bool common; /* 16 modes */
+} form;
+
+INLINE void deform_all(const supine_tiles *any, const float *weights, size_t first, size_t count,
+                       const supine_target *target, form f) {
+  supine_tiles same = *any;
+  if (f.common) { /* known to the compiler */
+    supine_tiles_layout(&same, f.storage, COMMON_MODES, f.vector, any->count);
+  }
+  const supine_tiles *tiles = &same;
+  const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  writer out[3] = {writer_open(target->x, target->stream), writer_open(target->y, target->stream),
+                   writer_open(target->z, target->stream)}; /* joined: the first alone */
+  weights16 w = {.at = weights};
+  if (f.common) {
+    UNROLL for (size_t k = 0; k < COMMON_MODES; ++k) {
+      w.v[k] = _mm512_set1_ps(weights[k]);
+    }
+  }
+  const size_t fetched = target->near ? 0 : tiles->stride;
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    const char *ahead = (const char *)tile + PREFETCH_BYTES;
+    for (size_t line = 0; line < fetched; line += 64) {
+      if (target->stream) { /* used once a frame: leave the caches alone */
+        _mm_prefetch(ahead + line, _MM_HINT_NTA);
+      } else {
+        _mm_prefetch(ahead + line, _MM_HINT_T0);
+      }
+    }
+    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
+    if (f.joined) {
+      writer_put(&out[0], xyz.v[0], t == 0);
+      writer_put(&out[0], xyz.v[1], t == 0);
+      writer_put(&out[0], xyz.v[2], t == 0);
+    } else {
+      xyz = separate(xyz);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        writer_put(&out[axis], xyz.v[axis], t == 0);
+      }
+    }
+  }
+  for (size_t axis = 0; axis < (f.joined ? 1 : 3) && count > 0; ++axis) {
+    writer_close(&out[axis]);
+  }
+}
+
+/* One instance for the common number of modes and form of target, one for the others. */
+INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                        const supine_target *target, supine_storage storage, bool vector) {
+  const bool joined = target->y == NULL;
+  if (target->rest && joined && tiles->modes == COMMON_MODES) {
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = true, .joined = true, .common = true});
+  } else {
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = target->rest, .joined = joined, .common = false});
+  }
+}
+
+INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
+                           size_t count, const supine_target *target, supine_storage storage) {
+  if (tiles->axes == 3) {
+    deform_kind(tiles, weights, first, count, target, storage, true);
+  } else {
+    deform_kind(tiles, weights, first, count, target, storage, false);
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                   const supine_target *target) {
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_EXACT:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
+    break;
+  case SUPINE_STORAGE_FLOAT32:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
+    break;
+  default:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
+  if (tiles->storage == SUPINE_STORAGE_INT16) {
+    for (size_t k = 0; k < tiles->modes; k += 2) {
+      const __m512i word = _mm512_loadu_si512(at + 32 * k);
+      const __m512i low = _mm512_srai_epi32(_mm512_slli_epi32(word, 16), 16);
+      const __m512i high = _mm512_srai_epi32(_mm512_sub_epi32(word, low), 16);
+      _mm512_storeu_ps(c + 16 * k, _mm512_cvtepi32_ps(high));
+      if (k + 1 < tiles->modes) {
+        _mm512_storeu_ps(c + 16 * (k + 1), _mm512_cvtepi32_ps(low));
+      }
+    }
+  } else {
+    for (size_t k = 0; k < tiles->modes; ++k) {
+      _mm512_storeu_ps(c + 16 * k, tiles->storage == SUPINE_STORAGE_FLOAT16
+                                       ? coefficient(at, k, SUPINE_STORAGE_FLOAT16)
+                                       : coefficient(at, k, SUPINE_STORAGE_FLOAT32));
+    }
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  const __m512i direction_bias = _mm512_set1_epi32((int)tiles->direction_bias);
+  const __m512i rest_bias = _mm512_set1_epi32((int)tiles->rest_bias);
+  const bool compact = supine_tiles_compact(tiles->storage);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    const unsigned char *direction = tile + tiles->direction_begin;
+    const unsigned char *rest = tile + tiles->rest_begin;
+    unsigned char *wide = to->bytes + t * to->stride;
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
+                         (float *)(void *)(wide + axis * to->axis_bytes));
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      if (tiles->axes == 1) {
+        _mm512_storeu_ps(wide + to->direction_begin + 64 * j,
+                         numbers(direction, j, compact, direction_bias));
+      }
+      _mm512_storeu_ps(wide + to->rest_begin + 64 * j, numbers(rest, j, compact, rest_bias));
+    }
+  }
+}
+
+const supine_kernels supine_kernels_avx512 = {deform, widen};
+#else
+const supine_kernels supine_kernels_avx512 = {NULL, NULL};
+#endif

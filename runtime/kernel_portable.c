@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: MIT */
+/* Evaluating tiles in C alone, in loops of 16 that a compiler turns into what vectors it has. */
+#include "compact.h"
+#include "tiles.h"
+
+/* sum over k of w_k c_vk of 16 vertices. */
+static void dot(const supine_tiles *tiles, const unsigned char *at, const float *w, float *sum) {
+  const size_t modes = tiles->modes;
+  for (size_t v = 0; v < TILE; ++v) {
+    sum[v] = 0;
+  }
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_INT16:
+    for (size_t k = 0; k < modes; k += 2, at += 64) {
+      uint32_t word[TILE];
+      memcpy(word, at, sizeof word);
+      for (size_t v = 0; v < TILE; ++v) {
+        sum[v] += w[k] * (float)(int32_t)word[v] + w[k + 1] * (float)(int32_t)(word[v] << 16);
+      }
+    }
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    for (size_t k = 0; k < modes; ++k, at += 32) {
+      uint16_t half[TILE];
+      memcpy(half, at, sizeof half);
+      for (size_t v = 0; v < TILE; ++v) {
+        sum[v] += w[k] * half_widen(half[v]);
+      }
+    }
+    break;
+  default:
+    for (size_t k = 0; k < modes; ++k, at += 64) {
+      float c[TILE];
+      memcpy(c, at, sizeof c);
+      for (size_t v = 0; v < TILE; ++v) {
+        sum[v] += w[k] * c[v];
+      }
+    }
+    break;
+  }
+}
+
+/* 48 numbers. */
+static void widen_numbers(const unsigned char *at, bool compact, uint32_t bias, float *numbers) {
+  if (!compact) {
+    memcpy(numbers, at, TILE_NUMBERS * sizeof *numbers);
+    return;
+  }
+  for (size_t j = 0; j < TILE_NUMBERS; ++j, at += 3) {
+    const uint32_t word = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+    numbers[j] = float24_widen(word, bias);
+  }
+}
+
+static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
+                        bool rest, float *xyz) {
+  const bool compact = supine_tiles_compact(tiles->storage);
+  float amount[3][TILE] = {{0}};
+  float p[TILE_NUMBERS] = {0};
+  for (size_t axis = 0; axis < tiles->axes; ++axis) {
+    dot(tiles, tile + axis * tiles->axis_bytes, w, amount[axis]);
+  }
+  if (rest) {
+    widen_numbers(tile + tiles->rest_begin, compact, tiles->rest_bias, p);
+  }
+  if (tiles->axes == 3) {
+    for (size_t j = 0; j < TILE_NUMBERS; ++j) {
+      xyz[j] = p[j] + amount[j % 3][j / 3];
+    }
+  } else {
+    float d[TILE_NUMBERS];
+    widen_numbers(tile + tiles->direction_begin, compact, tiles->direction_bias, d);
+    for (size_t j = 0; j < TILE_NUMBERS; ++j) {
+      xyz[j] = p[j] + amount[0][j / 3] * d[j];
+    }
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                   const supine_target *target) {
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    if (target->y == NULL) {
+      deform_tile(tiles, tile, weights, target->rest, target->x + t * TILE_NUMBERS);
+    } else {
+      float xyz[TILE_NUMBERS];
+      deform_tile(tiles, tile, weights, target->rest, xyz);
+      for (size_t v = 0; v < TILE; ++v) {
+        target->x[t * TILE + v] = xyz[3 * v];
+        target->y[t * TILE + v] = xyz[3 * v + 1];
+        target->z[t * TILE + v] = xyz[3 * v + 2];
+      }
+    }
+  }
+}
+
+/* 16 coefficients of each mode as floats, in the integers' scale. */
+static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
+  for (size_t k = 0; k < tiles->modes; ++k, c += TILE) {
+    if (tiles->storage == SUPINE_STORAGE_INT16) {
+      uint32_t word[TILE];
+      memcpy(word, at + k / 2 * sizeof word, sizeof word);
+      for (size_t v = 0; v < TILE; ++v) {
+        const int32_t low = (int32_t)(word[v] << 16) / 65536;
+        const int32_t high = ((int32_t)word[v] - low) / 65536;
+        c[v] = (float)(k % 2 == 0 ? high : low);
+      }
+    } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
+      uint16_t half[TILE];
+      memcpy(half, at + k * sizeof half, sizeof half);
+      for (size_t v = 0; v < TILE; ++v) {
+        c[v] = half_widen(half[v]);
+      }
+    } else {
+      memcpy(c, at + k * TILE * sizeof *c, TILE * sizeof *c);
+    }
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  const bool compact = supine_tiles_compact(tiles->storage);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    unsigned char *wide = to->bytes + t * to->stride;
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
+                         (float *)(void *)(wide + axis * to->axis_bytes));
+    }
+    if (tiles->axes == 1) {
+      widen_numbers(tile + tiles->direction_begin, compact, tiles->direction_bias,
+                    (float *)(void *)(wide + to->direction_begin));
+    }
+    widen_numbers(tile + tiles->rest_begin, compact, tiles->rest_bias,
+                  (float *)(void *)(wide + to->rest_begin));
+  }
+}
+
+const supine_kernels supine_kernels_portable = {deform, widen};

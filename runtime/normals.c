@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* Vertex normals of a deformed surface. */
+#include <math.h>
+#include <string.h>
+
+#include "internal.h"
+
+void supine_normals(const supine_basis *basis, const float *xyz, float *normals) {
+  memset(normals, 0, 3 * basis->info.vertex_count * sizeof *normals);
+  for (size_t t = 0; t < basis->info.triangle_count; ++t) {
+    const uint32_t *corner = basis->triangles + 3 * t;
+    const float *a = xyz + 3 * (size_t)corner[0];
+    const float *b = xyz + 3 * (size_t)corner[1];
+    const float *c = xyz + 3 * (size_t)corner[2];
+    const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const float v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    /* Twice the area long. */
+    const float n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                        u[0] * v[1] - u[1] * v[0]};
+    for (size_t j = 0; j < 3; ++j) {
+      float *sum = normals + 3 * (size_t)corner[j];
+      sum[0] += n[0];
+      sum[1] += n[1];
+      sum[2] += n[2];
+    }
+  }
+  for (size_t i = 0; i < basis->info.vertex_count; ++i) {
+    float *n = normals + 3 * i;
+    const float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    const float inverse = length > 0 ? 1 / length : 0;
+    n[0] *= inverse;
+    n[1] *= inverse;
+    n[2] *= inverse;
+  }
+}

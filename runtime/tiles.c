@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* The choice of the code that reads tiles. */
+#include "tiles.h"
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
+#if defined(__x86_64__)
+/* Asked of the processor and of the system, which must save the registers. */
+static bool has_avx2(void) {
+  unsigned a = 0;
+  unsigned b = 0;
+  unsigned c = 0;
+  unsigned d = 0;
+  const bool f16c = __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
+  return f16c && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+}
+static bool has_avx512(void) {
+  return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
+}
+#else
+static bool has_avx2(void) {
+  return false;
+}
+static bool has_avx512(void) {
+  return false;
+}
+#endif
+
+const supine_kernels *supine_kernels_choose(supine_simd *simd) {
+  const bool avx2 = supine_kernels_avx2.deform != NULL && has_avx2();
+  const bool avx512 = supine_kernels_avx512.deform != NULL && has_avx512();
+  if (*simd == SUPINE_SIMD_AUTO) {
+    *simd = avx512 ? SUPINE_SIMD_AVX512 : avx2 ? SUPINE_SIMD_AVX2 : SUPINE_SIMD_PORTABLE;
+  }
+  switch (*simd) {
+  case SUPINE_SIMD_PORTABLE:
+    return &supine_kernels_portable;
+  case SUPINE_SIMD_AVX2:
+    return avx2 ? &supine_kernels_avx2 : NULL;
+  case SUPINE_SIMD_AVX512:
+    return avx512 ? &supine_kernels_avx512 : NULL;
+  case SUPINE_SIMD_AUTO:
+  case SUPINE_SIMD_COUNT:
+    break;
+  }
+  return NULL;
+}

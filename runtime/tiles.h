@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * A basis as the evaluator reads it: tiles of 16 vertices, each one run of memory.
+ *
+ *     coefficients   K modes of 16 vertices, for each axis (1, or 3 where the kind is vector)
+ *                      FLOAT32, EXACT   16 floats a mode
+ *                      FLOAT16          16 halves a mode
+ *                      INT16            16 words a pair of modes: 65536 first + second
+ *     direction      48 numbers x y z x y z ...; none where the kind is vector
+ *     rest           48 numbers x y z x y z ...
+ *
+ * Tile t holds vertices 16 t to 16 t + 15, the last padded with zeros, and begins at a multiple of
+ * 32 bytes. Scales of coefficients are folded into the weights, so they cost nothing.
+ *
+ * The numbers of directions and rest positions are floats (EXACT), or compact floats of 24 bits:
+ * sign, 5 bits of exponent, 18 of fraction, the exponent counted from a bias that suits the
+ * largest. Within half a metre of the origin they err by at most 0.0005 mm. They widen to float32
+ * by shifts alone.
+ *
+ * A pair of INT16 modes needs no unpacking: with word = 65536 h + l,
+ *
+ *     w_h h + w_l l = W_h word + W_l (65536 l)      W_h = w_h / 65536, W_l = (w_l - W_h) / 65536
+ */
+#ifndef SUPINE_TILES_H
+#define SUPINE_TILES_H
+
+#include <supine/runtime.h>
+
+enum {
+  TILE = 16,             /**< vertices */
+  TILE_NUMBERS = 48,     /**< their coordinates */
+  PREFETCH_BYTES = 8192, /**< how far ahead the kernels ask for memory */
+};
+
+typedef struct supine_tiles {
+  supine_storage storage;
+  size_t modes;
+  size_t axes;            /**< 1, or 3 where the kind is vector */
+  size_t axis_bytes;      /**< coefficients of one axis in one tile */
+  size_t direction_begin; /**< byte offsets in the tile */
+  size_t rest_begin;
+  size_t stride; /**< bytes from tile to tile */
+  size_t count;
+  uint32_t direction_bias; /**< what to add to a compact exponent, in its place in a float */
+  uint32_t rest_bias;
+  unsigned char *bytes;
+} supine_tiles;
+
+/** Does the storage keep directions and rest positions compact? */
+static inline bool supine_tiles_compact(supine_storage storage) {
+  return storage != SUPINE_STORAGE_EXACT;
+}
+
+/** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. Inline, so that a
+ * kernel's constants fold. */
+static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
+                                       bool vector, size_t count) {
+  const bool compact = supine_tiles_compact(storage);
+  const bool pairs = storage == SUPINE_STORAGE_INT16;
+  const size_t word = pairs || storage == SUPINE_STORAGE_FLOAT16 ? 2 : 4;
+  const size_t numbers = (size_t)TILE_NUMBERS * (compact ? 3 : 4);
+  tiles->storage = storage;
+  tiles->modes = modes;
+  tiles->axes = vector ? 3 : 1;
+  tiles->axis_bytes = (pairs ? modes + modes % 2 : modes) * TILE * word;
+  tiles->direction_begin = tiles->axes * tiles->axis_bytes;
+  tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
+  tiles->stride = (tiles->rest_begin + numbers + 31) / 32 * 32;
+  tiles->count = count;
+}
+
+/** Where and how a kernel writes. Either one array of triples (x, with y NULL) or three arrays. */
+typedef struct supine_target {
+  float *x, *y, *z;
+  bool rest;   /**< positions; otherwise displacements alone */
+  bool stream; /**< store past the cache */
+  bool near;   /**< the tiles are in the cache: do not ask for them ahead */
+} supine_target;
+
+/** Evaluates whole tiles first <= t < first + count, of one lung, from folded weights (see
+ * supine_fold), into the first 16 count vertices of the target. */
+typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
+                                 size_t count, const supine_target *target);
+
+/** Makes stores past the cache visible to other threads in order; after the last kernel of a call.
+ */
+static inline void supine_stream_fence(bool stream) {
+#if defined(__x86_64__)
+  if (stream) {
+    __builtin_ia32_sfence();
+  }
+#else
+  (void)stream;
+#endif
+}
+
+/** Widens tiles first <= t < first + count into the EXACT layout `to`, keeping the integers' scale,
+ * so that weights folded with supine_fold_widened serve. */
+typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
+                                supine_tiles *to);
+
+typedef struct supine_kernels {
+  supine_deform_tiles *deform;
+  supine_widen_tiles *widen;
+} supine_kernels;
+
+extern const supine_kernels supine_kernels_portable;
+extern const supine_kernels supine_kernels_avx2;   /**< NULLs where not built */
+extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
+
+/** The code of the given kind, or of the widest kind where AUTO (then *simd says which); NULL where
+ * this processor or build has not got it. */
+const supine_kernels *supine_kernels_choose(supine_simd *simd);
+
+#endif

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Small surfaces of known properties, and a folder of temporary files. */
+#ifndef SUPINE_TEST_MESH_SAMPLES_H
+#define SUPINE_TEST_MESH_SAMPLES_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/mesh.h>
+
+/* Copies arrays into a mesh that supine_mesh_free releases. */
+static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,
+                                      size_t triangle_count, const uint32_t *triangles) {
+  supine_mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count};
+  mesh.vertices = malloc((3 * vertex_count + 1) * sizeof *vertices);
+  mesh.triangles = malloc((3 * triangle_count + 1) * sizeof *triangles);
+  assert_non_null(mesh.vertices);
+  assert_non_null(mesh.triangles);
+  if (vertex_count > 0) {
+    memcpy(mesh.vertices, vertices, 3 * vertex_count * sizeof *vertices);
+  }
+  if (triangle_count > 0) {
+    memcpy(mesh.triangles, triangles, 3 * triangle_count * sizeof *triangles);
+  }
+  return mesh;
+}
+
+/* Corner of the first octant, legs of 120 mm: volume 120^3 / 6 = 288000 mm^3. */
+static inline supine_mesh sample_tetrahedron(void) {
+  static const double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
+  static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  return sample_make(4, vertices, 4, triangles);
+}
+
+/* Box from (-30, 10, -50) with sides 100, 110, 130 mm: volume 1430000 mm^3. */
+static inline supine_mesh sample_box(void) {
+  static const double vertices[] = {-30, 10, -50, 70, 10, -50, 70, 120, -50, -30, 120, -50,
+                                    -30, 10, 80,  70, 10, 80,  70, 120, 80,  -30, 120, 80};
+  static const uint32_t triangles[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
+                                       1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
+  return sample_make(8, vertices, 12, triangles);
+}
+
+/* `path` = folder/name. */
+static inline const char *sample_path(void **state, const char *name, char path[256]) {
+  (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);
+  return path;
+}
+
+static inline const char *sample_write(void **state, const char *name, const void *bytes,
+                                       size_t size, char path[256]) {
+  FILE *file = fopen(sample_path(state, name, path), "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(bytes, 1, size, file), size);
+  assert_int_equal(fclose(file), 0);
+  return path;
+}
+
+static inline const char *sample_text(void **state, const char *name, const char *text,
+                                      char path[256]) {
+  return sample_write(state, name, text, strlen(text), path);
+}
+
+/* Reads a whole file; the caller frees. */
+static inline unsigned char *sample_read(const char *path, size_t *size) {
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  unsigned char *bytes = malloc(*size + 1);
+  assert_non_null(bytes);
+  assert_int_equal(fread(bytes, 1, *size, file), *size);
+  assert_int_equal(fclose(file), 0);
+  return bytes;
+}
+
+/* Group set-up and tear-down: a folder in *state; tear-down fails where files are left in it. */
+static inline int sample_folder_create(void **state) {
+  static char folder[] = "/tmp/supine-mesh-XXXXXX";
+  *state = mkdtemp(folder);
+  return *state == NULL ? -1 : 0;
+}
+
+static inline int sample_folder_remove(void **state) {
+  return rmdir(*state);
+}
+
+#endif

@@ -1,0 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+supine_test(disease supine_precompute GSL::gsl GSL::gslcblas)
+supine_test(expandability supine_precompute GSL::gsl GSL::gslcblas)
+supine_test(tissue_command supine_commands GSL::gsl)

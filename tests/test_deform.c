@@ -1,0 +1,460 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The evaluator in every storage and code path, against double precision. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/runtime.h>
+
+#include "runtime_fixture.h"
+
+/* A made basis in memory, and one opened basis of it. */
+typedef struct opened {
+  fixture *f;
+  unsigned char *bytes;
+  size_t size;
+} opened;
+
+static opened made(fixture *f) {
+  opened o = {f, NULL, 0};
+  o.bytes = fixture_bytes(f, &o.size);
+  return o;
+}
+
+static void drop(opened *o) {
+  free(o->bytes);
+  fixture_destroy(o->f);
+}
+
+/* NULL where this processor lacks the code. */
+static supine_basis *open_as(const opened *o, supine_storage storage, supine_simd simd) {
+  const supine_basis_options options = {storage, simd};
+  supine_basis *basis = NULL;
+  supine_error error = {0};
+  const supine_status status =
+      supine_basis_open_memory_with(o->bytes, o->size, &options, &basis, &error);
+  if (status == SUPINE_ERROR_UNSUPPORTED) {
+    return NULL;
+  }
+  if (status != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return basis;
+}
+
+static void *allocate(size_t count, size_t size) {
+  void *memory = calloc(count + 1, size);
+  assert_non_null(memory);
+  return memory;
+}
+
+static void random_frame(const supine_basis *basis, uint64_t *random, double *weights,
+                         double *scales) {
+  const double gravity[3] = {fixture_random(random), fixture_random(random),
+                             fixture_random(random)};
+  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+  for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
+    scales[i] = 2 * fixture_random(random);
+  }
+}
+
+/* Largest distance between float positions and exact ones of vertices begin <= i < end. */
+static double farthest(const float *xyz, const double *exact, size_t begin, size_t end) {
+  double top = 0;
+  for (size_t i = begin; i < end; ++i) {
+    double square = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double apart = (double)xyz[3 * (i - begin) + axis] - exact[3 * i + axis];
+      square += apart * apart;
+    }
+    assert_true(square >= 0); /* not NaN */
+    top = square > top ? square : top;
+  }
+  return sqrt(top);
+}
+
+/* One basis, every storage and code: within the stated bound of exact arithmetic. */
+static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
+                            uint64_t seed) {
+  opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
+  double *exact = allocate(3 * vertices, sizeof *exact);
+  float *xyz = allocate(3 * vertices, sizeof *xyz);
+  uint64_t random = seed;
+  for (int storage = 0; storage < SUPINE_STORAGE_COUNT; ++storage) {
+    for (int simd = 0; simd < SUPINE_SIMD_COUNT; ++simd) {
+      supine_basis *basis = open_as(&o, (supine_storage)storage, (supine_simd)simd);
+      if (basis == NULL) {
+        continue;
+      }
+      double weights[SUPINE_MODES_MAX];
+      double scales[SUPINE_LUNGS_MAX];
+      random_frame(basis, &random, weights, scales);
+      fixture_deform(o.f, weights, scales, exact);
+      supine_deform(basis, weights, scales, xyz);
+      const double error = farthest(xyz, exact, 0, vertices);
+      if (!(error <= supine_basis_error(basis, weights, scales))) {
+        fail_msg("N %zu K %zu lungs %zu storage %d code %d: %g mm, stated %g", vertices, modes,
+                 lungs, storage, simd, error, supine_basis_error(basis, weights, scales));
+      }
+      supine_basis_close(basis);
+    }
+  }
+  free(exact);
+  free(xyz);
+  drop(&o);
+}
+
+static void test_deform_every_path_within_stated_error(void **state) {
+  (void)state;
+  static const size_t sizes[] = {1, 2, 15, 16, 17, 31, 33, 48, 100, 257};
+  static const size_t modes[] = {1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 33, 64};
+  for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
+    for (size_t j = 0; j < sizeof modes / sizeof *modes; ++j) {
+      const size_t lungs = sizes[i] < 3 ? 1 : 1 + (i + j) % 3;
+      check_all_paths(sizes[i], modes[j], lungs, false, 100 * i + j);
+      if (j % 2 == i % 2) {
+        check_all_paths(sizes[i], modes[j], lungs, true, 7 + 100 * i + j);
+      }
+    }
+  }
+  check_all_paths(100, 255, 2, false, 1);
+  check_all_paths(100, 256, 2, true, 2);
+}
+
+static void test_deform_every_mode_count_within_stated_error(void **state) {
+  (void)state;
+  for (size_t modes = 1; modes <= 64; ++modes) {
+    check_all_paths(21, modes, 1, modes % 3 == 0, modes);
+  }
+}
+
+/* The bound must say something: over many frames it is reached to within a small factor. */
+static void test_basis_error_bound_near_what_happens(void **state) {
+  (void)state;
+  opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
+  double *exact = allocate(3 * 3000, sizeof *exact);
+  float *xyz = allocate(3 * 3000, sizeof *xyz);
+  for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
+    supine_basis *basis = open_as(&o, (supine_storage)storage, SUPINE_SIMD_AUTO);
+    uint64_t random = 31;
+    double best = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+      double weights[SUPINE_MODES_MAX];
+      double scales[SUPINE_LUNGS_MAX];
+      random_frame(basis, &random, weights, scales);
+      fixture_deform(o.f, weights, scales, exact);
+      supine_deform(basis, weights, scales, xyz);
+      const double ratio =
+          farthest(xyz, exact, 0, 3000) / supine_basis_error(basis, weights, scales);
+      assert_true(ratio <= 1);
+      best = ratio > best ? ratio : best;
+    }
+    assert_true(best > 1.0 / 30);
+    supine_basis_close(basis);
+  }
+  free(exact);
+  free(xyz);
+  drop(&o);
+}
+
+static void test_storage_error_orders_storages(void **state) {
+  (void)state;
+  opened o = made(fixture_create(500, 16, 3, 2, false, true, 11, 5));
+  double error[SUPINE_STORAGE_COUNT] = {0};
+  double bytes[SUPINE_STORAGE_COUNT] = {0};
+  for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
+    supine_basis *basis = open_as(&o, (supine_storage)storage, SUPINE_SIMD_AUTO);
+    const supine_basis_info *info = supine_basis_get_info(basis);
+    assert_int_equal(info->storage, storage);
+    assert_true(info->simd != SUPINE_SIMD_AUTO);
+    error[storage] = info->storage_error;
+    bytes[storage] = info->bytes_per_vertex;
+    assert_true(error[storage] > 0);
+    supine_basis_close(basis);
+  }
+  assert_true(error[SUPINE_STORAGE_EXACT] < error[SUPINE_STORAGE_FLOAT32]);
+  assert_true(error[SUPINE_STORAGE_FLOAT32] < error[SUPINE_STORAGE_INT16]);
+  assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_FLOAT16]);
+  assert_true(bytes[SUPINE_STORAGE_EXACT] == 88);   /* 64 + 12 + 12 */
+  assert_true(bytes[SUPINE_STORAGE_FLOAT32] == 82); /* 64 + 9 + 9 */
+  assert_true(bytes[SUPINE_STORAGE_FLOAT16] == 50); /* 32 + 9 + 9 */
+  assert_true(bytes[SUPINE_STORAGE_INT16] == 50);
+  drop(&o);
+}
+
+static void test_storage_auto_exact_where_int16_errs(void **state) {
+  (void)state;
+  fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
+  opened o = made(f);
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_INT16);
+  assert_true(supine_basis_get_info(basis)->storage_error <= 0.005);
+  supine_basis_close(basis);
+  free(o.bytes);
+  f->vertex[0] = 1e6F; /* a vertex a kilometre away makes rest positions coarse */
+  o = made(f);
+  basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_EXACT);
+  supine_basis_close(basis);
+  drop(&o);
+}
+
+static void test_open_bad_options_refused(void **state) {
+  (void)state;
+  opened o = made(fixture_create(5, 1, 0, 1, false, false, 1, 1));
+  const supine_basis_options bad[] = {{SUPINE_STORAGE_COUNT, SUPINE_SIMD_AUTO},
+                                      {SUPINE_STORAGE_AUTO, SUPINE_SIMD_COUNT},
+                                      {(supine_storage)-1, SUPINE_SIMD_AUTO}};
+  for (size_t i = 0; i < 3; ++i) {
+    supine_basis *basis = NULL;
+    assert_int_equal(supine_basis_open_memory_with(o.bytes, o.size, &bad[i], &basis, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_null(basis);
+  }
+  drop(&o);
+}
+
+/* Ranges, alignments and targets of one basis give the bits that the whole gives, and write nothing
+ * else. */
+static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,
+                         int trials) {
+  opened o = made(fixture_create(vertices, modes, 1, lungs, false, false, 11, 8));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_INT16, simd);
+  if (basis == NULL) {
+    drop(&o);
+    return;
+  }
+  const float mark = -12345.5F;
+  float *whole = allocate(3 * vertices, sizeof *whole);
+  float *part = allocate(3 * vertices + 64, sizeof *part);
+  float *split = allocate(3 * (vertices + 64), sizeof *split);
+  uint64_t random = 17;
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  random_frame(basis, &random, weights, scales);
+  supine_deform(basis, weights, scales, whole);
+  for (int trial = 0; trial < trials; ++trial) {
+    const double a = (fixture_random(&random) + 1) / 2;
+    const double b = (fixture_random(&random) + 1) / 2;
+    size_t begin = (size_t)((double)vertices * (a < b ? a : b));
+    size_t end = (size_t)((double)vertices * (a < b ? b : a)) + 1;
+    if (trial % 5 == 0) {
+      begin = 0;
+      end = vertices;
+    }
+    const size_t count = end - begin;
+    const size_t shift = (size_t)trial % 17;
+    for (size_t i = 0; i < 3 * count + 64; ++i) {
+      part[i] = mark;
+    }
+    for (size_t i = 0; i < 3 * (count + 64); ++i) {
+      split[i] = mark;
+    }
+    supine_deform_range(basis, weights, scales, begin, end, part + shift);
+    assert_memory_equal(part + shift, whole + 3 * begin, 3 * count * sizeof *part);
+    for (size_t i = 0; i < 64; ++i) {
+      assert_true((i < shift ? part[i] : part[i + 3 * count]) == mark);
+    }
+    float *x = split + shift;
+    float *y = x + count + 21;
+    float *z = y + count + 22;
+    supine_deform_separate(basis, weights, scales, begin, end, x, y, z);
+    for (size_t i = 0; i < count; ++i) {
+      const float *p = whole + 3 * (begin + i);
+      assert_true(x[i] == p[0] && y[i] == p[1] && z[i] == p[2]);
+    }
+    for (size_t i = 0; i < 21; ++i) {
+      assert_true(x[count + i] == mark && y[count + i] == mark);
+    }
+    assert_true((shift == 0 || x[-1] == mark) && z[count] == mark);
+  }
+  supine_deform_range(basis, weights, scales, 5, 5, NULL); /* nothing to do */
+  free(whole);
+  free(part);
+  free(split);
+  supine_basis_close(basis);
+  drop(&o);
+}
+
+static void test_deform_range_any_part_same_bits(void **state) {
+  (void)state;
+  for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
+    check_ranges(331, 5, 3, (supine_simd)simd, 300);
+  }
+}
+
+static void test_deform_range_past_cache_same_bits(void **state) {
+  (void)state;
+  for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
+    check_ranges(300007, 16, 2, (supine_simd)simd, 18);
+  }
+}
+
+static void test_displace_range_rest_added_is_deform(void **state) {
+  (void)state;
+  for (int vector = 0; vector < 2; ++vector) {
+    opened o = made(fixture_create(100, 7, 2, 2, vector != 0, false, 11, 8));
+    for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
+      supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, (supine_simd)simd);
+      if (basis == NULL) {
+        continue;
+      }
+      uint64_t random = 3;
+      double weights[SUPINE_MODES_MAX];
+      double scales[SUPINE_LUNGS_MAX];
+      double exact[300];
+      float moved[3 * 86];
+      random_frame(basis, &random, weights, scales);
+      fixture_deform(o.f, weights, scales, exact);
+      supine_displace_range(basis, weights, scales, 3, 89, moved);
+      for (size_t i = 0; i < (size_t)3 * 86; ++i) {
+        moved[i] += o.f->vertex[9 + i];
+      }
+      assert_true(farthest(moved, exact, 3, 89) <= supine_basis_error(basis, weights, scales));
+      supine_basis_close(basis);
+    }
+    drop(&o);
+  }
+}
+
+static void test_step_many_steps_reach_the_volume(void **state) {
+  (void)state;
+  opened o = made(fixture_create(100, 7, 2, 2, false, false, 11, 8));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  uint64_t random = 5;
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  double exact[300];
+  float step[300];
+  float xyz[300];
+  random_frame(basis, &random, weights, scales);
+  enum { STEPS = 60 };
+  const double small[2] = {scales[0] / STEPS, scales[1] / STEPS};
+  const double none[2] = {0, 0};
+  supine_displace_range(basis, weights, small, 0, 100, step);
+  supine_deform(basis, weights, none, xyz);
+  for (int i = 0; i < STEPS; ++i) {
+    supine_step(100, step, xyz);
+  }
+  fixture_deform(o.f, weights, scales, exact);
+  const double drift = STEPS * 0x1p-24 * 512 * 1.8; /* half a unit a step, three axes */
+  assert_true(farthest(xyz, exact, 0, 100) <= supine_basis_error(basis, weights, scales) + drift);
+  supine_basis_close(basis);
+  drop(&o);
+}
+
+static void check_batch(size_t vertices, size_t modes, bool vector, size_t count, size_t begin,
+                        size_t end) {
+  opened o = made(fixture_create(vertices, modes, 2, 2, vector, false, 11, 8));
+  double *weights = allocate(count * modes, sizeof *weights);
+  double *scales = allocate(count * 2 + SUPINE_LUNGS_MAX, sizeof *scales);
+  double *exact = allocate(3 * vertices, sizeof *exact);
+  float *xyz = allocate(3 * count * (end - begin), sizeof *xyz);
+  for (int storage = 1; storage < SUPINE_STORAGE_COUNT; ++storage) {
+    for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
+      supine_basis *basis = open_as(&o, (supine_storage)storage, (supine_simd)simd);
+      if (basis == NULL) {
+        continue;
+      }
+      uint64_t random = 77;
+      for (size_t j = 0; j < count; ++j) {
+        random_frame(basis, &random, weights + j * modes, scales + 2 * j);
+      }
+      supine_deform_batch(basis, count, weights, scales, begin, end, xyz);
+      for (size_t j = 0; j < count; ++j) {
+        fixture_deform(o.f, weights + j * modes, scales + 2 * j, exact);
+        const double error = farthest(xyz + 3 * j * (end - begin), exact, begin, end);
+        if (!(error <= supine_basis_error(basis, weights + j * modes, scales + 2 * j))) {
+          fail_msg("orientation %zu storage %d code %d: %g mm", j, storage, simd, error);
+        }
+      }
+      supine_basis_close(basis);
+    }
+  }
+  free(weights);
+  free(scales);
+  free(exact);
+  free(xyz);
+  drop(&o);
+}
+
+static void test_deform_batch_each_orientation_within_stated_error(void **state) {
+  (void)state;
+  check_batch(700, 16, false, 64, 0, 700);
+  check_batch(700, 16, false, 1, 3, 691);
+  check_batch(90, 16, false, 300, 0, 90); /* more than one group of weights */
+  check_batch(90, 3, false, 5, 17, 60);
+  check_batch(90, 3, false, 5, 17, 18);
+  check_batch(90, 5, true, 5, 0, 90);
+  check_batch(90, 255, false, 18, 1, 90);
+  check_batch(90, 256, true, 3, 1, 90); /* one widened tile outgrows the block */
+}
+
+static void test_normals_bipyramid_area_weighted(void **state) {
+  (void)state;
+  opened o = made(fixture_create(40, 2, 1, 2, false, false, 11, 8));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  float normals[120];
+  supine_normals(basis, o.f->vertex, normals);
+  double sums[120] = {0};
+  for (size_t t = 0; t < o.f->triangles; ++t) {
+    const uint32_t *corner = o.f->triangle + 3 * t;
+    double u[3];
+    double v[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double origin = (double)o.f->vertex[3 * corner[0] + axis];
+      u[axis] = (double)o.f->vertex[3 * corner[1] + axis] - origin;
+      v[axis] = (double)o.f->vertex[3 * corner[2] + axis] - origin;
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const size_t b = (axis + 1) % 3;
+        const size_t c = (axis + 2) % 3;
+        sums[3 * corner[j] + axis] += u[b] * v[c] - u[c] * v[b];
+      }
+    }
+  }
+  for (size_t i = 0; i < 40; ++i) {
+    const double *s = sums + 3 * i;
+    const double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    assert_true(length > 0);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      assert_true(fabs((double)normals[3 * i + axis] - s[axis] / length) <= 64 * 0x1p-24);
+    }
+  }
+  /* Outwards: the upper tip's points up. */
+  assert_true(normals[3 * 39 + 2] > 0.9F);
+  /* A surface that has shrunk to a point has none. */
+  float point[120] = {0};
+  supine_normals(basis, point, normals);
+  for (size_t i = 0; i < 120; ++i) {
+    assert_true(normals[i] == 0);
+  }
+  supine_basis_close(basis);
+  drop(&o);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_deform_every_path_within_stated_error),
+      cmocka_unit_test(test_deform_every_mode_count_within_stated_error),
+      cmocka_unit_test(test_basis_error_bound_near_what_happens),
+      cmocka_unit_test(test_storage_error_orders_storages),
+      cmocka_unit_test(test_storage_auto_exact_where_int16_errs),
+      cmocka_unit_test(test_open_bad_options_refused),
+      cmocka_unit_test(test_deform_range_any_part_same_bits),
+      cmocka_unit_test(test_deform_range_past_cache_same_bits),
+      cmocka_unit_test(test_displace_range_rest_added_is_deform),
+      cmocka_unit_test(test_step_many_steps_reach_the_volume),
+      cmocka_unit_test(test_deform_batch_each_orientation_within_stated_error),
+      cmocka_unit_test(test_normals_bipyramid_area_weighted),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

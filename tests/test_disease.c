@@ -1,0 +1,325 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lesions and collapse: what they change and what they leave alone. */
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/disease.h>
+#include <supine/precompute.h>
+#include <supine/volume.h>
+#include <supine/volume_forms.h>
+
+#include "lungs_helpers.h"
+
+static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+static const double supine[3] = {0.0, 1.0, 0.0};
+
+static supine_lungs lumps(void) {
+  supine_mesh meshes[2] = {helper_lump(9, 80.0, 5), helper_lump(9, -75.0, 6)};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(meshes, 2, NULL, &lungs, NULL), SUPINE_OK);
+  supine_mesh_free(&meshes[0]);
+  supine_mesh_free(&meshes[1]);
+  return lungs;
+}
+
+static supine_solution solve(const supine_lungs *lungs, const double g[3]) {
+  const supine_model model = supine_model_default();
+  supine_solution solution = {0};
+  supine_error error = {0};
+  if (supine_solve(lungs, &model, g, &solution, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return solution;
+}
+
+static double distance(const double *p, const double *q) {
+  return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+}
+
+/* The outermost point of the left lung. */
+static const double *side_of(const supine_lungs *lungs) {
+  size_t found = 0;
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    found = lungs->mesh.vertices[3 * i] > lungs->mesh.vertices[3 * found] ? i : found;
+  }
+  return lungs->mesh.vertices + 3 * found;
+}
+
+/* Least and greatest ratio of what a lesion makes of displacements to what they were. */
+typedef struct change {
+  double inside[2]; /* nearer than half the radius */
+  double far[2];    /* 50 mm and more from the lesion's edge */
+} change;
+
+static void widen(double range[2], double value) {
+  range[0] = fmin(range[0], value);
+  range[1] = fmax(range[1], value);
+}
+
+/* Both breathe `volume` mL, or at one breath scale where it is 0. */
+static change change_by(supine_lungs *lungs, const supine_lesion *lesion, double volume) {
+  supine_solution healthy = solve(lungs, supine);
+  size_t reached = 0;
+  assert_int_equal(supine_lungs_add_lesion(lungs, lesion, &reached, NULL), SUPINE_OK);
+  assert_true(reached > 10);
+  supine_solution ill = solve(lungs, supine);
+  double scale[2] = {1.0, 1.0};
+  if (volume != 0.0) {
+    assert_int_equal(supine_volume_scale(healthy.cubic, volume, &scale[0], NULL), SUPINE_OK);
+    assert_int_equal(supine_volume_scale(ill.cubic, volume, &scale[1], NULL), SUPINE_OK);
+  }
+  change found = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    const double r = distance(lungs->mesh.vertices + 3 * i, lesion->centre);
+    const double ratio = scale[1] * ill.catch_[i] / (scale[0] * healthy.catch_[i]);
+    if (r < 0.5 * lesion->radius) {
+      widen(found.inside, ratio);
+    } else if (r > lesion->radius + 50.0) {
+      widen(found.far, ratio);
+    }
+  }
+  supine_solution_free(&healthy);
+  supine_solution_free(&ill);
+  free(lungs->lesions);
+  lungs->lesions = NULL;
+  return found;
+}
+
+static void check_lesions(supine_lungs *lungs) {
+  const double *side = side_of(lungs);
+  for (int reach = 0; reach < 2; ++reach) {
+    lungs->reach = reach == 0 ? 0.0 : 10.0;
+    static const double factors[] = {2.0, 10.0};
+    for (size_t f = 0; f < 2; ++f) {
+      const supine_lesion lesion = {{side[0] - 8.0, side[1], side[2]}, 25.0, factors[f]};
+      const change scaled = change_by(lungs, &lesion, 0.0);
+      const change breathed = change_by(lungs, &lesion, 500.0);
+      printf("reach %2g mm, factor %2g: inside %.3f to %.3f; 50 mm away %.6f to %.6f at one scale, "
+             "%.6f to %.6f at 500 mL\n",
+             lungs->reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
+             scaled.far[1], breathed.far[0], breathed.far[1]);
+      assert_true(scaled.inside[1] < 0.9);
+      assert_true(breathed.inside[1] < 0.9);
+      assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
+      /* At one volume all others take what the lesion leaves, in the same proportion. */
+      assert_true(breathed.far[1] / breathed.far[0] - 1.0 < scaled.far[1] - scaled.far[0] + 1e-9);
+      const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
+      const change by_small = change_by(lungs, &small, 500.0);
+      printf("                         of 18 mm: %.6f to %.6f at 500 mL\n", by_small.far[0],
+             by_small.far[1]);
+      assert_true(by_small.inside[1] < 0.9);
+      assert_true(by_small.far[0] > 0.99 && by_small.far[1] < 1.01);
+    }
+    const supine_lesion soft = {{side[0] - 8.0, side[1], side[2]}, 25.0, 0.25};
+    assert_true(change_by(lungs, &soft, 500.0).inside[0] > 1.0);
+  }
+  lungs->reach = 0.0;
+}
+
+static void test_lesion_real_lungs_lowers_itself_and_leaves_the_rest(void **state) {
+  (void)state;
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+  }
+  check_lesions(&lungs);
+  supine_lungs_free(&lungs);
+}
+
+/* Scaling to geometric mean 1 with the lesion in it would change E everywhere. */
+static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  supine_solution healthy = solve(&lungs, supine);
+  const double *side = side_of(&lungs);
+  const supine_lesion lesion = {{side[0], side[1], side[2]}, 90.0, 50.0};
+  size_t reached = 0;
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of them */
+  supine_solution ill = solve(&lungs, supine);
+  for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
+    assert_true(fabs(ill.catch_[i] - healthy.catch_[i]) <= 1e-12 * healthy.catch_[i] + 1e-14);
+  }
+  supine_solution_free(&healthy);
+  supine_solution_free(&ill);
+  supine_lungs_free(&lungs);
+}
+
+static void test_lesion_factor_one_changes_no_bit(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  supine_solution healthy = solve(&lungs, supine);
+  const double *side = side_of(&lungs);
+  const supine_lesion lesion = {{side[0], side[1], side[2]}, 40.0, 1.0};
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
+  supine_solution same = solve(&lungs, supine);
+  assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
+  assert_memory_equal(same.cubic, healthy.cubic, sizeof same.cubic);
+  supine_solution_free(&healthy);
+  supine_solution_free(&same);
+  supine_lungs_free(&lungs);
+}
+
+static void test_lesion_profile_is_as_documented(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  const double *centre = side_of(&lungs);
+  const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK); /* multiply */
+  size_t seen[3] = {0, 0, 0};
+  for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
+    const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
+    const double value = lungs.lesions[i];
+    if (r <= 0.5) {
+      assert_true(fabs(value - 49.0) <= 64.0 * DBL_EPSILON * 49.0);
+      ++seen[0];
+    } else if (r >= 1.0) {
+      assert_true(value == 1.0);
+      ++seen[1];
+    } else {
+      const double q = 2.0 - 2.0 * r;
+      assert_true(fabs(log(value) - 2.0 * log(7.0) * (3.0 - 2.0 * q) * q * q) < 1e-12);
+      ++seen[2];
+    }
+  }
+  assert_true(seen[0] > 3 && seen[1] > 3 && seen[2] > 3);
+  supine_lungs_free(&lungs);
+}
+
+static void test_lesion_outside_reaches_nothing(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  supine_solution healthy = solve(&lungs, supine);
+  const supine_lesion lesion = {{900.0, 0.0, 0.0}, 40.0, 9.0};
+  size_t reached = 1;
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  assert_int_equal(reached, 0);
+  supine_solution same = solve(&lungs, supine);
+  assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
+  supine_solution_free(&healthy);
+  supine_solution_free(&same);
+  supine_lungs_free(&lungs);
+}
+
+static void test_lesion_bad_numbers_refused(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  static const supine_lesion bad[] = {{{NAN, 0, 0}, 10, 2},     {{0, INFINITY, 0}, 10, 2},
+                                      {{0, 0, 0}, 0, 2},        {{0, 0, 0}, -1, 2},
+                                      {{0, 0, 0}, INFINITY, 2}, {{0, 0, 0}, 10, 0},
+                                      {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    supine_error error = {0};
+    assert_int_equal(supine_lungs_add_lesion(&lungs, &bad[i], NULL, &error), SUPINE_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "lesion at"));
+  }
+  assert_null(lungs.lesions);
+  supine_lungs_free(&lungs);
+}
+
+/* Volumes of lung j of a surface, mL. */
+static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices) {
+  const supine_mesh part = {lungs->mesh.vertex_count, vertices,
+                            lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
+                            lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
+  return 1e-3 * supine_mesh_volume(&part);
+}
+
+static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void **state) {
+  (void)state;
+  static const double directions[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.48, -0.6, 0.64}};
+  const double share = 0.3;
+  const double scale = 1.7;
+  supine_lungs lungs = lumps();
+  const size_t n = lungs.mesh.vertex_count;
+  double *rest = malloc(3 * n * sizeof *rest);
+  double *moved = malloc(3 * n * sizeof *moved);
+  for (size_t d = 0; d < 4; ++d) {
+    double rests[2][2];
+    double gains[2][2];
+    double cubic[2];
+    for (int ill = 0; ill < 2; ++ill) {
+      assert_int_equal(supine_lungs_collapse(&lungs, 0, ill == 1 ? share : 1.0, NULL), SUPINE_OK);
+      supine_solution solution = solve(&lungs, directions[d]);
+      supine_lungs_rest(&lungs, rest);
+      const supine_mesh shape = {n, rest, 0, NULL};
+      supine_solution_apply(&solution, &shape, scale, moved);
+      for (size_t lung = 0; lung < 2; ++lung) {
+        rests[ill][lung] = volume_of(&lungs, lung, rest);
+        gains[ill][lung] = volume_of(&lungs, lung, moved) - rests[ill][lung];
+      }
+      cubic[ill] = supine_volume_at(solution.cubic, scale);
+      supine_solution_free(&solution);
+    }
+    for (size_t lung = 0; lung < 2; ++lung) {
+      const double wanted = lung == 0 ? share : 1.0;
+      assert_true(fabs(rests[1][lung] - wanted * rests[0][lung]) < 1e-12 * rests[0][lung]);
+      assert_true(fabs(gains[1][lung] - wanted * gains[0][lung]) < 1e-10 * rests[0][lung]);
+    }
+    assert_true(gains[0][0] > 1.0);
+    assert_true(fabs(cubic[1] - gains[1][0] - gains[1][1]) < 1e-9 * rests[0][0]);
+  }
+  free(rest);
+  free(moved);
+  supine_lungs_free(&lungs);
+}
+
+static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void **state) {
+  (void)state;
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+  }
+  assert_int_equal(supine_lungs_collapse(&lungs, 1, 0.25, NULL), SUPINE_OK);
+  double *rest = malloc(3 * lungs.mesh.vertex_count * sizeof *rest);
+  supine_lungs_rest(&lungs, rest);
+  double outer[2] = {0.0, 0.0};
+  for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      if (i < lungs.lung_begin[1]) {
+        assert_true(rest[3 * i + k] == lungs.mesh.vertices[3 * i + k]);
+      }
+      assert_true(rest[3 * i + k] >= lungs.minimum[k] && rest[3 * i + k] <= lungs.maximum[k]);
+    }
+    outer[0] = fmin(outer[0], lungs.mesh.vertices[3 * i]);
+    outer[1] = fmin(outer[1], rest[3 * i]);
+  }
+  assert_true(outer[1] > outer[0] + 20.0); /* room between the lung's side and the chest, mm */
+  free(rest);
+  supine_lungs_free(&lungs);
+}
+
+static void test_collapse_bad_arguments_refused(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  static const double bad[] = {0.0, -0.5, 1.0001, NAN, INFINITY};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    assert_int_equal(supine_lungs_collapse(&lungs, 0, bad[i], NULL), SUPINE_ERROR_ARGUMENT);
+  }
+  assert_int_equal(supine_lungs_collapse(&lungs, 2, 0.5, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_true(lungs.share[0] == 1.0 && lungs.share[1] == 1.0);
+  supine_lungs_free(&lungs);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest),
+      cmocka_unit_test(test_lesion_large_leaves_the_other_lung_to_rounding),
+      cmocka_unit_test(test_lesion_factor_one_changes_no_bit),
+      cmocka_unit_test(test_lesion_profile_is_as_documented),
+      cmocka_unit_test(test_lesion_outside_reaches_nothing),
+      cmocka_unit_test(test_lesion_bad_numbers_refused),
+      cmocka_unit_test(test_collapse_rest_and_breath_are_its_share_in_every_direction),
+      cmocka_unit_test(test_collapse_draws_towards_the_midline_within_the_healthy_box),
+      cmocka_unit_test(test_collapse_bad_arguments_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

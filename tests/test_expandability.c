@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Expandability: regional models, files, and what both do to displacement. */
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/expandability.h>
+#include <supine/precompute.h>
+
+#include "lungs_helpers.h"
+
+static char path[] = "/tmp/supine-expandability-XXXXXX";
+static supine_lungs lungs;
+
+static int setup(void **state) {
+  (void)state;
+  const int file = mkstemp(path);
+  supine_mesh lump = helper_lump(6, 80.0, 11);
+  const supine_status status = supine_lungs_create(&lump, 1, NULL, &lungs, NULL);
+  supine_mesh_free(&lump);
+  return file < 0 || close(file) != 0 || status != SUPINE_OK ? -1 : 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  supine_lungs_free(&lungs);
+  return unlink(path);
+}
+
+static void write_text(const char *text) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  (void)fputs(text, file);
+  assert_int_equal(fclose(file), 0);
+}
+
+static void test_regional_follows_box_coordinates(void **state) {
+  (void)state;
+  const size_t n = lungs.mesh.vertex_count;
+  double *a = malloc(n * sizeof *a);
+  for (int axis = 0; axis < 3; ++axis) {
+    const supine_expandability_law linear = {SUPINE_EXPANDABILITY_LINEAR, axis, 0.5, 1.5};
+    const supine_expandability_law ratios = {SUPINE_EXPANDABILITY_EXPONENTIAL, axis, 0.25, 4.0};
+    double box[3];
+    assert_int_equal(supine_expandability_regional(&lungs, &linear, a, NULL), SUPINE_OK);
+    for (size_t i = 0; i < n; ++i) {
+      supine_lungs_box_coordinates(&lungs, i, box);
+      assert_true(fabs(a[i] - 0.5 - box[axis]) <= 4.0 * DBL_EPSILON);
+    }
+    assert_int_equal(supine_expandability_regional(&lungs, &ratios, a, NULL), SUPINE_OK);
+    for (size_t i = 0; i < n; ++i) {
+      supine_lungs_box_coordinates(&lungs, i, box);
+      assert_true(fabs(log2(a[i]) + 2.0 - 4.0 * box[axis]) <= 1e-14);
+    }
+  }
+  const supine_expandability_law uniform = {0};
+  assert_int_equal(supine_expandability_regional(&lungs, &uniform, a, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n; ++i) {
+    assert_true(a[i] == 1.0);
+  }
+  free(a);
+}
+
+static void test_regional_bad_law_refused(void **state) {
+  (void)state;
+  double *a = malloc(lungs.mesh.vertex_count * sizeof *a);
+  static const supine_expandability_law bad[] = {
+      {SUPINE_EXPANDABILITY_LINEAR, 3, 1, 2},        {SUPINE_EXPANDABILITY_LINEAR, -1, 1, 2},
+      {SUPINE_EXPANDABILITY_LINEAR, 0, 0, 2},        {SUPINE_EXPANDABILITY_EXPONENTIAL, 0, 1, -2},
+      {SUPINE_EXPANDABILITY_EXPONENTIAL, 0, NAN, 2}, {SUPINE_EXPANDABILITY_LINEAR, 0, 1, INFINITY}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    assert_int_equal(supine_expandability_regional(&lungs, &bad[i], a, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+  }
+  free(a);
+}
+
+static void test_load_both_forms_read_the_same(void **state) {
+  (void)state;
+  static const double wanted[] = {1.5, 0.25, 3e-2};
+  static const char *const texts[] = {
+      "expandability\n1.5\n0.25\n3e-2\n",
+      "# made\n\nexpandability\r\n1.5\r\n 0.25 \r\n3e-2",
+      "vertex,expandability\n2,3e-2\n0,1.5\n# and\n1,0.25\n",
+  };
+  for (size_t t = 0; t < 3; ++t) {
+    double a[3] = {-1.0, -1.0, -1.0};
+    supine_error error = {0};
+    write_text(texts[t]);
+    if (supine_expandability_load(path, 3, a, &error) != SUPINE_OK) {
+      fail_msg("%s", error.message);
+    }
+    assert_memory_equal(a, wanted, sizeof a);
+  }
+}
+
+static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *line, *detail;
+  } bad[] = {
+      {"a\n1\n-2\n3\n", ":3:", "vertex 1 is -2"},
+      {"a\n1\n0\n3\n", ":3:", "vertex 1 is 0"},
+      {"a\n1\nnan\n3\n", ":3:", "vertex 1 is nan"},
+      {"a\n1\n1e999\n3\n", ":3:", "vertex 1 is inf"},
+      {"a\n1\n1e-320\n3\n", ":3:", "vertex 1"},
+      {"a\n1\n2\n", "", "vertex 2 of 3 has no expandability"},
+      {"a\n1\n2\n3\n4\n", ":5:", "vertex 3, but the model has 3"},
+      {"a\n1\ntwo\n3\n", ":3:", "'two' is not a number"},
+      {"a\n1\n2 2\n3\n", ":3:", "is not a number"},
+      {"1\n2\n3\n", ":1:", "header"},
+      {"", "", "vertex 0 of 3"},
+      {"vertex,a\n0,1\n2,1\n", "", "vertex 1 of 3 has no"},
+      {"vertex,a\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 has a value already"},
+      {"vertex,a\n0,1\n7,1\n", ":3:", "vertex 7"},
+      {"vertex,a\n0,1\n-1,1\n", ":3:", "'-1,1'"},
+      {"vertex,a\n0,1\n1;1\n", ":3:", "'1;1'"},
+      {"vertex,a\n0,1\n99999999999999999999,1\n", ":3:", "not a number"},
+      {"vertex,a\n0,1\n1,-4\n", ":3:", "vertex 1 is -4"},
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    double a[3];
+    supine_error error = {0};
+    write_text(bad[i].text);
+    assert_int_equal(supine_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
+    if (strstr(error.message, bad[i].line) == NULL ||
+        strstr(error.message, bad[i].detail) == NULL) {
+      fail_msg("%s", error.message);
+    }
+  }
+}
+
+static void test_load_binary_or_missing_refused(void **state) {
+  (void)state;
+  double a[3];
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  (void)fwrite("a\n1\0\n", 1, 5, file);
+  assert_int_equal(fclose(file), 0);
+  assert_int_equal(supine_expandability_load(path, 3, a, NULL), SUPINE_ERROR_FORMAT);
+  supine_error error = {0};
+  assert_int_equal(supine_expandability_load("/nowhere/a.csv", 3, a, &error), SUPINE_ERROR_READ);
+  assert_non_null(strstr(error.message, "/nowhere/a.csv"));
+  assert_int_equal(supine_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
+}
+
+static void test_stiffness_is_reciprocal_and_names_bad_vertex(void **state) {
+  (void)state;
+  const double a[3] = {0.5, 4.0, 1.0};
+  double e[3];
+  assert_int_equal(supine_expandability_stiffness(3, a, e, NULL), SUPINE_OK);
+  assert_true(e[0] == 2.0 && e[1] == 0.25 && e[2] == 1.0);
+  static const double bad[] = {0.0, -1.0, NAN, INFINITY, 5e-324};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    const double spoiled[3] = {0.5, bad[i], 1.0};
+    supine_error error = {0};
+    assert_int_equal(supine_expandability_stiffness(3, spoiled, e, &error), SUPINE_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "vertex 1"));
+  }
+}
+
+/* Twice as expandable everywhere changes nothing; more expandable in one place moves that more. */
+static void test_expandability_is_relative_and_its_sign_is_as_documented(void **state) {
+  (void)state;
+  const size_t n = lungs.mesh.vertex_count;
+  const double g[3] = {0.0, 1.0, 0.0};
+  double *e = malloc(n * sizeof *e);
+  supine_solution found[3] = {{0}};
+  for (int i = 0; i < 3; ++i) {
+    const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, i == 0 ? 1.0 : 0.5 * i,
+                                          i == 0 ? 1.0 : 1.5 * i};
+    supine_model model = supine_model_default();
+    model.stiffness = e;
+    assert_int_equal(supine_expandability_regional(&lungs, &law, e, NULL), SUPINE_OK);
+    assert_int_equal(supine_expandability_stiffness(n, e, e, NULL), SUPINE_OK);
+    assert_int_equal(supine_solve(&lungs, &model, g, &found[i], NULL), SUPINE_OK);
+  }
+  double ends[2] = {0.0, 0.0}; /* mean ratio to uniform near the apex and the base */
+  double count[2] = {0.0, 0.0};
+  for (size_t i = 0; i < n; ++i) {
+    double box[3];
+    supine_lungs_box_coordinates(&lungs, i, box);
+    assert_true(fabs(found[1].catch_[i] - found[2].catch_[i]) <= 1e-12);
+    if (found[0].catch_[i] > 0.01 && (box[2] < 0.2 || box[2] > 0.8)) {
+      ends[box[2] > 0.5] += found[1].catch_[i] / found[0].catch_[i];
+      count[box[2] > 0.5] += 1.0;
+    }
+  }
+  assert_true(ends[0] / count[0] < 0.8);
+  assert_true(ends[1] / count[1] > 1.2);
+  for (int i = 0; i < 3; ++i) {
+    supine_solution_free(&found[i]);
+  }
+  free(e);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_regional_follows_box_coordinates),
+      cmocka_unit_test(test_regional_bad_law_refused),
+      cmocka_unit_test(test_load_both_forms_read_the_same),
+      cmocka_unit_test(test_load_bad_files_refused_naming_line_and_vertex),
+      cmocka_unit_test(test_load_binary_or_missing_refused),
+      cmocka_unit_test(test_stiffness_is_reciprocal_and_names_bad_vertex),
+      cmocka_unit_test(test_expandability_is_relative_and_its_sign_is_as_documented),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

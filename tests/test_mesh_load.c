@@ -1,0 +1,409 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Loading small files of every kind: what is welded, dropped, turned and scaled. */
+#include <math.h>
+#include <pthread.h>
+#include <sys/stat.h>
+
+#include "mesh_samples.h"
+
+static const char tetrahedron_obj[] = "v 0 0 0\nv 120 0 0\nv 0 120 0\nv 0 0 120\n"
+                                      "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+static const char tetrahedron_stl[] =
+    "solid\n"
+    "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 120 "
+    "0\nvertex 120 0 0\nendloop\nendfacet\n"
+    "facet normal 0 -1 0\nouter loop\nvertex 0 -0 0\nvertex 120 0 "
+    "0\nvertex 0 0 120\nendloop\nendfacet\n"
+    "facet normal -1 0 0\nouter loop\nvertex 0 0 -0\nvertex 0 0 "
+    "120\nvertex 0 120 0\nendloop\nendfacet\n"
+    "facet normal 1 1 1\nouter loop\nvertex 120 0 0\nvertex 0 120 "
+    "0\nvertex 0 0 120\nendloop\nendfacet\n"
+    "endsolid\n";
+
+/* Loads what must load, and removes the file. */
+static supine_mesh load(const char *path, const supine_mesh_load_options *options,
+                        supine_mesh_report *report) {
+  supine_mesh mesh = {0};
+  supine_error error = {0};
+  const supine_status status = supine_mesh_load(path, options, &mesh, report, &error);
+  if (status != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(unlink(path), 0);
+  return mesh;
+}
+
+static void expect_refused(const char *path, const supine_mesh_load_options *options,
+                           supine_status expected, const char *words) {
+  supine_mesh mesh = {0};
+  supine_mesh_report report = {.file_vertices = 77};
+  supine_error error = {0};
+  const supine_status status = supine_mesh_load(path, options, &mesh, &report, &error);
+  if (status != expected || strstr(error.message, words) == NULL ||
+      strstr(error.message, path) == NULL || strchr(error.message, '\n') != NULL) {
+    fail_msg("%s: status %d, message \"%s\"", path, (int)status, error.message);
+  }
+  assert_int_equal(error.status, expected);
+  assert_null(mesh.vertices);
+  assert_null(mesh.triangles);
+  assert_int_equal(report.file_vertices, 77);
+  assert_int_equal(supine_mesh_load(path, options, &mesh, NULL, NULL), expected);
+}
+
+static void refuse_text(void **state, const char *name, const char *text, supine_status expected,
+                        const char *words) {
+  char path[256];
+  expect_refused(sample_text(state, name, text, path), NULL, expected, words);
+  assert_int_equal(unlink(path), 0);
+}
+
+static void expect_tetrahedron(const supine_mesh *mesh) {
+  assert_int_equal(mesh->vertex_count, 4);
+  assert_int_equal(mesh->triangle_count, 4);
+  assert_true(fabs(supine_mesh_volume(mesh) - 288000.0) < 1.0e-6);
+}
+
+static void test_load_stl_soup_equals_indexed(void **state) {
+  char path[256];
+  supine_mesh_report report = {0};
+  supine_mesh soup = load(sample_text(state, "a.stl", tetrahedron_stl, path), NULL, &report);
+  expect_tetrahedron(&soup);
+  assert_int_equal(report.file_vertices, 12);
+  assert_int_equal(report.file_faces, 4);
+  assert_int_equal(report.welded_vertices, 8); /* -0 is 0 */
+  assert_int_equal(report.degenerate_faces, 0);
+  assert_int_equal(report.unreferenced_vertices, 0);
+  /* In order of first appearance. */
+  static const double vertices[] = {0, 0, 0, 0, 120, 0, 120, 0, 0, 0, 0, 120};
+  static const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 3, 1, 2, 1, 3};
+  assert_memory_equal(soup.vertices, vertices, sizeof vertices);
+  assert_memory_equal(soup.triangles, triangles, sizeof triangles);
+  supine_mesh_free(&soup);
+}
+
+static void test_load_polygons_cut_points_and_lines_dropped(void **state) {
+  static const char text[] =
+      "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nv 50 50 90\nv 7 7 7\nv 8 8 8\n"
+      "f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nl 6 7\np 6\n";
+  char path[256];
+  supine_mesh_report report = {0};
+  supine_mesh mesh = load(sample_text(state, "pyramid.obj", text, path), NULL, &report);
+  assert_int_equal(mesh.vertex_count, 5);
+  assert_int_equal(mesh.triangle_count, 6);
+  assert_int_equal(report.file_faces, 8);
+  assert_int_equal(report.degenerate_faces, 2);
+  assert_int_equal(report.unreferenced_vertices, 2);
+  assert_true(fabs(supine_mesh_volume(&mesh) - 300000.0) < 1.0e-6);
+  supine_mesh_free(&mesh);
+}
+
+static void test_load_degenerate_and_unreferenced_dropped_counted(void **state) {
+  static const char text[] =
+      "ply\nformat ascii 1.0\nelement vertex 7\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n"
+      "55 55 55\n0 0 0\n120 0 0\n0 120 0\n0 0 120\n0 0 0\n66 66 66\n"
+      "3 1 3 2\n3 1 2 4\n3 5 4 3\n3 2 3 4\n3 1 1 2\n3 1 5 6\n";
+  char path[256];
+  supine_mesh_report report = {0};
+  supine_mesh mesh = load(sample_text(state, "a.PLY", text, path), NULL, &report);
+  expect_tetrahedron(&mesh);
+  assert_int_equal(report.file_vertices, 7);
+  assert_int_equal(report.file_faces, 6);
+  assert_int_equal(report.welded_vertices, 1);
+  assert_int_equal(report.degenerate_faces, 2);
+  assert_int_equal(report.unreferenced_vertices, 2);
+  supine_mesh_free(&mesh);
+}
+
+static void test_load_off_comments_and_colours(void **state) {
+  static const char text[] = "COFF # a tetrahedron\n4 4 6\n\n0 0 0 255 0 0\n120 0 0 255 0 0\n"
+                             "0 120 0 255 0 0 # y\n\n# z\n0 0 120 255 0 0\n3 0 2 1\n# between\n"
+                             "3 0 1 3 9 9 9\n\n3 0 3 2\n3 1 2 3";
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "a.off", text, path), NULL, NULL);
+  expect_tetrahedron(&mesh);
+  supine_mesh_free(&mesh);
+  mesh = load(sample_text(state, "without_ending", text + 1, path), NULL, NULL);
+  expect_tetrahedron(&mesh);
+  supine_mesh_free(&mesh);
+}
+
+/* Two nodes hold the tetrahedron: one moved, one mirrored and moved; both face outwards. */
+static void test_load_nodes_transformed_mirror_keeps_sense(void **state) {
+  static const char text[] =
+      "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
+      "{\"children\":[1,2],\"translation\":[0,0,1000]},"
+      "{\"mesh\":0,\"translation\":[10,20,30]},{\"mesh\":0,\"scale\":[-1,1,1],\"translation\":[-"
+      "10,0,0]}],"
+      "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],"
+      "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\","
+      "\"min\":[0,0,0],\"max\":[120,120,120]},"
+      "{\"bufferView\":1,\"componentType\":5123,\"count\":12,\"type\":\"SCALAR\"}],"
+      "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":48},"
+      "{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}],"
+      "\"buffers\":[{\"byteLength\":72,\"uri\":\"data:application/octet-stream;base64,"
+      "AAAAAAAAAAAAAAAAAADwQgAAAAAAAAAAAAAAAAAA8EIAAAAAAAAAAAAAAAAAAPBCAAACAAEAAAABAAMAAAADAAIAAQAC"
+      "A"
+      "AMA\"}]}";
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "a.gltf", text, path), NULL, NULL);
+  assert_int_equal(mesh.vertex_count, 8);
+  assert_int_equal(mesh.triangle_count, 8);
+  assert_true(fabs(supine_mesh_volume(&mesh) - 2.0 * 288000.0) < 1.0e-6);
+  double minimum[3];
+  double maximum[3];
+  supine_mesh_box(&mesh, minimum, maximum);
+  const double expected_minimum[3] = {-130.0, 0.0, 1000.0};
+  const double expected_maximum[3] = {130.0, 140.0, 1150.0};
+  assert_memory_equal(minimum, expected_minimum, sizeof minimum);
+  assert_memory_equal(maximum, expected_maximum, sizeof maximum);
+  supine_topology topology = {0};
+  assert_int_equal(supine_topology_create(&mesh, &topology), SUPINE_OK);
+  assert_true(topology.closed);
+  assert_int_equal(topology.component_count, 2);
+  supine_topology_free(&topology);
+  supine_mesh_free(&mesh);
+}
+
+/* Loads the tetrahedron with a first line `head`; returns vertex 1's x, 120 or -120. */
+static double x_under(void **state, const char *name, const char *head, supine_axes axes,
+                      supine_mesh_report *report) {
+  char text[512];
+  char path[256];
+  (void)snprintf(text, sizeof text, "%s%s", head, tetrahedron_obj);
+  const supine_mesh_load_options options = {.axes = axes};
+  supine_mesh mesh = load(sample_text(state, name, text, path), &options, report);
+  expect_tetrahedron(&mesh);
+  double x = 0.0;
+  for (size_t i = 0; i < 12; ++i) {
+    x = i % 3 == 0 && mesh.vertices[i] != 0.0 ? mesh.vertices[i] : x;
+  }
+  supine_mesh_free(&mesh);
+  return x;
+}
+
+static void test_load_axes_tag_option_and_comment(void **state) {
+  static const struct {
+    const char *head;
+    supine_axes asked;
+    double x;
+    supine_axes axes;
+    bool from_tag;
+    bool names_ras;
+  } cases[] = {
+      {"", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
+      {"# SPACE=RAS\n", SUPINE_AXES_AUTO, -120.0, SUPINE_AXES_RAS, true, false},
+      {"# 3D Slicer output. SPACE=LPS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, true, false},
+      {"# x;space=ras;\n", SUPINE_AXES_AUTO, -120.0, SUPINE_AXES_RAS, true, false},
+      {"# SPACE=RAS\n", SUPINE_AXES_LPS, 120.0, SUPINE_AXES_LPS, false, false},
+      {"# SPACE=LPS\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
+      {"# left lung, RAS+ mm\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
+      {"# left lung, RAS+ mm\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
+      {"# grass, rasp\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
+      {"# SPACE=LAS\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_mesh_report report = {0};
+    const double x = x_under(state, "a.obj", cases[i].head, cases[i].asked, &report);
+    assert_true(x == cases[i].x);
+    assert_int_equal(report.axes, cases[i].axes);
+    assert_int_equal(report.axes_from_tag, cases[i].from_tag);
+    assert_int_equal(report.comment_names_ras, cases[i].names_ras);
+  }
+}
+
+static void test_load_axes_foreign_tag_refused(void **state) {
+  refuse_text(state, "a.obj", "# SPACE=LAS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+              SUPINE_ERROR_FORMAT, "SPACE tag");
+}
+
+static void test_load_units_scaled_and_guessed(void **state) {
+  static const struct {
+    double scale; /* of 120 mm */
+    const char *likely;
+  } cases[] = {{0.0, NULL},      {1.0, NULL},    {0.1, "inch"},  {0.2, "cm"},
+               {0.002, "m"},     {0.05, "inch"}, {2000.0, "um"}, {1.0e-7, "unknown"},
+               {0.6, "unknown"}, {5.0, NULL},    {0.667, NULL},  {1.0e6, "unknown"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    char path[256];
+    supine_mesh_report report = {0};
+    const supine_mesh_load_options options = {.millimetres_per_unit = cases[i].scale};
+    supine_mesh mesh = load(sample_text(state, "a.obj", tetrahedron_obj, path), &options, &report);
+    double minimum[3];
+    double maximum[3];
+    supine_mesh_box(&mesh, minimum, maximum);
+    assert_true(maximum[0] == 120.0 * (cases[i].scale == 0.0 ? 1.0 : cases[i].scale));
+    if (cases[i].likely == NULL) {
+      assert_null(report.likely_unit);
+    } else {
+      assert_non_null(report.likely_unit);
+      assert_string_equal(report.likely_unit, cases[i].likely);
+    }
+    supine_mesh_free(&mesh);
+  }
+}
+
+static void test_load_units_not_positive_argument(void **state) {
+  char path[256];
+  (void)sample_text(state, "a.obj", tetrahedron_obj, path);
+  static const double scales[] = {-1.0, (double)INFINITY, (double)NAN};
+  for (size_t i = 0; i < sizeof scales / sizeof *scales; ++i) {
+    const supine_mesh_load_options options = {.millimetres_per_unit = scales[i]};
+    expect_refused(path, &options, SUPINE_ERROR_ARGUMENT, "mm per unit");
+  }
+  assert_int_equal(unlink(path), 0);
+}
+
+static void test_load_missing_folder_device_unreadable_read(void **state) {
+  char path[256];
+  expect_refused(sample_path(state, "missing.ply", path), NULL, SUPINE_ERROR_READ, "No such file");
+  expect_refused(*state, NULL, SUPINE_ERROR_READ, "is a folder");
+  expect_refused("/dev/null", NULL, SUPINE_ERROR_READ, "not a regular file");
+  (void)sample_text(state, "a.obj", tetrahedron_obj, path);
+  assert_int_equal(chmod(path, 0), 0);
+  if (access(path, R_OK) != 0) { /* root may read all */
+    expect_refused(path, NULL, SUPINE_ERROR_READ, "Permission denied");
+  }
+  assert_int_equal(unlink(path), 0);
+}
+
+static void test_load_unknown_kind_format(void **state) {
+  refuse_text(state, "empty.ply", "", SUPINE_ERROR_FORMAT, "empty");
+  refuse_text(state, "a.jpg", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
+  refuse_text(state, "none", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
+  refuse_text(state, "a.vtp", "<VTKFile/>", SUPINE_ERROR_FORMAT, "written but not read");
+  refuse_text(state, "a.gltf", "{", SUPINE_ERROR_FORMAT, "malformed");
+  refuse_text(state, "a.dae", "\n<a>\n\n</b>\n", SUPINE_ERROR_FORMAT, "malformed");
+}
+
+static void test_load_no_triangles_mesh(void **state) {
+  refuse_text(state, "points.obj", "v 1 2 3\nv 4 5 6\n", SUPINE_ERROR_MESH, "no triangles");
+  refuse_text(state, "lines.obj", "v 1 2 3\nv 4 5 6\nl 1 2\n", SUPINE_ERROR_MESH, "no triangles");
+  refuse_text(state, "flat.obj", "v 1 2 3\nv 4 5 6\nv 1 2 3\nf 1 2 3\n", SUPINE_ERROR_MESH,
+              "no triangles");
+  refuse_text(state, "comment.obj", "# nothing here but words that go on for a while\n",
+              SUPINE_ERROR_MESH, "no triangles");
+  refuse_text(state, "points.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n1 2 3\n",
+              SUPINE_ERROR_MESH, "no triangles");
+  unsigned char stl[84] = {0};
+  char path[256];
+  expect_refused(sample_write(state, "empty.stl", stl, sizeof stl, path), NULL, SUPINE_ERROR_MESH,
+                 "no triangles");
+  assert_int_equal(unlink(path), 0);
+}
+
+static void test_load_not_finite_mesh_vertex_named(void **state) {
+  static const char head[] =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  static const char *const bad[] = {"nan", "inf", "-inf", "1e60"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    char text[512];
+    (void)snprintf(text, sizeof text, "%s0 0 0\n1 0 0\n0 %s 0\n1 1 1\n3 0 1 3\n", head, bad[i]);
+    refuse_text(state, "a.ply", text, SUPINE_ERROR_MESH, "vertex 2 of 4");
+  }
+  const float soup[12] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, NAN, 0};
+  unsigned char stl[134] = {0};
+  stl[80] = 1;
+  memcpy(stl + 84, soup, sizeof soup);
+  char path[256];
+  expect_refused(sample_write(state, "a.stl", stl, sizeof stl, path), NULL, SUPINE_ERROR_MESH,
+                 "vertex 2 of 3");
+  assert_int_equal(unlink(path), 0);
+}
+
+static void test_load_stl_binary_that_says_solid(void **state) {
+  unsigned char stl[134] = "solid of a scanner that does not know better";
+  const float soup[12] = {0, 0, 1, 0, 0, 0, 100, 0, 0, 0, 100, 0};
+  stl[80] = 1;
+  memcpy(stl + 84, soup, sizeof soup);
+  char path[256];
+  supine_mesh mesh = load(sample_write(state, "a.stl", stl, sizeof stl, path), NULL, NULL);
+  assert_int_equal(mesh.vertex_count, 3);
+  assert_int_equal(mesh.triangle_count, 1);
+  supine_mesh_free(&mesh);
+}
+
+typedef struct reader {
+  const char *good;
+  const char *bad;
+  int wrong;
+} reader;
+
+static void *read_often(void *argument) {
+  reader *self = argument;
+  for (int i = 0; i < 40; ++i) {
+    supine_mesh mesh = {0};
+    supine_error error = {0};
+    const supine_status good = supine_mesh_load(self->good, NULL, &mesh, NULL, &error);
+    self->wrong += good != SUPINE_OK || mesh.vertex_count != 4;
+    supine_mesh_free(&mesh);
+    const supine_status bad = supine_mesh_load(self->bad, NULL, &mesh, NULL, &error);
+    self->wrong += bad != SUPINE_ERROR_FORMAT || strstr(error.message, self->bad) == NULL ||
+                   strstr(error.message, "index") == NULL;
+  }
+  return NULL;
+}
+
+static void test_load_from_threads_good_and_bad(void **state) {
+  enum { THREADS = 4 };
+  static const char *const names[] = {"0", "1", "2", "3"};
+  char paths[THREADS][2][256];
+  pthread_t threads[THREADS];
+  reader readers[THREADS];
+  supine_mesh mesh = sample_tetrahedron();
+  for (int t = 0; t < THREADS; ++t) {
+    char name[16];
+    (void)snprintf(name, sizeof name, "%s.%s", names[t], t % 2 == 0 ? "ply" : "stl");
+    assert_int_equal(supine_mesh_save(sample_path(state, name, paths[t][0]), &mesh, NULL, NULL),
+                     SUPINE_OK);
+    (void)snprintf(name, sizeof name, "%s.obj", names[t]);
+    (void)sample_text(state, name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", paths[t][1]);
+    readers[t] = (reader){.good = paths[t][0], .bad = paths[t][1]};
+  }
+  for (int t = 0; t < THREADS; ++t) {
+    assert_int_equal(pthread_create(&threads[t], NULL, read_often, &readers[t]), 0);
+  }
+  for (int t = 0; t < THREADS; ++t) {
+    assert_int_equal(pthread_join(threads[t], NULL), 0);
+    assert_int_equal(readers[t].wrong, 0);
+    assert_int_equal(unlink(paths[t][0]), 0);
+    assert_int_equal(unlink(paths[t][1]), 0);
+  }
+  supine_mesh_free(&mesh);
+}
+
+static void test_mesh_free_zeroed_and_twice_legal(void **state) {
+  (void)state;
+  supine_mesh mesh = {0};
+  supine_mesh_free(&mesh);
+  mesh = sample_tetrahedron();
+  supine_mesh_free(&mesh);
+  supine_mesh_free(&mesh);
+  assert_null(mesh.vertices);
+  assert_int_equal(mesh.triangle_count, 0);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_load_stl_soup_equals_indexed),
+      cmocka_unit_test(test_load_polygons_cut_points_and_lines_dropped),
+      cmocka_unit_test(test_load_degenerate_and_unreferenced_dropped_counted),
+      cmocka_unit_test(test_load_off_comments_and_colours),
+      cmocka_unit_test(test_load_nodes_transformed_mirror_keeps_sense),
+      cmocka_unit_test(test_load_axes_tag_option_and_comment),
+      cmocka_unit_test(test_load_axes_foreign_tag_refused),
+      cmocka_unit_test(test_load_units_scaled_and_guessed),
+      cmocka_unit_test(test_load_units_not_positive_argument),
+      cmocka_unit_test(test_load_missing_folder_device_unreadable_read),
+      cmocka_unit_test(test_load_unknown_kind_format),
+      cmocka_unit_test(test_load_no_triangles_mesh),
+      cmocka_unit_test(test_load_not_finite_mesh_vertex_named),
+      cmocka_unit_test(test_load_stl_binary_that_says_solid),
+      cmocka_unit_test(test_load_from_threads_good_and_bad),
+      cmocka_unit_test(test_mesh_free_zeroed_and_twice_legal),
+  };
+  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
+}

@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Real lungs, where they are there: their numbers as ../shared/data/README.md gives them. */
+#include <math.h>
+
+#include "mesh_samples.h"
+
+/* Loads a file of the test data; skips the test where it is absent. */
+static supine_mesh lung_load(const char *name, supine_mesh_report *report) {
+  char path[512];
+  (void)snprintf(path, sizeof path, "%s/%s", SUPINE_TEST_DATA, name);
+  if (access(path, R_OK) != 0) {
+    print_message("no test data in " SUPINE_TEST_DATA ": skipped\n");
+    skip();
+  }
+  supine_mesh mesh = {0};
+  supine_error error = {0};
+  if (supine_mesh_load(path, NULL, &mesh, report, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return mesh;
+}
+
+static supine_topology topology_of(const supine_mesh *mesh) {
+  supine_topology topology = {0};
+  assert_int_equal(supine_topology_create(mesh, &topology), SUPINE_OK);
+  return topology;
+}
+
+/* Closed lungs: numbers of vertices and triangles, genus, litres to one decimal. */
+static void test_lungs_closed_known_numbers(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    size_t vertices;
+    size_t triangles;
+    long genus;
+    double litres; /* to 0.05 */
+    bool names_ras;
+  } cases[] = {
+      {"lungs/chaste_left_5k.obj", 5001, 9998, 0, 3.4, false},
+      {"lungs/chaste_right_5k.obj", 5001, 9998, 0, 4.2, false},
+      {"lungs/chaste_left.ply", 20001, 39998, 0, 3.4, false},
+      {"lungs/chaste_right.ply", 20001, 39998, 0, 4.2, false},
+      {"covid/covid001_left.ply", 10001, 19998, 0, 1.5, true},
+      {"covid/covid001_right.ply", 10001, 19998, 0, 1.8, true},
+      {"covid/covid002_left.ply", 9999, 19998, 1, 2.2, true},
+      {"covid/covid005_left.ply", 12000, 24000, 1, 2.2, true},
+      {"covid/covid005_right.ply", 10000, 20000, 1, 2.7, true},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_mesh_report report = {0};
+    supine_mesh mesh = lung_load(cases[i].name, &report);
+    supine_topology topology = topology_of(&mesh);
+    assert_int_equal(mesh.vertex_count, cases[i].vertices);
+    assert_int_equal(mesh.triangle_count, cases[i].triangles);
+    assert_true(topology.closed);
+    assert_int_equal(topology.component_count, 1);
+    assert_int_equal(topology.genus, cases[i].genus);
+    assert_true(fabs(supine_mesh_volume(&mesh) * 1.0e-6 - cases[i].litres) <= 0.05);
+    assert_int_equal(report.comment_names_ras, cases[i].names_ras);
+    assert_int_equal(report.axes, SUPINE_AXES_LPS);
+    assert_int_equal(report.degenerate_faces, 0);
+    assert_null(report.likely_unit);
+    supine_topology_free(&topology);
+    supine_mesh_free(&mesh);
+  }
+}
+
+static void test_lungs_stl_soup_welds_closed(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    size_t vertices;
+    size_t triangles;
+  } cases[] = {{"lungs/chaste_lobe_upper_left.stl", 22300, 44596},
+               {"covid/covid004_right_40k.stl", 40000, 79996}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    supine_mesh_report report = {0};
+    supine_mesh mesh = lung_load(cases[i].name, &report);
+    supine_topology topology = topology_of(&mesh);
+    assert_int_equal(report.file_vertices, 3 * cases[i].triangles);
+    assert_int_equal(mesh.vertex_count, cases[i].vertices);
+    assert_int_equal(mesh.triangle_count, cases[i].triangles);
+    assert_int_equal(report.welded_vertices, 3 * cases[i].triangles - cases[i].vertices);
+    assert_true(topology.closed);
+    assert_int_equal(topology.genus, 0);
+    assert_true(supine_mesh_volume(&mesh) > 2.0e6);
+    supine_topology_free(&topology);
+    supine_mesh_free(&mesh);
+  }
+}
+
+static void test_lungs_defect_boundary_and_non_manifold(void **state) {
+  (void)state;
+  supine_mesh mesh = lung_load("covid/covid005_left_DEFECT.ply", NULL);
+  supine_topology topology = topology_of(&mesh);
+  assert_int_equal(topology.boundary_edges, 2);
+  assert_int_equal(topology.non_manifold_edges, 1);
+  assert_int_equal(topology.inconsistent_edges, 0);
+  assert_false(topology.closed);
+  assert_int_equal(topology.genus, -1);
+  supine_topology_free(&topology);
+  supine_mesh_free(&mesh);
+}
+
+/* Saved as triangle soup and loaded again, a lung is the same surface. */
+static void test_lungs_stl_round_trip_same_surface(void **state) {
+  supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
+  char path[256];
+  const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS};
+  assert_int_equal(supine_mesh_save(sample_path(state, "lung.stl", path), &mesh, &options, NULL),
+                   SUPINE_OK);
+  supine_mesh again = {0};
+  assert_int_equal(supine_mesh_load(path, NULL, &again, NULL, NULL), SUPINE_OK);
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(again.vertex_count, mesh.vertex_count);
+  assert_int_equal(again.triangle_count, mesh.triangle_count);
+  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* file and mesh are float32: exact */
+    assert_memory_equal(again.vertices + 3 * (size_t)again.triangles[c],
+                        mesh.vertices + 3 * (size_t)mesh.triangles[c], 3 * sizeof(double));
+  }
+  supine_mesh_free(&again);
+  supine_mesh_free(&mesh);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_lungs_closed_known_numbers),
+      cmocka_unit_test(test_lungs_stl_soup_welds_closed),
+      cmocka_unit_test(test_lungs_defect_boundary_and_non_manifold),
+      cmocka_unit_test(test_lungs_stl_round_trip_same_surface),
+  };
+  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
+}

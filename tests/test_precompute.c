@@ -1,0 +1,469 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* From lungs to a basis file and back: coefficients, stated errors and volumes against the full
+ * physics. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/grid.h>
+#include <supine/phantom.h>
+#include <supine/precompute.h>
+#include <supine/runtime.h>
+#include <supine/safetensors.h>
+#include <supine/sh.h>
+#include <supine/volume.h>
+
+#include "full_operator.h"
+#include "lungs_helpers.h"
+
+static char folder[] = "/tmp/supine-precompute-XXXXXX";
+static char path[64];
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(path, sizeof path, "%s/basis.safetensors", folder);
+  return 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  (void)unlink(path);
+  return rmdir(folder); /* fails where a temporary file is left */
+}
+
+static supine_lungs phantom(size_t vertices) {
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_phantom_create(vertices, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+  supine_mesh_free(&mesh);
+  return lungs;
+}
+
+static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
+                                           double soften, size_t held_out) {
+  supine_precompute_options options = {
+      .model = supine_model_default(), .band = band, .modes = modes, .held_out = held_out};
+  options.model.force.soften = soften;
+  supine_precompute_report report;
+  supine_error error;
+  if (supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return report;
+}
+
+/* As the file has it: what compact storage adds is the run time's to state. */
+static supine_basis *open_basis(void) {
+  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  supine_error error;
+  if (supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return basis;
+}
+
+/* Coefficients in the file against a direct factorisation over all nodes, one right-hand side a
+ * harmonic, with the same quadrature of the force. */
+static void check_coefficients(const char *const *names, supine_axes axes) {
+  enum { BAND = 3, TERMS = 16, LATITUDES = 32 };
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, axes, &lungs)) {
+    skip();
+    return;
+  }
+  const size_t n = lungs.mesh.vertex_count;
+  (void)make_basis(&lungs, BAND, 0, 0.0, 0);
+  supine_sh_grid *grid = NULL;
+  assert_int_equal(supine_sh_grid_create(LATITUDES, 2 * LATITUDES, &grid), SUPINE_OK);
+  double *projected = calloc(TERMS * n, sizeof *projected);
+  double *force = malloc(n * sizeof *force);
+  /* f is linear in position: project it at four points, which is all of it */
+  double moments[TERMS][4] = {{0.0}};
+  for (size_t d = 0; d < 2 * LATITUDES * LATITUDES; ++d) {
+    double g[3];
+    double y[TERMS];
+    double low = INFINITY;
+    double high = -INFINITY;
+    supine_sh_grid_direction(grid, d / (2 * LATITUDES), d % (2 * LATITUDES), g);
+    assert_int_equal(supine_sh_evaluate(BAND, g, y), SUPINE_OK);
+    assert_int_equal(supine_height_range(&lungs.mesh, 1, g, &low, &high), SUPINE_OK);
+    const double weight = grid->weight[d / (2 * LATITUDES)] * M_PI / LATITUDES;
+    for (size_t t = 0; t < TERMS; ++t) {
+      moments[t][0] -= weight * y[t] * low / (high - low);
+      for (size_t k = 0; k < 3; ++k) {
+        moments[t][1 + k] += weight * y[t] * g[k] / (high - low);
+      }
+    }
+  }
+  for (size_t t = 0; t < TERMS; ++t) {
+    for (size_t i = 0; i < n; ++i) {
+      const double *p = lungs.mesh.vertices + 3 * i;
+      projected[t * n + i] =
+          moments[t][0] + moments[t][1] * p[0] + moments[t][2] * p[1] + moments[t][3] * p[2];
+    }
+  }
+  double *ones = malloc(n * sizeof *ones);
+  for (size_t i = 0; i < n; ++i) {
+    ones[i] = 1.0;
+  }
+  full_operator op = full_operator_create(&lungs.mesh, &lungs.topology, ones);
+  direct_solver direct = direct_solver_create(&op);
+  supine_safetensors *file = NULL;
+  assert_int_equal(supine_safetensors_open(path, &file, NULL), SUPINE_OK);
+  const float *coefficients = supine_safetensors_find(file, "coefficients")->data;
+  double largest = 0.0;
+  double worst = 0.0;
+  for (size_t t = 0; t < TERMS; ++t) {
+    direct_solver_solve(&direct, &op, n, projected + t * n, force);
+    for (size_t i = 0; i < n; ++i) {
+      largest = fmax(largest, fabs(force[i]));
+      worst = fmax(worst, fabs(force[i] - (double)coefficients[i * TERMS + t]));
+    }
+  }
+  printf("%s: %zu vertices, coefficients within %.1e of the largest\n", names[0], n,
+         worst / largest);
+  assert_true(worst <= 1e-5 * largest);
+  supine_safetensors_close(file);
+  direct_solver_free(&direct);
+  full_operator_free(&op);
+  supine_sh_grid_destroy(grid);
+  supine_lungs_free(&lungs);
+  free(projected);
+  free(force);
+  free(ones);
+}
+
+static void test_precompute_real_adult_coefficients_equal_direct_solution(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  check_coefficients(names, SUPINE_AXES_AUTO);
+}
+
+static void test_precompute_real_ras_lungs_coefficients_equal_direct_solution(void **state) {
+  (void)state;
+  static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
+  check_coefficients(names, SUPINE_AXES_RAS);
+}
+
+/* Mean and standard error of the mean of what each direction has to say. */
+typedef struct sample_mean {
+  double mean, error;
+} sample_mean;
+
+static sample_mean mean_of(size_t count, const double *values) {
+  double sum = 0.0;
+  double square = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += values[i];
+    square += values[i] * values[i];
+  }
+  const double mean = sum / (double)count;
+  return (sample_mean){mean, sqrt((square / (double)count - mean * mean) / (double)(count - 1))};
+}
+
+enum { CHECKED = 300 };
+
+/* Squared difference between the basis and supine_solve for each direction, averaged over the
+ * vertices: of the field in error2 (against field2), and in mm where both breathe `volume`. */
+static void true_errors(const supine_lungs *lungs, const supine_model *model,
+                        const supine_basis *basis, size_t count, const double *directions,
+                        double volume, double *error2, double *field2, double *error_mm2) {
+  const size_t n = lungs->mesh.vertex_count;
+  float *is = malloc(3 * n * sizeof *is);
+  double *should = malloc(3 * n * sizeof *should);
+  for (size_t d = 0; d < count; ++d) {
+    const double *g = directions + 3 * d;
+    double weights[SUPINE_MODES_MAX];
+    double scales[2] = {1.0, 1.0};
+    double scale;
+    supine_solution solution;
+    assert_int_equal(supine_solve(lungs, model, g, &solution, NULL), SUPINE_OK);
+    assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
+    supine_solution_apply(&solution, &lungs->mesh, 1.0, should);
+    supine_deform(basis, weights, scales, is);
+    error2[d] = field2[d] = error_mm2[d] = 0.0;
+    for (size_t i = 0; i < 3 * n; ++i) {
+      error2[d] += pow((double)is[i] - should[i], 2.0) / (double)n;
+      field2[d] += pow(should[i] - lungs->mesh.vertices[i], 2.0) / (double)n;
+    }
+    assert_int_equal(supine_volume_scale(solution.cubic, volume, &scale, NULL), SUPINE_OK);
+    assert_int_equal(supine_basis_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
+    scales[1] = scales[0];
+    supine_solution_apply(&solution, &lungs->mesh, scale, should);
+    supine_deform(basis, weights, scales, is);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      error_mm2[d] += pow((double)is[i] - should[i], 2.0) / (double)n;
+    }
+    supine_solution_free(&solution);
+  }
+  free(is);
+  free(should);
+}
+
+/* On the held-out directions themselves, the stated error is what deforming and solving one by one
+ * find, to the rounding of float positions. */
+static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
+                               double soften) {
+  enum { HELD_OUT = 40 };
+  const supine_precompute_report report = make_basis(lungs, band, modes, soften, HELD_OUT);
+  supine_basis *basis = open_basis();
+  supine_model model = supine_model_default();
+  double g[3 * HELD_OUT];
+  double error2[HELD_OUT];
+  double field2[HELD_OUT];
+  double error_mm2[HELD_OUT];
+  model.force.soften = soften;
+  supine_held_out_directions(HELD_OUT, g);
+  true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
+  const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
+  assert_close(report.accuracy.relative_rms, relative, 1e-4 * relative);
+  assert_close(report.accuracy.rms_mm, sqrt(mean_of(HELD_OUT, error_mm2).mean),
+               1e-3 * report.accuracy.rms_mm);
+  assert_true(report.accuracy.relative_p95 > report.accuracy.relative_rms);
+  assert_true(report.accuracy.relative_max > report.accuracy.relative_p95);
+  assert_true(report.accuracy.max_mm > report.accuracy.p95_mm);
+  assert_close(atof(supine_basis_metadata(basis, "error_rms_percent")), 100.0 * relative,
+               1e-3 * 100.0 * relative);
+  supine_basis_close(basis);
+}
+
+/* On other directions it may differ by what chance in their choice allows: four standard errors of
+ * this sample's own. */
+static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
+                                  double soften, const char *what) {
+  const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
+  const supine_accuracy *stated = &report.accuracy;
+  supine_basis *basis = open_basis();
+  supine_model model = supine_model_default();
+  double g[3 * CHECKED];
+  double error2[CHECKED];
+  double field2[CHECKED];
+  double error_mm2[CHECKED];
+  uint64_t seed = 2026;
+  for (size_t d = 0; d < CHECKED; ++d) {
+    random_direction(&seed, g + 3 * d);
+  }
+  model.force.soften = soften;
+  true_errors(lungs, &model, basis, CHECKED, g, stated->volume, error2, field2, error_mm2);
+  const sample_mean error = mean_of(CHECKED, error2);
+  const sample_mean field = mean_of(CHECKED, field2);
+  printf("%s, soften %g: stated %.3f %%, %.4f mm; found %.3f %%, %.4f mm\n", what, soften,
+         100.0 * stated->relative_rms, stated->rms_mm, 100.0 * sqrt(error.mean / field.mean),
+         sqrt(mean_of(CHECKED, error_mm2).mean));
+  assert_true(error.error < 0.2 * error.mean); /* or this test would say little */
+  assert_close(stated->relative_rms * stated->relative_rms, error.mean / field.mean,
+               4.0 * error.error / field.mean);
+  supine_basis_close(basis);
+}
+
+static void test_precompute_stated_error_equals_deform_against_solve(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(2000);
+  check_stated_error(&lungs, 3, 0, 0.0);
+  check_stated_error(&lungs, 15, 16, 0.0);
+  check_stated_error(&lungs, 5, 9, 1.0);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_stated_error_is_found_on_other_directions(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(1500);
+  check_error_elsewhere(&lungs, 3, 0, 0.0, "phantom, 16 harmonics");
+  check_error_elsewhere(&lungs, 15, 16, 0.0, "phantom, best modes of band 15");
+  check_error_elsewhere(&lungs, 7, 16, 1.0, "phantom, best modes of band 7");
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_real_lung_stated_error_is_found_and_small(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left_5k.obj"};
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+    return;
+  }
+  check_stated_error(&lungs, 3, 0, 0.0);
+  check_error_elsewhere(&lungs, 3, 0, 0.0, "chaste_left_5k, 16 harmonics");
+  check_error_elsewhere(&lungs, 15, 16, 0.0, "chaste_left_5k, best modes of band 15");
+  supine_lungs_free(&lungs);
+}
+
+/* Volume of the deformed surface itself, mL above rest. */
+static double measured_volume(const supine_basis *basis, const double *weights,
+                              const double *scales) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_mesh mesh = {.vertex_count = info->vertex_count, .triangle_count = info->triangle_count};
+  float *xyz = malloc(3 * mesh.vertex_count * sizeof *xyz);
+  double *vertices = malloc(3 * mesh.vertex_count * sizeof *vertices);
+  uint32_t *triangles = malloc(3 * mesh.triangle_count * sizeof *triangles);
+  memcpy(triangles, supine_basis_triangles(basis), 3 * mesh.triangle_count * sizeof *triangles);
+  mesh.vertices = vertices;
+  mesh.triangles = triangles;
+  supine_deform(basis, weights, scales, xyz);
+  double volume = 0.0;
+  for (int rest = 0; rest < 2; ++rest) {
+    const float *from = rest ? supine_basis_vertices(basis) : xyz;
+    for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+      vertices[i] = (double)from[i];
+    }
+    volume += (rest ? -1e-3 : 1e-3) * supine_mesh_volume(&mesh);
+  }
+  free(xyz);
+  free(vertices);
+  free(triangles);
+  return volume;
+}
+
+static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, double soften,
+                          double least) {
+  static const double postures[6][3] = {{0, 1, 0},  {0, -1, 0}, {1, 0, 0},
+                                        {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}};
+  (void)make_basis(lungs, band, modes, soften, 0);
+  supine_basis *basis = open_basis();
+  uint64_t seed = 400;
+  double worst = 0.0;
+  for (size_t d = 0; d < 106; ++d) {
+    double g[3];
+    double weights[SUPINE_MODES_MAX];
+    double scales[2];
+    if (d < 6) {
+      memcpy(g, postures[d], sizeof g);
+    } else {
+      random_direction(&seed, g);
+    }
+    assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
+    for (int out = 0; out < 2; ++out) {
+      const double volume = out ? least : 500.0;
+      assert_int_equal(supine_basis_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
+      scales[1] = scales[0];
+      worst = fmax(worst, fabs(measured_volume(basis, weights, scales) - volume));
+    }
+  }
+  printf("volumes within %.4f mL\n", worst);
+  assert_true(worst <= 0.05);
+  supine_basis_close(basis);
+}
+
+static void test_precompute_volumes_exact_in_every_direction(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(3000);
+  check_volumes(&lungs, 3, 0, 0.0, -300.0);
+  /* head down, a softening phantom folds at -299 mL */
+  check_volumes(&lungs, 7, 10, 1.0, -200.0);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_real_lungs_volumes_exact_in_every_direction(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+    return;
+  }
+  check_volumes(&lungs, 15, 16, 0.0, -300.0);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_default_law_keeps_four_modes(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(1000);
+  const supine_precompute_report report = make_basis(&lungs, 15, 16, 0.0, 0);
+  assert_int_equal(report.mode_count, 4);
+  assert_int_equal(report.route, SUPINE_ROUTE_LINEAR);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_open_surface_has_no_volume(void **state) {
+  (void)state;
+  supine_mesh lump = helper_lump(6, 80.0, 3);
+  supine_lungs lungs = {0};
+  --lump.triangle_count;
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
+  const supine_precompute_report report = make_basis(&lungs, 3, 0, 0.0, 0);
+  assert_true(report.accuracy.relative_rms > 0.0);
+  assert_close(report.accuracy.volume, 0.0, 0.0);
+  supine_basis *basis = open_basis();
+  double weights[SUPINE_MODES_MAX];
+  double scale;
+  const double g[3] = {0.0, 1.0, 0.0};
+  assert_false(supine_basis_get_info(basis)->has_volume);
+  assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
+  assert_int_equal(supine_basis_scale(basis, weights, 10.0, &scale, NULL),
+                   SUPINE_ERROR_OPEN_SURFACE);
+  supine_basis_close(basis);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lump);
+}
+
+static bool stop_halfway(void *context, double fraction) {
+  (void)context;
+  return fraction < 0.4;
+}
+
+static void test_precompute_interrupted_or_unwritable_leaves_old_file(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(500);
+  (void)make_basis(&lungs, 3, 0, 0.0, 0);
+  supine_precompute_options options = {
+      .model = supine_model_default(), .band = 7, .modes = 16, .progress = stop_halfway};
+  supine_error error;
+  options.model.force.soften = 0.5;
+  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error),
+                   SUPINE_ERROR_INTERRUPTED);
+  supine_basis *basis = open_basis();
+  assert_int_equal(supine_basis_get_info(basis)->mode_count, 16);
+  assert_string_equal(supine_basis_metadata(basis, "modes"), "harmonics");
+  supine_basis_close(basis);
+  options.progress = NULL;
+  assert_int_equal(supine_precompute(&lungs, &options, "/nonexistent/basis", NULL, &error),
+                   SUPINE_ERROR_WRITE);
+  assert_int_equal(supine_precompute(&lungs, &options, "/dev/full", NULL, &error),
+                   SUPINE_ERROR_WRITE);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_bad_options_refused(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(500);
+  supine_precompute_options options = {.model = supine_model_default(), .band = 65, .modes = 16};
+  supine_error error;
+  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  options.band = 8;
+  options.modes = 0; /* 81 harmonics */
+  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  options.modes = 65;
+  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  options.modes = 16;
+  options.route = SUPINE_ROUTE_LINEAR;
+  options.model.force.soften = 1.0;
+  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  supine_lungs_free(&lungs);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_precompute_real_adult_coefficients_equal_direct_solution),
+      cmocka_unit_test(test_precompute_real_ras_lungs_coefficients_equal_direct_solution),
+      cmocka_unit_test(test_precompute_stated_error_equals_deform_against_solve),
+      cmocka_unit_test(test_precompute_stated_error_is_found_on_other_directions),
+      cmocka_unit_test(test_precompute_real_lung_stated_error_is_found_and_small),
+      cmocka_unit_test(test_precompute_volumes_exact_in_every_direction),
+      cmocka_unit_test(test_precompute_real_lungs_volumes_exact_in_every_direction),
+      cmocka_unit_test(test_precompute_default_law_keeps_four_modes),
+      cmocka_unit_test(test_precompute_open_surface_has_no_volume),
+      cmocka_unit_test(test_precompute_interrupted_or_unwritable_leaves_old_file),
+      cmocka_unit_test(test_precompute_bad_options_refused),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

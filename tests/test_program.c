@@ -1,0 +1,316 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The program as its users meet it: results, exit codes, messages, and what bad input leaves
+ * behind. */
+#include <dirent.h>
+#include <errno.h>
+#include <ftw.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/status.h>
+
+static char folder[] = "/tmp/supine-program-XXXXXX";
+static char printed[65536]; /* by the last run, stdout and stderr together */
+
+/* Runs "supine ARGUMENTS" in the folder; its exit code, or -1 where a signal or the clock ended it.
+ */
+SUPINE_PRINTF(1, 2)
+static int run(const char *format, ...) {
+  char arguments[2048];
+  char command[4096];
+  va_list list;
+  va_start(list, format);
+  (void)vsnprintf(arguments, sizeof arguments, format, list);
+  va_end(list);
+  (void)snprintf(command, sizeof command, "cd %s && timeout 60 %s %s 2>&1", folder, SUPINE_PROGRAM,
+                 arguments);
+  FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
+  assert_non_null(pipe);
+  printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
+  const int status = pclose(pipe);
+  return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
+}
+
+static void expect(int code, const char *words, int got) {
+  if (got != code || strstr(printed, words) == NULL) {
+    fail_msg("exit code %d, not %d, or no \"%s\" in: %s", got, code, words, printed);
+  }
+}
+
+/* Runs, and asks for an exit code and for words in what is printed. */
+#define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
+
+static void write_file(const char *name, const void *bytes, size_t size) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(bytes, 1, size, file), size);
+  assert_int_equal(fclose(file), 0);
+}
+
+static void write_text(const char *name, const char *text) {
+  write_file(name, text, strlen(text));
+}
+
+static size_t read_file(const char *name, char *bytes, size_t size) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  const size_t length = fread(bytes, 1, size, file);
+  (void)fclose(file);
+  return length;
+}
+
+/* Files in the folder whose name begins so. */
+static size_t count_files(const char *prefix) {
+  size_t count = 0;
+  DIR *entries = opendir(folder);
+  assert_non_null(entries);
+  for (const struct dirent *entry; (entry = readdir(entries)) != NULL;) {
+    count += strncmp(entry->d_name, prefix, strlen(prefix)) == 0 ? 1 : 0;
+  }
+  (void)closedir(entries);
+  return count;
+}
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  return run("phantom -o lungs.ply --vertices 500") != 0 ||
+         run("precompute lungs.ply -o lungs.safetensors --band 3 --modes harmonics") != 0;
+}
+
+static int remove_entry(const char *path, const struct stat *status, int type, struct FTW *walk) {
+  (void)status;
+  (void)type;
+  (void)walk;
+  return remove(path);
+}
+
+static int teardown(void **state) {
+  (void)state;
+  return nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
+}
+
+static void test_help_every_command_teaches(void **state) {
+  (void)state;
+  static const char *const commands[] = {"phantom", "precompute", "info", "deform", "solve", "pv"};
+  EXPECT(0, "precompute", "--help");
+  EXPECT(0, "supine ", "--version");
+  EXPECT(1, "Commands:", "%s", "");
+  for (size_t i = 0; i < sizeof commands / sizeof *commands; ++i) {
+    EXPECT(0, "Usage: supine", "%s --help", commands[i]);
+    EXPECT(0, "Usage: supine", "help %s", commands[i]);
+  }
+  EXPECT(1, "did you mean 'deform'", "defrom");
+  EXPECT(1, "'supine --help' lists them", "xyzzy");
+  EXPECT(1, "did you mean '--posture'", "deform lungs.safetensors --postrue prone -o a.ply");
+  EXPECT(1, "needs a value", "deform lungs.safetensors -o");
+}
+
+static void test_deform_each_way_to_say_prone_same_file(void **state) {
+  (void)state;
+  static const char *const ways[] = {"--posture prone",
+                                     "--posture HFP",
+                                     "--posture ffp",
+                                     "--gravity 0,-1,0",
+                                     "--gravity 0,-7.5,0",
+                                     "--quaternion 0.70710678118654752,0.70710678118654752,0,0",
+                                     "--posture upright --tilt -90"};
+  static char first[1 << 20];
+  static char other[1 << 20];
+  EXPECT(0, "+500.00 mL", "deform lungs.safetensors %s -o way.stl", ways[0]);
+  const size_t length = read_file("way.stl", first, sizeof first);
+  for (size_t i = 1; i < sizeof ways / sizeof *ways; ++i) {
+    EXPECT(0, "+500.00 mL", "deform lungs.safetensors %s -o way.stl", ways[i]);
+    assert_int_equal(read_file("way.stl", other, sizeof other), length);
+    size_t differing = 0;
+    for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
+      for (size_t k = 3; k < 12; ++k) {
+        float p;
+        float q;
+        memcpy(&p, first + at + 4 * k, sizeof p);
+        memcpy(&q, other + at + 4 * k, sizeof q);
+        differing += fabs((double)p - (double)q) > 1e-3 ? 1 : 0;
+      }
+    }
+    assert_int_equal(differing, 0);
+  }
+}
+
+static void test_deform_volumes_and_scale_as_asked(void **state) {
+  (void)state;
+  EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume -300 -o a.ply");
+  EXPECT(0, "+350.00 mL",
+         "deform lungs.safetensors --posture left --volume left=100,right=250 -o a.vtp");
+  EXPECT(0, "displacement 7.000 mm", "deform lungs.safetensors --posture HFS --scale 7 -o a.obj");
+  EXPECT(0, "displacement 7.000 mm", "solve lungs.ply --posture HFS --scale 7 -o a.obj");
+  EXPECT(0, "+120.00 mL", "solve lungs.ply --tilt 15 --volume 120 -o a.obj");
+  EXPECT(1, "left,right", "deform lungs.safetensors --posture left --volume middle=3 -o b.ply");
+  EXPECT(1, "not both", "deform lungs.safetensors --posture left --volume 3 --scale 4 -o b.ply");
+  EXPECT(5, "out of reach", "deform lungs.safetensors --posture inverted --volume -2600 -o b.ply");
+  assert_int_equal(count_files("b."), 0);
+}
+
+static void test_orientation_bad_values_refused(void **state) {
+  (void)state;
+  EXPECT(1, "did you mean 'prone'", "deform lungs.safetensors --posture pron -o c.ply");
+  EXPECT(1, "no direction", "deform lungs.safetensors --gravity 0,0,0 -o c.ply");
+  EXPECT(1, "three finite numbers", "deform lungs.safetensors --gravity 0,nan,0 -o c.ply");
+  EXPECT(1, "three finite numbers", "deform lungs.safetensors --gravity 0,1 -o c.ply");
+  EXPECT(1, "four finite numbers", "deform lungs.safetensors --quaternion 0,0,0,0 -o c.ply");
+  EXPECT(1, "degrees", "deform lungs.safetensors --posture supine --tilt up -o c.ply");
+  EXPECT(1, "give one of", "deform lungs.safetensors --posture supine --gravity 0,1,0 -o c.ply");
+  EXPECT(1, "where does gravity point", "deform lungs.safetensors -o c.ply");
+  assert_int_equal(count_files("c."), 0);
+  EXPECT(0, "note: gravity has length 5", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
+}
+
+static void test_output_impossible_exit_4_and_nothing_left(void **state) {
+  (void)state;
+  EXPECT(4, "nowhere/out", "deform lungs.safetensors --posture prone -o nowhere/out.ply");
+  EXPECT(4, "nowhere/out", "precompute lungs.ply -o nowhere/out.safetensors");
+  EXPECT(4, "/dev/full", "precompute lungs.ply -o /dev/full");
+  EXPECT(4, "nowhere/lungs", "phantom -o nowhere/lungs.ply");
+  EXPECT(4, "", "info lungs.safetensors > /dev/full");
+  EXPECT(1, "must end in", "deform lungs.safetensors --posture prone -o out.xyz");
+}
+
+static void test_basis_damaged_or_foreign_refused(void **state) {
+  (void)state;
+  static char bytes[1 << 20];
+  const size_t size = read_file("lungs.safetensors", bytes, sizeof bytes);
+  assert_true(size < sizeof bytes);
+  write_file("bad.safetensors", bytes, size - 1);
+  EXPECT(2, "bad.safetensors", "info bad.safetensors");
+  write_file("bad.safetensors", bytes, 100);
+  EXPECT(2, "bad.safetensors", "deform bad.safetensors --posture prone -o e.ply");
+  bytes[size - 1000] ^= 0x10;
+  write_file("bad.safetensors", bytes, size);
+  EXPECT(2, "bad.safetensors", "deform bad.safetensors --posture prone -o e.ply");
+  EXPECT(2, "lungs.ply", "deform lungs.ply --posture prone -o e.ply");
+  EXPECT(2, "missing.safetensors", "deform missing.safetensors --posture prone -o e.ply");
+  write_text("empty", "");
+  EXPECT(2, "empty", "info empty");
+  assert_int_equal(count_files("e."), 0);
+}
+
+static void test_mesh_bad_input_named_and_nothing_left(void **state) {
+  (void)state;
+  static char bytes[1 << 20];
+  EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
+  write_text("empty.ply", "");
+  EXPECT(2, "empty.ply", "precompute empty.ply -o f.safetensors");
+  const size_t size = read_file("lungs.ply", bytes, sizeof bytes);
+  write_file("cut.ply", bytes, size / 2);
+  EXPECT(2, "cut.ply", "precompute cut.ply -o f.safetensors");
+  write_text("nan.off",
+             "OFF\n4 4 0\n0 0 0\n1 0 0\n0 nan 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n");
+  EXPECT(2, "nan.off", "precompute nan.off -o f.safetensors");
+  write_text("inf.obj",
+             "v 0 0 0\nv 1 0 0\nv 0 inf 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  EXPECT(2, "inf.obj", "precompute inf.obj -o f.safetensors");
+  write_text("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  EXPECT(2, "points.obj", "solve points.obj --posture prone -o f.ply");
+  EXPECT(2, ".", "precompute . -o f.safetensors");
+  EXPECT(1, "which surface", "precompute -o f.safetensors");
+  EXPECT(1, "--units takes", "precompute lungs.ply --units parsec -o f.safetensors");
+  EXPECT(1, "--axes takes", "precompute lungs.ply --axes XYZ -o f.safetensors");
+  assert_int_equal(count_files("f."), 0);
+}
+
+static void test_mesh_open_surface_explains_volume(void **state) {
+  (void)state;
+  write_text("open.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+  EXPECT(0, "not closed", "precompute open.obj -o open.safetensors --band 2");
+  EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume 5 -o g.ply");
+  EXPECT(2, "--scale", "deform open.safetensors --posture prone -o g.ply");
+  EXPECT(2, "close it", "solve open.obj --posture prone --volume 5 -o g.ply");
+  assert_int_equal(count_files("g."), 0);
+  EXPECT(0, "displacement 5.000 mm", "deform open.safetensors --posture prone --scale 5 -o g.ply");
+}
+
+static void test_mesh_wrong_units_warned(void **state) {
+  (void)state;
+  write_text("metres.obj",
+             "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.25\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  EXPECT(0, "--units m", "solve metres.obj --posture prone -o h.ply");
+  EXPECT(0, "largest displacement", "solve metres.obj --units m --posture prone -o h.ply");
+  assert_null(strstr(printed, "warning"));
+}
+
+static void test_solve_unit_force_writes_column(void **state) {
+  (void)state;
+  static char text[1 << 20];
+  EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");
+  text[read_file("column.csv", text, sizeof text - 1)] = '\0';
+  assert_non_null(strstr(text, "vertex,x_mm,y_mm,z_mm,response\n0,"));
+  EXPECT(1, "they count from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
+}
+
+static int sweep_failures;
+static int sweep_files;
+
+static int sweep(const char *path, const struct stat *status, int type, struct FTW *walk) {
+  (void)status;
+  (void)walk;
+  if (type == FTW_F) {
+    ++sweep_files;
+    const int code = run("precompute '%s' --band 1 -o swept.safetensors", path);
+    if ((code != 0 && code != 2) || (code != 0) != (count_files("swept") == 0)) {
+      printf("%s: exit code %d: %s\n", path, code, printed);
+      ++sweep_failures;
+    }
+    char file[256];
+    (void)snprintf(file, sizeof file, "%s/swept.safetensors", folder);
+    (void)unlink(file);
+  }
+  return 0;
+}
+
+static void test_mesh_hostile_files_never_crash(void **state) {
+  (void)state;
+  char defects[] = SUPINE_TEST_DATA "/defects";
+  char *real = realpath(defects, NULL);
+  if (real == NULL) {
+    printf("skipped: %s is not there\n", defects);
+    skip();
+  }
+  assert_int_equal(nftw(real, sweep, 8, FTW_PHYS), 0);
+  free(real);
+  printf("%d files\n", sweep_files);
+  assert_true(sweep_files > 20);
+  assert_int_equal(sweep_failures, 0);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_help_every_command_teaches),
+      cmocka_unit_test(test_deform_each_way_to_say_prone_same_file),
+      cmocka_unit_test(test_deform_volumes_and_scale_as_asked),
+      cmocka_unit_test(test_orientation_bad_values_refused),
+      cmocka_unit_test(test_output_impossible_exit_4_and_nothing_left),
+      cmocka_unit_test(test_basis_damaged_or_foreign_refused),
+      cmocka_unit_test(test_mesh_bad_input_named_and_nothing_left),
+      cmocka_unit_test(test_mesh_open_surface_explains_volume),
+      cmocka_unit_test(test_mesh_wrong_units_warned),
+      cmocka_unit_test(test_solve_unit_force_writes_column),
+      cmocka_unit_test(test_mesh_hostile_files_never_crash),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

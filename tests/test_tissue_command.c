@@ -1,0 +1,305 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The tissue options of solve and precompute: what they accept, refuse, warn of and write. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/mesh.h>
+#include <supine/phantom.h>
+#include <supine/runtime.h>
+
+#include "../runtime/command/command.h"
+
+static char folder[] = "/tmp/supine-tissue-XXXXXX";
+static char lungs[64], csv[64], out[64], other[64], printed[64];
+static char text[16384]; /* what the command said on stderr */
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(lungs, sizeof lungs, "%s/lungs.ply", folder);
+  (void)snprintf(csv, sizeof csv, "%s/a.csv", folder);
+  (void)snprintf(out, sizeof out, "%s/out.ply", folder);
+  (void)snprintf(other, sizeof other, "%s/other", folder);
+  (void)snprintf(printed, sizeof printed, "%s/printed", folder);
+  supine_mesh mesh = {0};
+  const bool made = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
+                    supine_mesh_save(lungs, &mesh, NULL, NULL) == SUPINE_OK;
+  supine_mesh_free(&mesh);
+  return made ? 0 : -1;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  (void)unlink(lungs);
+  (void)unlink(csv);
+  (void)unlink(out);
+  (void)unlink(other);
+  (void)unlink(printed);
+  return rmdir(folder);
+}
+
+static void write_text(const char *content) {
+  FILE *file = fopen(csv, "wb");
+  assert_non_null(file);
+  (void)fputs(content, file);
+  assert_int_equal(fclose(file), 0);
+}
+
+/* Runs a command with stderr in `text` and stdout dropped. */
+static int run(supine_command_function *command, const char *const *words) {
+  char *argv[24] = {NULL};
+  int argc = 0;
+  for (; words[argc] != NULL; ++argc) {
+    argv[argc] = strdup(words[argc]);
+  }
+  (void)fflush(stdout);
+  (void)fflush(stderr);
+  const int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)};
+  FILE *file = fopen(printed, "w+b");
+  FILE *dropped = fopen("/dev/null", "wb");
+  assert_true(file != NULL && dropped != NULL);
+  assert_true(dup2(fileno(dropped), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
+  optind = 0;
+  const int code = command(argc, argv);
+  (void)fflush(stdout);
+  (void)fflush(stderr);
+  assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
+  (void)close(kept[0]);
+  (void)close(kept[1]);
+  rewind(file);
+  text[fread(text, 1, sizeof text - 1, file)] = '\0';
+  (void)fclose(file);
+  (void)fclose(dropped);
+  for (int i = 0; i < argc; ++i) {
+    free(argv[i]);
+  }
+  return code;
+}
+
+static int solve(const char *option, const char *value, const char *path) {
+  const char *const words[] = {"solve", lungs, "--posture", "supine", "--volume", "400",
+                               "-o",    path,  option,      value,    NULL};
+  return run(supine_command_solve, words);
+}
+
+static bool same_bytes(const char *first, const char *second) {
+  FILE *a = fopen(first, "rb");
+  FILE *b = fopen(second, "rb");
+  assert_true(a != NULL && b != NULL);
+  int x;
+  int y;
+  do {
+    x = fgetc(a);
+    y = fgetc(b);
+  } while (x == y && x != EOF);
+  (void)fclose(a);
+  (void)fclose(b);
+  return x == y;
+}
+
+static void test_solve_lesion_factor_one_writes_the_same_bytes(void **state) {
+  (void)state;
+  char ply[80];
+  (void)snprintf(ply, sizeof ply, "%s.ply", other);
+  assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
+  assert_int_equal(solve("--lesion", "120,-150,-100,40,1", ply), SUPINE_EXIT_OK);
+  assert_string_equal(text, "");
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--lung", "left:1", ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--expandability", "uniform", ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--lesion", "120,-150,-100,90,3", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  assert_int_equal(solve("--expandability", "exp:z:0.5:2", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  assert_int_equal(solve("--reach", "15", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  (void)unlink(ply);
+}
+
+static void test_solve_lesion_outside_is_warned(void **state) {
+  (void)state;
+  assert_int_equal(solve("--lesion", "900,0,0,30,4", out), SUPINE_EXIT_OK);
+  assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is outside the lungs"));
+}
+
+static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
+  (void)state;
+  static const char *const bad[][2] = {{"--lesion", "1,2,3,4"},
+                                       {"--lesion", "1,2,3,0,4"},
+                                       {"--lesion", "1,2,3,4,0"},
+                                       {"--lesion", "1,2,3,4,-1"},
+                                       {"--lesion", "a,2,3,4,5"},
+                                       {"--lung", "left"},
+                                       {"--lung", "left:0"},
+                                       {"--lung", "left:1.5"},
+                                       {"--lung", "middle:0.5"},
+                                       {"--lung", "left:x"},
+                                       {"--reach", "0"},
+                                       {"--reach", "-4"},
+                                       {"--reach", "far"},
+                                       {"--expandability", "linear:w:1:2"},
+                                       {"--expandability", "linear:z:1"},
+                                       {"--expandability", "linear:z:0:1"},
+                                       {"--expandability", "exp:z:1:-1"},
+                                       {"--expandability", "linear:"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    if (solve(bad[i][0], bad[i][1], out) != SUPINE_EXIT_USAGE) {
+      fail_msg("%s %s", bad[i][0], bad[i][1]);
+    }
+    assert_non_null(strstr(text, bad[i][0]));
+    assert_non_null(strstr(text, "supine solve --help"));
+  }
+}
+
+static void test_solve_bad_expandability_file_names_vertex(void **state) {
+  (void)state;
+  write_text("expandability\n1\n1\n-3\n");
+  assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
+  assert_non_null(strstr(text, "a.csv:4: expandability of vertex 2 is -3"));
+  write_text("expandability\n1\n1\n");
+  assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
+  assert_non_null(strstr(text, "vertex 2 of"));
+  assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);
+}
+
+/* A file that holds the same values as the built-in model makes the same lungs. */
+static void test_solve_expandability_file_of_ones_equals_uniform(void **state) {
+  (void)state;
+  char ply[80];
+  (void)snprintf(ply, sizeof ply, "%s.ply", other);
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  FILE *file = fopen(csv, "wb");
+  assert_non_null(file);
+  (void)fputs("vertex,a\n", file);
+  for (size_t i = mesh.vertex_count; i-- > 0;) {
+    (void)fprintf(file, "%zu,1\n", i);
+  }
+  assert_int_equal(fclose(file), 0);
+  supine_mesh_free(&mesh);
+  assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
+  assert_int_equal(solve("--expandability", csv, ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  (void)unlink(ply);
+}
+
+/* The basis of a collapsed lung: volumes exact by lung and in all, by measuring its surfaces. */
+static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **state) {
+  (void)state;
+  double volumes[2][2]; /* healthy and ill, by lung, at one scale */
+  double rests[2][2];
+  supine_basis *healthy = NULL;
+  static const char *const shares[] = {"left:1", "left:0.3"};
+  for (int ill = 0; ill < 2; ++ill) {
+    const char *const words[] = {"precompute", lungs,    "-o",        other, "--band",
+                                 "5",          "--lung", shares[ill], NULL};
+    assert_int_equal(run(supine_command_precompute, words), SUPINE_EXIT_OK);
+    supine_basis *basis = NULL;
+    supine_error error = {0};
+    if (supine_basis_open(other, &basis, &error) != SUPINE_OK) {
+      fail_msg("%s", error.message);
+    }
+    const supine_basis_info *info = supine_basis_get_info(basis);
+    const double gravity[3] = {0.6, 0.64, -0.48};
+    double weights[SUPINE_MODES_MAX];
+    double scales[2];
+    assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+    assert_int_equal(supine_basis_scale(basis, weights, 400.0, &scales[0], NULL), SUPINE_OK);
+    scales[1] = scales[0];
+    float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+    supine_deform(basis, weights, scales, xyz);
+    double whole = 0.0;
+    for (size_t lung = 0; lung < 2; ++lung) {
+      const float *shapes[] = {supine_basis_vertices(basis), xyz};
+      double measured[2] = {0.0, 0.0};
+      for (int s = 0; s < 2; ++s) {
+        for (size_t t = 0; t < info->triangle_count; ++t) {
+          const uint32_t *corner = supine_basis_triangles(basis) + 3 * t;
+          if (corner[0] < info->lung_begin[lung] || corner[0] >= info->lung_begin[lung + 1]) {
+            continue;
+          }
+          double p[3][3];
+          for (size_t c = 0; c < 3; ++c) {
+            for (size_t k = 0; k < 3; ++k) {
+              p[c][k] = (double)shapes[s][3 * (size_t)corner[c] + k];
+            }
+          }
+          measured[s] += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                          p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+                          p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
+                         6000.0;
+        }
+      }
+      const double said = supine_basis_lung_volume(basis, lung, weights, scales[lung]);
+      rests[ill][lung] = measured[0];
+      volumes[ill][lung] = said;
+      whole += measured[1] - measured[0];
+      assert_true(fabs(measured[1] - measured[0] - said) < 0.05);
+    }
+    assert_true(fabs(whole - 400.0) < 0.05);
+    if (ill == 1) {
+      assert_string_equal(supine_basis_metadata(basis, "lung_share"), "0.3,1");
+    } else {
+      assert_null(supine_basis_metadata(basis, "lung_share"));
+    }
+    free(xyz);
+    if (ill == 0) {
+      healthy = basis;
+    } else { /* 0.3 of what it took at this scale when it was healthy */
+      const double was = supine_basis_lung_volume(healthy, 0, weights, scales[0]);
+      assert_true(fabs(volumes[1][0] - 0.3 * was) < 1e-4);
+      supine_basis_close(basis);
+    }
+  }
+  supine_basis_close(healthy);
+  assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
+  assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung takes what is left */
+  assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
+}
+
+static void test_lung_that_is_not_there_is_refused(void **state) {
+  (void)state;
+  supine_mesh mesh = {0};
+  supine_mesh left = {0};
+  char one[80];
+  (void)snprintf(one, sizeof one, "%s.ply", other);
+  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  left = mesh;
+  left.vertex_count = mesh.vertex_count / 2; /* the phantom's lungs are alike */
+  left.triangle_count = mesh.triangle_count / 2;
+  assert_int_equal(supine_mesh_save(one, &left, NULL, NULL), SUPINE_OK);
+  supine_mesh_free(&mesh);
+  const char *const words[] = {"solve", one,      "--posture", "prone", "-o",
+                               out,     "--lung", "right:0.5", NULL};
+  assert_int_equal(run(supine_command_solve, words), SUPINE_EXIT_USAGE);
+  assert_non_null(strstr(text, "no right lung"));
+  (void)unlink(one);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_solve_lesion_factor_one_writes_the_same_bytes),
+      cmocka_unit_test(test_solve_lesion_outside_is_warned),
+      cmocka_unit_test(test_solve_bad_tissue_options_are_usage_errors),
+      cmocka_unit_test(test_solve_bad_expandability_file_names_vertex),
+      cmocka_unit_test(test_solve_expandability_file_of_ones_equals_uniform),
+      cmocka_unit_test(test_precompute_collapsed_lung_breathes_its_share_exactly),
+      cmocka_unit_test(test_lung_that_is_not_there_is_refused),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}
