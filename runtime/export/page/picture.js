@@ -38,7 +38,7 @@ class Picture {
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${vertex}: ${gl.getShaderInfoLog(shader)}`);
       gl.attachShader(program, shader);
     };
-    attach(gl.VERTEX_SHADER, (vertex === 'position.vert.glsl' ? source('deform.glsl') : '') + source(vertex));
+    attach(gl.VERTEX_SHADER, (vertex === 'position.vert.glsl' ? source('supine.glsl') : '') + source(vertex));
     attach(gl.FRAGMENT_SHADER, fragment ? source(fragment) : 'precision highp float; void main() {}');
     if (output) gl.transformFeedbackVaryings(program, [output], gl.SEPARATE_ATTRIBS);
     gl.linkProgram(program);
@@ -184,6 +184,7 @@ class Picture {
   /** Runs a program over every vertex into a buffer. */
   capture(program, array, target) {
     const { gl } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, target);
@@ -202,7 +203,7 @@ class Picture {
     const weights = new Float32Array(16);
     weights.set(moment.weights);
     gl.useProgram(moving.program);
-    gl.uniform4fv(moving.at.weights, weights);
+    gl.uniform4fv(moving.at.supine_weights, weights);
     this.capture(moving, this.inputs, target);
   }
 

@@ -6,9 +6,8 @@ layout(location = 2) in vec4 c0;
 layout(location = 3) in vec4 c1;
 layout(location = 4) in vec4 c2;
 layout(location = 5) in vec4 c3;
-uniform vec4 weights[4];
 out vec4 moved;
 
 void main() {
-  moved = vec4(supine_deform(rest, direction, c0, c1, c2, c3, weights), 1.0);
+  moved = vec4(supine_displace(rest, direction, c0, c1, c2, c3), 1.0);
 }
