@@ -19,6 +19,8 @@ static const struct {
     {"deform", supine_command_deform, "deform a basis for a posture and a volume"},
     {"compare", supine_command_compare, "how far postures differ, and who ventilates where"},
     {"render", supine_command_render, "draw the lungs: postures side by side, as PNG"},
+    {"breathe", supine_command_breathe, "let a basis breathe, in one posture or turning"},
+    {"export", supine_command_export, "write a basis as a page or as glTF morph targets"},
     {"solve", supine_command_solve, "full physics for one posture: the reference"},
     {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
 };

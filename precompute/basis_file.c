@@ -175,7 +175,7 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
   }
   add_accuracy(list, content->accuracy);
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
-  supine_tensor tensors[9] = {
+  supine_tensor tensors[11] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
@@ -196,6 +196,13 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
         (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, content->forms->quadratic};
     tensors[count++] =
         (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
+  }
+  if (content->table != NULL) {
+    const supine_error_table *table = content->table;
+    tensors[count++] =
+        (supine_tensor){"error_harmonics", SUPINE_F64, 1, {table->band_count}, table->harmonics};
+    tensors[count++] =
+        (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
   }
   status = supine_safetensors_write(path, tensors, count, list->metadata, list->count, error);
 cleanup:

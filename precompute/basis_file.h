@@ -6,6 +6,8 @@
 #include <supine/fields.h>
 #include <supine/precompute.h>
 
+#include "error_table.h"
+
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
   const supine_model *model;    /* NULL: fields from elsewhere */
@@ -14,9 +16,10 @@ typedef struct supine_basis_content {
   const supine_compression *compression;
   const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
-  const char *route;   /* how the field was found */
-  bool harmonics;      /* the modes are the harmonics themselves */
-  const char *made_by; /* optional */
+  const supine_error_table *table; /* optional */
+  const char *route;               /* how the field was found */
+  bool harmonics;                  /* the modes are the harmonics themselves */
+  const char *made_by;             /* optional */
 } supine_basis_content;
 
 supine_status supine_basis_file_write(const char *path, const supine_basis_content *content,

@@ -13,6 +13,11 @@ supine_status supine_compression_create(const supine_projection *projection, siz
 /* coefficients = columns x mix. */
 void supine_compression_mix(const supine_projection *projection, supine_compression *made);
 
+/* The `count` leading eigenpairs of a symmetric matrix [n, n], of which one triangle is read and
+ * which is destroyed: values [n] falling, vectors [count, n]. */
+supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
+                                        double *vectors);
+
 /* Volume forms of the coefficients as they are stored. directions [N, 3]; NULL: a vector field. */
 supine_status supine_compression_volume_forms(const supine_compression *compression,
                                               const supine_lungs *lungs, const double *directions,

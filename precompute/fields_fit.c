@@ -11,12 +11,18 @@
 #include <supine/sh.h>
 #include <supine/transform.h>
 
+#include "compression.h"
 #include "tally.h"
 
 /* Directions determine a band while the harmonics there are no closer to dependent than this, and
  * no direction is fitted by itself alone. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
+
+/* A higher band has to win by this factor, and there is nothing to win below the rounding of
+ * float coefficients. */
+static const double worthwhile = 0.99;
+static const double exact = 1e-6;
 
 /* What a weighted least-squares fit of one band is made of: with A = sqrt(W) Y = U S V^T,
  * C^T = V S^-1 U^T sqrt(W) F. On a product grid with its rule's weights A is orthonormal. */
@@ -294,8 +300,8 @@ static supine_status choose_band(fitting *w, supine_fit_report *report, supine_e
                               supine_status_string(status));
     }
     determined = band + 1;
-    const bool wanted =
-        w->options->band < 0 ? report->error[band] < least : (size_t)w->options->band == band;
+    const bool better = report->error[band] < worthwhile * least && least > exact;
+    const bool wanted = w->options->band < 0 ? better : (size_t)w->options->band == band;
     if (wanted) {
       least = report->error[band];
       fit_free(&w->chosen);
@@ -357,59 +363,123 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
   return status;
 }
 
-/* Leave-one-out error of what run time will evaluate: without direction i the coefficients would be
- * C minus (A^T A)^-1 y_i w_i r_i^T / (1 - h_i), r_i the residual of the whole fit there. */
-static supine_status cross_validate(const fitting *w, const supine_compression *field,
-                                    supine_accuracy *accuracy, supine_error *error) {
-  const size_t m = w->fields->direction_count;
+/* The whole procedure without one direction, in closed form: with r its residual in the whole fit
+ * and a = (A^T A)^-1 y w / (1 - h), the coefficients are C - r a^T, and their modes come from the
+ * Gram matrix of those. */
+typedef struct without {
+  double *removed;  /* [P] a */
+  double *residual; /* [rows] r */
+  double *seen;     /* [P] V V^T y: the harmonics there as the modes see them */
+  double *overlap;  /* [P] C^T r */
+  double *gram;     /* [P, P] */
+  double *values;   /* [P] */
+  double *vectors;  /* [K, P] */
+} without;
+
+static void without_free(without *o) {
+  free(o->removed);
+  free(o->residual);
+  free(o->seen);
+  free(o->overlap);
+  free(o->gram);
+  free(o->values);
+  free(o->vectors);
+}
+
+static bool without_create(size_t rows, size_t terms, size_t modes, without *o) {
+  *o = (without){malloc(terms * sizeof(double)),         malloc(rows * sizeof(double)),
+                 malloc(terms * sizeof(double)),         malloc(terms * sizeof(double)),
+                 malloc(terms * terms * sizeof(double)), malloc(terms * sizeof(double)),
+                 malloc(modes * terms * sizeof(double))};
+  return o->removed != NULL && o->residual != NULL && o->seen != NULL && o->overlap != NULL &&
+         o->gram != NULL && o->values != NULL && o->vectors != NULL;
+}
+
+/* Leaves direction `d` out; `gram` is that of the whole fit. */
+static supine_status leave_out(const fitting *w, const double *gram, size_t d, size_t modes,
+                               without *o) {
+  const int terms = (int)w->chosen.terms;
+  const int rows = (int)w->rows;
+  const double *y = w->chosen.y + d * w->chosen.terms;
+  const double *c = w->projection.columns;
+  cblas_dgemv(CblasRowMajor, CblasNoTrans, terms, terms,
+              w->weight[d] / (1.0 - w->chosen.leverage[d]), w->chosen.inverse, terms, y, 1, 0.0,
+              o->removed, 1);
+  memcpy(o->residual, w->values + d * w->rows, w->rows * sizeof *o->residual);
+  cblas_dgemv(CblasRowMajor, CblasNoTrans, rows, terms, -1.0, c, terms, y, 1, 1.0, o->residual, 1);
+  if (w->options->modes == 0) {
+    memcpy(o->seen, y, w->chosen.terms * sizeof *o->seen);
+    return SUPINE_OK;
+  }
+  cblas_dgemv(CblasRowMajor, CblasTrans, rows, terms, 1.0, c, terms, o->residual, 1, 0.0,
+              o->overlap, 1);
+  memcpy(o->gram, gram, w->chosen.terms * w->chosen.terms * sizeof *o->gram);
+  cblas_dger(CblasRowMajor, terms, terms, -1.0, o->removed, 1, o->overlap, 1, o->gram, terms);
+  cblas_dger(CblasRowMajor, terms, terms, -1.0, o->overlap, 1, o->removed, 1, o->gram, terms);
+  cblas_dger(CblasRowMajor, terms, terms, cblas_ddot(rows, o->residual, 1, o->residual, 1),
+             o->removed, 1, o->removed, 1, o->gram, terms);
+  const supine_status status =
+      supine_leading_eigenpairs(w->chosen.terms, o->gram, modes, o->values, o->vectors);
+  memset(o->seen, 0, w->chosen.terms * sizeof *o->seen);
+  for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
+    const double *mode = o->vectors + k * w->chosen.terms;
+    cblas_daxpy(terms, cblas_ddot(terms, mode, 1, y, 1), mode, 1, o->seen, 1);
+  }
+  return status;
+}
+
+/* Squared miss of each vertex at a direction that is left out, into the tally. */
+static void tally_misses(const fitting *w, const without *o, size_t d, supine_tally *tally) {
   const size_t n = w->fields->vertex_count;
-  const size_t terms = w->chosen.terms;
-  const size_t modes = field->mode_count;
   const size_t each = w->rows / n; /* components */
+  const size_t terms = w->chosen.terms;
+  const double influence = cblas_ddot((int)terms, o->removed, 1, o->seen, 1);
+  for (size_t i = 0; i < n; ++i) {
+    double square = 0.0;
+    for (size_t row = each * i; row < each * (i + 1); ++row) {
+      const double evaluated =
+          cblas_ddot((int)terms, w->projection.columns + row * terms, 1, o->seen, 1) -
+          o->residual[row] * influence;
+      const double difference = w->values[d * w->rows + row] - evaluated;
+      square += difference * difference;
+    }
+    if (w->options->scalar) { /* and what no magnitude along one direction can give */
+      const double *u = w->fields->displacement + 3 * (d * n + i);
+      const double along = w->values[d * n + i];
+      square += fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - along * along, 0.0);
+    }
+    const double miss = sqrt(square);
+    supine_tally_add(tally, 1, &miss);
+  }
+}
+
+/* Leave-one-out error of what run time will evaluate. */
+static supine_status cross_validate(const fitting *w, size_t modes, supine_accuracy *accuracy,
+                                    supine_error *error) {
+  const size_t m = w->fields->direction_count;
+  const size_t terms = w->chosen.terms;
+  without out = {0};
   supine_tally *tally = calloc(1, sizeof *tally);
-  double *weights = malloc(modes * sizeof *weights);
-  double *moved = malloc(terms * sizeof *moved);
-  if (tally == NULL || weights == NULL || moved == NULL) {
-    free(tally);
-    free(weights);
-    free(moved);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to cross-validate");
+  double *gram = malloc(terms * terms * sizeof *gram);
+  supine_status status = SUPINE_OK;
+  if (tally == NULL || gram == NULL || !without_create(w->rows, terms, modes, &out)) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to cross-validate");
+    goto cleanup;
   }
-  for (size_t d = 0; d < m; ++d) {
-    const double *y = w->chosen.y + d * terms;
-    cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)modes, (int)terms, 1.0, field->modes, (int)terms,
-                y, 1, 0.0, weights, 1);
-    cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)terms, (int)terms, w->weight[d],
-                w->chosen.inverse, (int)terms, y, 1, 0.0, moved, 1);
-    double influence = 0.0; /* of r_i on the value there, through the modes that are kept */
-    for (size_t k = 0; k < modes; ++k) {
-      influence += weights[k] * cblas_ddot((int)terms, field->modes + k * terms, 1, moved, 1);
-    }
-    influence /= 1.0 - w->chosen.leverage[d];
-    for (size_t i = 0; i < n; ++i) {
-      double square = 0.0;
-      for (size_t a = 0; a < each; ++a) {
-        const size_t row = each * i + a;
-        const double value = w->values[d * w->rows + row];
-        const double residual =
-            value - cblas_ddot((int)terms, w->projection.columns + row * terms, 1, y, 1);
-        double evaluated = 0.0;
-        for (size_t k = 0; k < modes; ++k) {
-          evaluated += weights[k] * (double)field->coefficients[row * modes + k];
-        }
-        const double difference = value - (evaluated - influence * residual);
-        square += difference * difference;
-      }
-      if (w->options->scalar) { /* and what no magnitude along d can give */
-        const double *u = w->fields->displacement + 3 * (d * n + i);
-        const double along = w->values[d * n + i];
-        square += fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - along * along, 0.0);
-      }
-      const double miss = sqrt(square);
-      supine_tally_add(tally, 1, &miss);
+  cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)terms, (int)terms, (int)w->rows, 1.0,
+              w->projection.columns, (int)terms, w->projection.columns, (int)terms, 0.0, gram,
+              (int)terms);
+  for (size_t d = 0; d < m && status == SUPINE_OK; ++d) {
+    status = leave_out(w, gram, d, modes, &out);
+    if (status == SUPINE_OK) {
+      tally_misses(w, &out, d, tally);
     }
   }
-  const double samples = (double)m * (double)n;
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
+    goto cleanup;
+  }
+  const double samples = (double)m * (double)w->fields->vertex_count;
   const double size = sqrt(w->field2 / samples);
   *accuracy = (supine_accuracy){.direction_count = m,
                                 .rms_mm = sqrt(tally->square_sum / samples),
@@ -418,10 +488,11 @@ static supine_status cross_validate(const fitting *w, const supine_compression *
   accuracy->relative_rms = accuracy->rms_mm / size;
   accuracy->relative_p95 = accuracy->p95_mm / size;
   accuracy->relative_max = accuracy->max_mm / size;
+cleanup:
+  without_free(&out);
   free(tally);
-  free(weights);
-  free(moved);
-  return SUPINE_OK;
+  free(gram);
+  return status;
 }
 
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
@@ -447,7 +518,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
                                                          NULL, NULL, error);
   }
   if (status == SUPINE_OK) {
-    status = cross_validate(&w, &made, &found.accuracy, error);
+    status = cross_validate(&w, made.mode_count, &found.accuracy, error);
   }
   if (status == SUPINE_OK) {
     found.scalar_loss = sqrt(w.lost2 / w.field2);

@@ -29,7 +29,8 @@ supine_status supine_stiffness_normalise(size_t count, const double *stiffness, 
 /* D(mass, spring) of an edge of the given length, mm. */
 double supine_link_distance(const double *first, const double *second);
 
-/* Replaces the links' distances and the masses' own weights by those of a spreading length in mm. */
+/* Replaces the links' distances and the masses' own weights by those of a spreading length in mm.
+ */
 supine_status supine_network_set_reach(supine_network *network, const supine_mesh *mesh,
                                        const supine_topology *topology, double reach);
 

@@ -21,13 +21,12 @@ void supine_projection_free(supine_projection *projection) {
 
 /* functions[r, lm] = integral of function r times Y_lm, by the rule's sum. */
 static supine_status project_functions(const supine_lungs *lungs, const supine_force_law *law,
-                                       size_t band, size_t rank, double *functions) {
+                                       size_t band, size_t latitudes, size_t longitudes,
+                                       size_t rank, double *functions) {
   const size_t terms = supine_sh_count(band);
-  size_t latitudes = LATITUDES_PER_BAND * (band + 1);
-  latitudes = latitudes < LATITUDES_MIN ? LATITUDES_MIN : latitudes;
-  const size_t count = 2 * latitudes * latitudes;
+  const size_t count = latitudes * longitudes;
   supine_sh_grid *grid = NULL;
-  supine_status status = supine_sh_grid_create(latitudes, 2 * latitudes, &grid);
+  supine_status status = supine_sh_grid_create(latitudes, longitudes, &grid);
   double *directions = malloc(3 * count * sizeof *directions);
   double *minimum = malloc(count * sizeof *minimum);
   double *maximum = malloc(count * sizeof *maximum);
@@ -73,6 +72,16 @@ cleanup:
 supine_status supine_project_linear(const supine_lungs *lungs, const supine_force_law *law,
                                     const double *stiffness, size_t band,
                                     supine_projection *projection, supine_error *error) {
+  size_t latitudes = LATITUDES_PER_BAND * (band + 1);
+  latitudes = latitudes < LATITUDES_MIN ? LATITUDES_MIN : latitudes;
+  return supine_project_linear_rule(lungs, law, stiffness, band, latitudes, 2 * latitudes,
+                                    projection, error);
+}
+
+supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
+                                         const double *stiffness, size_t band, size_t latitudes,
+                                         size_t longitudes, supine_projection *projection,
+                                         supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const size_t rank = supine_force_column_count(law);
   supine_network *network = NULL;
@@ -111,7 +120,7 @@ supine_status supine_project_linear(const supine_lungs *lungs, const supine_forc
   }
   made.iterations = report.iterations;
   made.residual = report.residual;
-  status = project_functions(lungs, law, band, rank, made.functions);
+  status = project_functions(lungs, law, band, latitudes, longitudes, rank, made.functions);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "projection to band %zu: %s", band,
                            supine_status_string(status));

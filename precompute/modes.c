@@ -39,9 +39,7 @@ static supine_status gram_matrix(const supine_projection *projection, const doub
   return SUPINE_OK;
 }
 
-/* The `count` leading eigenpairs of a symmetric matrix [n, n], which is destroyed: values [n]
- * falling, vectors [count, n]. */
-static supine_status leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
+supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
                                         double *vectors) {
   lapack_int found = 0;
   lapack_int *support = malloc(2 * n * sizeof *support);
@@ -80,7 +78,7 @@ static supine_status factored_modes(const supine_projection *projection, double 
   if (vectors == NULL || reduced == NULL) {
     goto cleanup;
   }
-  status = leading_eigenpairs(rank, gram, rank, values, vectors);
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -95,7 +93,7 @@ static supine_status factored_modes(const supine_projection *projection, double 
   for (size_t r = 0; r < rank; ++r) {
     *total += gram[r * rank + r];
   }
-  status = leading_eigenpairs(rank, gram, rank, values, vectors);
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
   for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* A^T U_k / sigma_k */
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
@@ -114,7 +112,7 @@ static supine_status plain_modes(const supine_projection *projection, double *gr
   for (size_t r = 0; r < projection->rank; ++r) {
     *total += gram[r * projection->rank + r];
   }
-  return leading_eigenpairs(projection->rank, gram, count, values, modes);
+  return supine_leading_eigenpairs(projection->rank, gram, count, values, modes);
 }
 
 /* mix = functions x modes^T, [R, K]. */

@@ -38,6 +38,7 @@ typedef struct pipeline {
   supine_volume_forms forms;
   supine_held_out held_out;
   supine_accuracy accuracy;
+  supine_error_table table;
 } pipeline;
 
 static void pipeline_free(pipeline *p) {
@@ -48,6 +49,7 @@ static void pipeline_free(pipeline *p) {
   supine_compression_free(&p->compression);
   supine_volume_forms_free(&p->forms);
   supine_held_out_free(&p->held_out);
+  supine_error_table_free(&p->table);
 }
 
 /* Progress of one stage, as a part of the whole. */
@@ -165,6 +167,14 @@ static size_t modes_needed(const pipeline *p) {
   return count;
 }
 
+/* Made before modes are dropped, so that it shows what more of them would bring. */
+static supine_status tabulate(pipeline *p, supine_error *error) {
+  const supine_status status = supine_error_table_create(&p->held_out.truth, &p->projection,
+                                                         &p->compression, p->directions, &p->table);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "no memory to tabulate the error");
+}
+
 /* Drops the modes that do not pay, and states the error of what is left. */
 static supine_status drop_modes(pipeline *p, supine_error *error) {
   const size_t needed = modes_needed(p);
@@ -184,6 +194,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .compression = &p->compression,
                                         .forms = p->forms.linear != NULL ? &p->forms : NULL,
                                         .accuracy = &p->accuracy,
+                                        .table = &p->table,
                                         .route = p->linear ? "linear" : "sampled",
                                         .harmonics = p->options->modes == 0,
                                         .made_by = p->options->made_by};
@@ -199,7 +210,7 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 supine_error *error) {
   pipeline p = {.lungs = lungs, .options = options};
   supine_status (*const steps[])(pipeline *, supine_error *) = {
-      find_directions, project, compress, find_forms, hold_out, measure, drop_modes};
+      find_directions, project, compress, find_forms, hold_out, measure, tabulate, drop_modes};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
     status = steps[i](&p, error);

@@ -225,8 +225,7 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
 /* Chooses the code and packs: AUTO is INT16 where that is accurate enough, else EXACT. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
-  static const double error_limit = 0.005;           /* mm */
-  static const size_t cache_bytes = (size_t)1 << 24; /* what positions and tiles may share */
+  static const double error_limit = 0.005; /* mm */
   supine_storage storage = options->storage;
   supine_simd simd = options->simd;
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
@@ -254,7 +253,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
     return supine_error_set(c->error, status, "%s: out of memory", c->name);
   }
   const double bytes = basis->info.bytes_per_vertex + 3 * sizeof(float);
-  basis->stream = (double)basis->info.vertex_count * bytes > (double)cache_bytes;
+  basis->stream = (double)basis->info.vertex_count * bytes > STREAM_BYTES;
   return SUPINE_OK;
 }
 

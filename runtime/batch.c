@@ -26,8 +26,8 @@ static void batch_tiles(const supine_basis *basis, size_t count, const float *fo
     const size_t here = tiles - t < step ? tiles - t : step;
     basis->kernels->widen(&basis->tiles, first + t, here, wide);
     for (size_t j = 0; j < count; ++j) {
-      const supine_target target = {positions + j * apart + t * TILE_NUMBERS, NULL, NULL, true,
-                                    stream};
+      const supine_target target = {
+          positions + j * apart + t * TILE_NUMBERS, NULL, NULL, true, stream, true};
       basis->kernels->deform(wide, folded + j * basis->info.mode_count, 0, here, &target);
     }
   }
@@ -41,6 +41,8 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
   const size_t lungs = basis->info.lung_count;
   const size_t apart = 3 * (end - begin);
   const size_t group = WEIGHT_NUMBERS / modes;
+  const double bytes = (double)count * (double)apart * sizeof *xyz;
+  const bool stream = basis->stream || bytes > STREAM_BYTES;
   supine_tiles_layout(&wide, SUPINE_STORAGE_EXACT, modes, basis->info.vector, BLOCK_TILES);
   wide.bytes = scratch.bytes;
   for (size_t lung = 0; lung < lungs; ++lung) {
@@ -63,7 +65,7 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
                     scratch.folded + i * modes);
       }
       batch_tiles(basis, here, scratch.folded, &wide, from / TILE, (to - from) / TILE,
-                  xyz + j * apart + 3 * (from - begin), apart, basis->stream);
+                  xyz + j * apart + 3 * (from - begin), apart, stream);
     }
     for (size_t j = 0; j < count; ++j) {
       const double *w = weights + j * modes;
@@ -73,4 +75,5 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
       supine_deform_range(basis, w, s, to, last, positions + 3 * (to - begin));
     }
   }
+  supine_stream_fence(stream);
 }

@@ -20,8 +20,12 @@ static void deform_part(const supine_basis *basis, const float *folded, size_t b
                         const supine_target *target) {
   float aside[TILE_NUMBERS];
   const bool joined = target->y == NULL;
-  const supine_target whole = {aside, joined ? NULL : aside + TILE,
-                               joined ? NULL : aside + (size_t)2 * TILE, target->rest, false};
+  const supine_target whole = {aside,
+                               joined ? NULL : aside + TILE,
+                               joined ? NULL : aside + (size_t)2 * TILE,
+                               target->rest,
+                               false,
+                               true};
   basis->kernels->deform(&basis->tiles, folded, begin / TILE, 1, &whole);
   const size_t first = begin % TILE;
   const size_t count = end - begin;
@@ -65,11 +69,12 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
       deform_lung(basis, folded, first, last, &here);
     }
   }
+  supine_stream_fence(target->stream);
 }
 
 void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
                          size_t begin, size_t end, float *xyz) {
-  const supine_target target = {xyz, NULL, NULL, true, basis->stream};
+  const supine_target target = {xyz, NULL, NULL, true, basis->stream, false};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
@@ -80,12 +85,12 @@ void supine_deform(const supine_basis *basis, const double *weights, const doubl
 
 void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *x, float *y, float *z) {
-  const supine_target target = {x, y, z, true, basis->stream};
+  const supine_target target = {x, y, z, true, basis->stream, false};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
 void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
                            size_t begin, size_t end, float *xyz) {
-  const supine_target target = {xyz, NULL, NULL, false, basis->stream};
+  const supine_target target = {xyz, NULL, NULL, false, basis->stream, false};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }

@@ -9,6 +9,9 @@
 
 #include "tiles.h"
 
+/** Tiles and positions larger than this pass through the caches rather than stay there. */
+enum { STREAM_BYTES = 1 << 22 };
+
 struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];

@@ -159,9 +159,15 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                        const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  const size_t fetched = target->near ? 0 : tiles->stride;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    for (size_t line = 0; line < tiles->stride; line += 64) {
-      _mm_prefetch((const char *)tile + PREFETCH_BYTES + line, _MM_HINT_T0);
+    const char *ahead = (const char *)tile + PREFETCH_BYTES;
+    for (size_t line = 0; line < fetched; line += 64) {
+      if (target->stream) { /* used once a frame: leave the caches alone */
+        _mm_prefetch(ahead + line, _MM_HINT_NTA);
+      } else {
+        _mm_prefetch(ahead + line, _MM_HINT_T0);
+      }
     }
     const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
     if (target->y != NULL) {
@@ -171,9 +177,6 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
     for (size_t j = 0; j < 6; ++j) {
       put(target->x + t * TILE_NUMBERS + 8 * j, xyz.v[j], target->stream);
     }
-  }
-  if (target->stream) {
-    _mm_sfence();
   }
 }
 

@@ -6,41 +6,61 @@
 #include <immintrin.h>
 
 #define INLINE static inline __attribute__((always_inline))
+/* Where the trip count is known, all of it, so that an array of registers is one. */
+#if defined(__clang__)
+#define UNROLL _Pragma("clang loop unroll_count(16)")
+#else
+#define UNROLL _Pragma("GCC unroll 16")
+#endif
+
+enum { COMMON_MODES = 16 }; /* whose weights stay in registers */
+
+/* Weight k in every lane: from a register where the number of modes is the common one. */
+typedef struct weights16 {
+  const float *at;
+  __m512 v[COMMON_MODES];
+} weights16;
+
+INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
+  return common ? w->v[k] : _mm512_set1_ps(w->at[k]);
+}
 
 /* Coefficient k of 16 vertices; float and half storage. */
 INLINE __m512 coefficient(const unsigned char *at, size_t k, supine_storage storage) {
   return storage == SUPINE_STORAGE_FLOAT16
-             ? _mm512_cvtph_ps(_mm256_load_si256((const __m256i *)(at + 32 * k)))
+             ? _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(at + 32 * k)))
              : _mm512_loadu_ps(at + 64 * k);
 }
 
-/* sum over k of w_k c_k: K multiplications, K - 1 additions, in two chains. */
-INLINE __m512 dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
+/* sum over k of w_k c_k: K multiplications, K - 1 additions (INT16: K rounded up to even), in two
+ * chains. */
+INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, bool common,
+                  supine_storage storage) {
   if (storage == SUPINE_STORAGE_INT16) {
     __m512i word = _mm512_loadu_si512(at);
-    __m512 high = _mm512_mul_ps(_mm512_set1_ps(w[0]), _mm512_cvtepi32_ps(word));
+    __m512 high = _mm512_mul_ps(weight(w, 0, common), _mm512_cvtepi32_ps(word));
     __m512 low =
-        _mm512_mul_ps(_mm512_set1_ps(w[1]), _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)));
-    for (size_t k = 2; k < modes; k += 2) {
+        _mm512_mul_ps(weight(w, 1, common), _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)));
+    UNROLL for (size_t k = 2; k < modes; k += 2) {
       word = _mm512_loadu_si512(at + 32 * k);
-      high = _mm512_fmadd_ps(_mm512_set1_ps(w[k]), _mm512_cvtepi32_ps(word), high);
-      low = _mm512_fmadd_ps(_mm512_set1_ps(w[k + 1]),
+      high = _mm512_fmadd_ps(weight(w, k, common), _mm512_cvtepi32_ps(word), high);
+      low = _mm512_fmadd_ps(weight(w, k + 1, common),
                             _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)), low);
     }
     return _mm512_add_ps(high, low);
   }
-  __m512 even = _mm512_mul_ps(_mm512_set1_ps(w[0]), coefficient(at, 0, storage));
+  __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, storage));
   if (modes == 1) {
     return even;
   }
-  __m512 odd = _mm512_mul_ps(_mm512_set1_ps(w[1]), coefficient(at, 1, storage));
+  __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 1, storage));
   size_t k = 2;
-  for (; k + 1 < modes; k += 2) {
-    even = _mm512_fmadd_ps(_mm512_set1_ps(w[k]), coefficient(at, k, storage), even);
-    odd = _mm512_fmadd_ps(_mm512_set1_ps(w[k + 1]), coefficient(at, k + 1, storage), odd);
+  UNROLL for (; k + 1 < modes; k += 2) {
+    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
+    odd = _mm512_fmadd_ps(weight(w, k + 1, common), coefficient(at, k + 1, storage), odd);
   }
   if (k < modes) {
-    even = _mm512_fmadd_ps(_mm512_set1_ps(w[k]), coefficient(at, k, storage), even);
+    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
   }
   return _mm512_add_ps(even, odd);
 }
@@ -138,8 +158,9 @@ INLINE void writer_close(const writer *w) {
   }
 }
 
-INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                           bool with_rest, supine_storage storage, bool vector) {
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
+                           bool with_rest, bool common, supine_storage storage, bool vector) {
+  const size_t modes = common ? COMMON_MODES : tiles->modes;
   const bool compact = supine_tiles_compact(storage);
   const __m512i direction_bias = _mm512_set1_epi32((int)tiles->direction_bias);
   const __m512i rest_bias = _mm512_set1_epi32((int)tiles->rest_bias);
@@ -147,16 +168,16 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
   const unsigned char *rest = tile + tiles->rest_begin;
   triples result;
   if (vector) {
-    const __m512 x = dot(tile, w, tiles->modes, storage);
-    const __m512 y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
-    const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
+    const __m512 x = dot(tile, w, modes, common, storage);
+    const __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
+    const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
     result = interleave(x, y, z);
     for (size_t j = 0; j < 3 && with_rest; ++j) {
       result.v[j] = _mm512_add_ps(result.v[j], numbers(rest, j, compact, rest_bias));
     }
     return result;
   }
-  const triples amount = spread_amount(dot(tile, w, tiles->modes, storage));
+  const triples amount = spread_amount(dot(tile, w, modes, common, storage));
   for (size_t j = 0; j < 3; ++j) {
     const __m512 d = numbers(direction, j, compact, direction_bias);
     result.v[j] = with_rest ? _mm512_fmadd_ps(amount.v[j], d, numbers(rest, j, compact, rest_bias))
@@ -165,18 +186,41 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
   return result;
 }
 
-INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                       const supine_target *target, supine_storage storage, bool vector,
-                       bool with_rest, bool joined) {
+/* What a caller's constants make of one loop. */
+typedef struct form {
+  supine_storage storage;
+  bool vector, rest, joined;
+  bool common; /* 16 modes */
+} form;
+
+INLINE void deform_all(const supine_tiles *any, const float *weights, size_t first, size_t count,
+                       const supine_target *target, form f) {
+  supine_tiles same = *any;
+  if (f.common) { /* known to the compiler */
+    supine_tiles_layout(&same, f.storage, COMMON_MODES, f.vector, any->count);
+  }
+  const supine_tiles *tiles = &same;
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   writer out[3] = {writer_open(target->x, target->stream), writer_open(target->y, target->stream),
                    writer_open(target->z, target->stream)}; /* joined: the first alone */
-  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    for (size_t line = 0; line < tiles->stride; line += 64) {
-      _mm_prefetch((const char *)tile + PREFETCH_BYTES + line, _MM_HINT_T0);
+  weights16 w = {.at = weights};
+  if (f.common) {
+    UNROLL for (size_t k = 0; k < COMMON_MODES; ++k) {
+      w.v[k] = _mm512_set1_ps(weights[k]);
     }
-    triples xyz = deform_tile(tiles, tile, weights, with_rest, storage, vector);
-    if (joined) {
+  }
+  const size_t fetched = target->near ? 0 : tiles->stride;
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    const char *ahead = (const char *)tile + PREFETCH_BYTES;
+    for (size_t line = 0; line < fetched; line += 64) {
+      if (target->stream) { /* used once a frame: leave the caches alone */
+        _mm_prefetch(ahead + line, _MM_HINT_NTA);
+      } else {
+        _mm_prefetch(ahead + line, _MM_HINT_T0);
+      }
+    }
+    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
+    if (f.joined) {
       writer_put(&out[0], xyz.v[0], t == 0);
       writer_put(&out[0], xyz.v[1], t == 0);
       writer_put(&out[0], xyz.v[2], t == 0);
@@ -187,22 +231,21 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
       }
     }
   }
-  for (size_t axis = 0; axis < (joined ? 1 : 3) && count > 0; ++axis) {
+  for (size_t axis = 0; axis < (f.joined ? 1 : 3) && count > 0; ++axis) {
     writer_close(&out[axis]);
-  }
-  if (target->stream) {
-    _mm_sfence();
   }
 }
 
-/* One instance for the common form of target, one for the others. */
+/* One instance for the common number of modes and form of target, one for the others. */
 INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                         const supine_target *target, supine_storage storage, bool vector) {
-  if (target->rest && target->y == NULL) {
-    deform_all(tiles, weights, first, count, target, storage, vector, true, true);
+  const bool joined = target->y == NULL;
+  if (target->rest && joined && tiles->modes == COMMON_MODES) {
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = true, .joined = true, .common = true});
   } else {
-    deform_all(tiles, weights, first, count, target, storage, vector, target->rest,
-               target->y == NULL);
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = target->rest, .joined = joined, .common = false});
   }
 }
 

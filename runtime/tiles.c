@@ -1,26 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The layout of tiles, and the choice of the code that reads them. */
+/* The choice of the code that reads tiles. */
 #include "tiles.h"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
 #endif
-
-void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes, bool vector,
-                         size_t count) {
-  static const size_t word_bytes[SUPINE_STORAGE_COUNT] = {0, 4, 4, 2, 2};
-  const bool compact = supine_tiles_compact(storage);
-  const size_t even = storage == SUPINE_STORAGE_INT16 ? modes + modes % 2 : modes;
-  tiles->storage = storage;
-  tiles->modes = modes;
-  tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = even * TILE * word_bytes[storage];
-  tiles->direction_begin = tiles->axes * tiles->axis_bytes;
-  const size_t numbers = (size_t)TILE_NUMBERS * (compact ? 3 : 4);
-  tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
-  tiles->stride = (tiles->rest_begin + numbers + 31) / 32 * 32;
-  tiles->count = count;
-}
 
 #if defined(__x86_64__)
 /* Asked of the processor and of the system, which must save the registers. */

@@ -29,7 +29,7 @@
 enum {
   TILE = 16,             /**< vertices */
   TILE_NUMBERS = 48,     /**< their coordinates */
-  PREFETCH_BYTES = 4096, /**< how far ahead the kernels ask for memory */
+  PREFETCH_BYTES = 8192, /**< how far ahead the kernels ask for memory */
 };
 
 typedef struct supine_tiles {
@@ -46,17 +46,53 @@ typedef struct supine_tiles {
   unsigned char *bytes;
 } supine_tiles;
 
+/** Does the storage keep directions and rest positions compact? */
+static inline bool supine_tiles_compact(supine_storage storage) {
+  return storage != SUPINE_STORAGE_EXACT;
+}
+
+/** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. Inline, so that a
+ * kernel's constants fold. */
+static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
+                                       bool vector, size_t count) {
+  const bool compact = supine_tiles_compact(storage);
+  const bool pairs = storage == SUPINE_STORAGE_INT16;
+  const size_t word = pairs || storage == SUPINE_STORAGE_FLOAT16 ? 2 : 4;
+  const size_t numbers = (size_t)TILE_NUMBERS * (compact ? 3 : 4);
+  tiles->storage = storage;
+  tiles->modes = modes;
+  tiles->axes = vector ? 3 : 1;
+  tiles->axis_bytes = (pairs ? modes + modes % 2 : modes) * TILE * word;
+  tiles->direction_begin = tiles->axes * tiles->axis_bytes;
+  tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
+  tiles->stride = (tiles->rest_begin + numbers + 31) / 32 * 32;
+  tiles->count = count;
+}
+
 /** Where and how a kernel writes. Either one array of triples (x, with y NULL) or three arrays. */
 typedef struct supine_target {
   float *x, *y, *z;
   bool rest;   /**< positions; otherwise displacements alone */
   bool stream; /**< store past the cache */
+  bool near;   /**< the tiles are in the cache: do not ask for them ahead */
 } supine_target;
 
 /** Evaluates whole tiles first <= t < first + count, of one lung, from folded weights (see
  * supine_fold), into the first 16 count vertices of the target. */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
+
+/** Makes stores past the cache visible to other threads in order; after the last kernel of a call.
+ */
+static inline void supine_stream_fence(bool stream) {
+#if defined(__x86_64__)
+  if (stream) {
+    __builtin_ia32_sfence();
+  }
+#else
+  (void)stream;
+#endif
+}
 
 /** Widens tiles first <= t < first + count into the EXACT layout `to`, keeping the integers' scale,
  * so that weights folded with supine_fold_widened serve. */
@@ -75,14 +111,5 @@ extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
 /** The code of the given kind, or of the widest kind where AUTO (then *simd says which); NULL where
  * this processor or build has not got it. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
-
-/** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. */
-void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes, bool vector,
-                         size_t count);
-
-/** Does the storage keep directions and rest positions compact? */
-static inline bool supine_tiles_compact(supine_storage storage) {
-  return storage != SUPINE_STORAGE_EXACT;
-}
 
 #endif

@@ -12,3 +12,22 @@ supine_test(volume runtime_fixture)
 supine_test(runtime_basis runtime_fixture)
 supine_test(deform runtime_fixture)
 supine_test(deform_lung runtime_fixture)
+
+# The library as others have it: installed, through CMake and pkg-config.
+add_executable(make_basis example/make_basis.c)
+target_include_directories(make_basis PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+target_link_libraries(make_basis PRIVATE supine_options runtime_fixture PkgConfig::CMOCKA)
+include(CheckLanguage)
+check_language(CXX)
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
+  add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_install.sh ${CMAKE_COMMAND}
+    ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/example $<TARGET_FILE:make_basis>
+    ${CMAKE_C_COMPILER} ${CMAKE_CXX_COMPILER})
+  set_tests_properties(install PROPERTIES TIMEOUT 120)
+endif()
+
+supine_test(runtime_quiet runtime_fixture)
+foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open close)
+  target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})
+endforeach()
+supine_test(runtime_threads runtime_fixture Threads::Threads)

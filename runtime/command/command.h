@@ -29,6 +29,8 @@ supine_command_function supine_command_info;
 supine_command_function supine_command_deform;
 supine_command_function supine_command_compare;
 supine_command_function supine_command_render;
+supine_command_function supine_command_breathe;
+supine_command_function supine_command_export;
 supine_command_function supine_command_solve;
 supine_command_function supine_command_pv;
 

@@ -114,10 +114,10 @@ static void print_text(const char *path, const supine_basis *basis, const double
                  text_of(basis, "error_max_percent"));
     if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
       const char *volume = supine_basis_metadata(basis, "error_volume_ml");
-      (void)printf("  mm  %10s   %15s   %7s   %s%s\n", text_of(basis, "error_rms_mm"),
+      (void)printf("  mm  %10s   %15s   %7s   %s%s%s\n", text_of(basis, "error_rms_mm"),
                    text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"),
-                   volume != NULL ? "mL: " : "of the fields as given",
-                   volume != NULL ? volume : "");
+                   volume != NULL ? "at " : "of the fields as given", volume != NULL ? volume : "",
+                   volume != NULL ? " mL" : "");
     }
   }
   (void)puts("\nEnergy per band:");
@@ -133,12 +133,53 @@ static void print_text(const char *path, const supine_basis *basis, const double
   (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
 }
 
+/* A tensor of errors in the file, or NULL. */
+static const double *error_list(const supine_safetensors *file, const char *key, size_t *count) {
+  const supine_tensor *tensor = supine_safetensors_find(file, key);
+  if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {
+    *count = 0;
+    return NULL;
+  }
+  *count = tensor->shape[0];
+  return tensor->data;
+}
+
+/* Error against the number of functions of orientation, each a multiplication per vertex. */
+static void print_table(const supine_safetensors *file) {
+  size_t bands;
+  size_t modes;
+  const double *harmonics = error_list(file, "error_harmonics", &bands);
+  const double *best = error_list(file, "error_modes", &modes);
+  if (harmonics == NULL || best == NULL) {
+    return;
+  }
+  (void)puts("\nRMS error against the number of multiplications:\n"
+             "             first harmonics     best modes");
+  for (size_t k = 1, l = 0; k <= modes || (l < bands && (l + 1) * (l + 1) <= 64); ++k) {
+    const bool square = l < bands && (l + 1) * (l + 1) == k;
+    if (square || k <= modes) {
+      (void)printf("  %4zu + 3  ", k);
+      if (square) {
+        (void)printf("  %8.3f %% (l <= %zu)", 100.0 * harmonics[l], l);
+        ++l;
+      } else {
+        (void)printf("%22s", "");
+      }
+      if (k <= modes) {
+        (void)printf("  %7.3f %%", 100.0 * best[k - 1]);
+      }
+      (void)putchar('\n');
+    }
+  }
+}
+
 static json_t *number_or_text(const char *text) {
   double value;
   return supine_parse_number(text, &value) ? json_real(value) : json_string(text);
 }
 
-static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
+static bool print_json(const char *path, const supine_basis *basis, const supine_safetensors *file,
+                       const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   json_t *bands = json_array();
   json_t *error = json_object();
@@ -162,6 +203,16 @@ static bool print_json(const char *path, const supine_basis *basis, const double
   for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
     const char *value = supine_basis_metadata(basis, shown[i]);
     good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
+  }
+  for (size_t i = 0; good && i < 2; ++i) {
+    static const char *const keys[] = {"error_harmonics", "error_modes"};
+    size_t count;
+    const double *values = error_list(file, keys[i], &count);
+    json_t *list = json_array();
+    for (size_t k = 0; values != NULL && k < count; ++k) {
+      (void)json_array_append_new(list, json_real(values[k]));
+    }
+    good = json_object_set_new(root, keys[i], list) == 0;
   }
   good = good && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
   (void)putchar('\n');
@@ -207,13 +258,14 @@ int supine_command_info(int argc, char **argv) {
     result = SUPINE_EXIT_NUMERICAL;
     goto cleanup;
   }
-  if (json && !print_json(path, basis, energy)) {
+  if (json && !print_json(path, basis, file, energy)) {
     supine_command_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
   if (!json) {
     print_text(path, basis, energy);
+    print_table(file);
   }
   result = supine_command_finish(name);
 cleanup:

@@ -42,6 +42,13 @@ supine_status supine_project_linear(const supine_lungs *lungs, const supine_forc
                                     const double *stiffness, size_t band,
                                     supine_projection *projection, supine_error *error);
 
+/** The same with a rule of latitudes x longitudes directions instead of the default, which is eight
+ * times finer than the band. */
+supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
+                                         const double *stiffness, size_t band, size_t latitudes,
+                                         size_t longitudes, supine_projection *projection,
+                                         supine_error *error);
+
 /** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
  * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
  * coefficients themselves; memory is one ring of fields and those.

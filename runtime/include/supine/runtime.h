@@ -187,6 +187,24 @@ SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
  * Cost: one pass over the triangles, in the caller's thread. */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
+/** Modes that the GPU form has room for, and floats of one vertex's attributes. */
+enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 22 };
+
+/** Attributes of vertices begin <= i < end for supine.glsl, as one vertex buffer has them:
+ *
+ *     rest vec3 (offset 0), direction vec3 (offset 12), coefficients four vec4 (offset 24)
+ *
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS], written; 88 bytes a vertex
+ * @retval SUPINE_ERROR_UNSUPPORTED  more than 16 modes, or a vector field */
+SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
+                                        float *attributes);
+
+/** The uniform supine_weights of supine.glsl, for lungs at one breath scale.
+ * @param uniforms  [SUPINE_GL_MODES], written, for glUniform4fv(location, 4, uniforms)
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
+SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
+                                           double scale, float *uniforms);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Base64 (RFC 4648, section 4). */
+#ifndef SUPINE_EXPORT_BASE64_H
+#define SUPINE_EXPORT_BASE64_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+/** Writes `size` bytes as base64, padded; errors stay in the stream. */
+void export_base64_write(const void *bytes, size_t size, FILE *file);
+
+#endif

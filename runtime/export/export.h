@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * A basis in forms that other programs play: a page for the browser, and glTF morph targets. */
+#ifndef SUPINE_EXPORT_H
+#define SUPINE_EXPORT_H
+
+#include <supine/runtime.h>
+#include <supine/safetensors.h>
+
+/** An open basis with the tensors that the run-time library keeps to itself. */
+typedef struct export_source {
+  supine_basis *basis;
+  const supine_basis_info *info;
+  supine_safetensors *file;
+  size_t terms;              /**< (L+1)^2 */
+  const float *vertices;     /**< [N, 3] */
+  const uint32_t *triangles; /**< [M, 3] */
+  const float *direction;    /**< [N, 3]; NULL where the kind is vector */
+  const float *coefficients; /**< [N, K] or [N, 3, K] */
+  const double *modes;       /**< [K, (L+1)^2] */
+  const double *linear;      /**< [G, K], mL; NULL where the surface is open; likewise: */
+  const double *quadratic;   /**< [G, K, K] */
+  const double *cubic;       /**< [G, K, K, K] */
+} export_source;
+
+/** Opens a basis file.
+ * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY  as supine_basis_open */
+supine_status export_source_open(const char *path, export_source *source, supine_error *error);
+
+/** Releases it; a zeroed one is legal. */
+void export_source_close(export_source *source);
+
+/** Displacement u_k of vertex `vertex` for a weight of 1 in mode `mode`, mm. */
+void export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
+
+/** How deep a breath is. */
+typedef struct export_breath {
+  double volume;  /**< mL above rest: where the surface is closed */
+  double largest; /**< mm, the largest displacement when supine: where it is open */
+  double scale;   /**< the breath scale that gives it */
+} export_breath;
+
+/** A breath of `volume` mL; on an open surface one whose largest displacement, supine, is
+ * `largest` mm.
+ * @retval SUPINE_ERROR_NUMERICAL  nothing moves
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status export_breath_set(const export_source *source, double volume, double largest,
+                                export_breath *breath, supine_error *error);
+
+/** The breath scale s at a fraction of the breath (0 rest, 1 all of it) for the basis' weights.
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
+supine_status export_breath_scale(const export_source *source, const export_breath *breath,
+                                  const double *weights, double fraction, double *scale,
+                                  supine_error *error);
+
+/** How to write glTF. Zeros: every mode as a target, float32, no animation. */
+typedef struct export_glb_options {
+  bool eight;      /**< at most eight targets, the best there are */
+  bool clamp_safe; /**< weights from 0 to 1 for every gravity and breaths up to `breath` */
+  bool quantise;   /**< targets as 16-bit counts (KHR_mesh_quantization) */
+  bool animate;    /**< an animation that breathes and turns the patient */
+  export_breath breath;
+} export_glb_options;
+
+/** What was written. */
+typedef struct export_glb_report {
+  size_t targets;
+  double loss_percent; /**< RMS of what `eight` left out, of the RMS displacement */
+  size_t bytes;
+} export_glb_report;
+
+/** Writes glTF 2.0 binary: a mesh of K morph targets that any engine deforms,
+ *
+ *     position_i = base_i + sum over k of weight_k target_ik
+ *     weight_k   = (s sum over lm of modes[k, lm] Y_lm(g) - offset_k) / unit_k
+ *
+ * with modes, offset, unit and the volume forms that give s in the mesh's `extras`, and vertices
+ * in the basis' order. The node turns and scales millimetres LPS to glTF's metres, y up.
+ * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
+ * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+supine_status export_glb_write(const char *path, const export_source *source,
+                               const export_glb_options *options, export_glb_report *report,
+                               supine_error *error);
+
+/** Most modes that the page carries: four vertex attributes of four. */
+enum { EXPORT_PAGE_MODES_MAX = 16 };
+
+/** Writes one self-contained page that shows the lungs in a browser (WebGL 2), without a network.
+ * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, or more than EXPORT_PAGE_MODES_MAX modes
+ * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+supine_status export_html_write(const char *path, const export_source *source,
+                                const export_breath *breath, const char *title,
+                                supine_error *error);
+
+#endif

@@ -1,0 +1,241 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* glTF 2.0 binary: a header, a chunk of JSON, a chunk of numbers. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "glb.h"
+
+enum { CHUNK_ALIGNMENT = 4, SHORT_STRIDE = 8 };
+static const uint32_t magic = 0x46546C67, version = 2, json_chunk = 0x4E4F534A,
+                      binary_chunk = 0x004E4942;
+
+/* A file on its way. */
+typedef struct glb {
+  const export_source *source;
+  const export_glb_options *options;
+  export_targets targets;
+  glb_animation animation;
+  float *xyz;      /* [N, 3] */
+  int16_t *short4; /* [N, 4], where quantised */
+  glb_plan plan;
+} glb;
+
+size_t glb_plan_add(glb_plan *plan, int component, const char *type, size_t count, int target,
+                    size_t axes, const double *low, const double *high) {
+  const size_t size = component == GLTF_SHORT ? SHORT_STRIDE : 4 * axes;
+  const json_int_t length = (json_int_t)count * (json_int_t)size;
+  json_t *view = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)plan->bytes,
+                           "byteLength", length);
+  if (target != GLTF_NO_TARGET) {
+    (void)json_object_set_new(view, "target", json_integer(target));
+  }
+  if (component == GLTF_SHORT) {
+    (void)json_object_set_new(view, "byteStride", json_integer(SHORT_STRIDE));
+  }
+  json_t *accessor =
+      json_pack("{s:I, s:i, s:I, s:s}", "bufferView", (json_int_t)json_array_size(plan->views),
+                "componentType", component, "count", (json_int_t)count, "type", type);
+  if (low != NULL && high != NULL) {
+    (void)json_object_set_new(accessor, "min", glb_numbers(low, axes));
+    (void)json_object_set_new(accessor, "max", glb_numbers(high, axes));
+  }
+  (void)json_array_append_new(plan->views, view);
+  (void)json_array_append_new(plan->accessors, accessor);
+  plan->bytes += count * size;
+  return json_array_size(plan->accessors) - 1;
+}
+
+/* Bounds of `count` points, as they will stand in the file. */
+static void find_bounds(const float *xyz, size_t count, bool rounded, double low[3],
+                        double high[3]) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = INFINITY;
+    high[axis] = -INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+      const double x = (double)xyz[3 * i + axis];
+      low[axis] = fmin(low[axis], rounded ? rint(x) : x);
+      high[axis] = fmax(high[axis], rounded ? rint(x) : x);
+    }
+  }
+}
+
+/* Accessors in the order in which write_numbers writes them: indices, base, normals, targets. */
+static json_t *plan_mesh(glb *g) {
+  const size_t n = g->source->info->vertex_count;
+  const bool quantise = g->options->quantise;
+  double low[3];
+  double high[3];
+  (void)glb_plan_add(&g->plan, GLTF_UINT, "SCALAR", 3 * g->source->info->triangle_count,
+                     GLTF_INDICES, 1, NULL, NULL);
+  export_targets_base(g->source, &g->targets, g->xyz);
+  find_bounds(g->xyz, n, false, low, high);
+  (void)glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, low, high);
+  (void)glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
+  json_t *targets = json_array();
+  json_t *weights = json_array();
+  for (size_t j = 0; j < g->targets.count; ++j) {
+    export_targets_fill(g->source, &g->targets, j, g->xyz);
+    find_bounds(g->xyz, n, quantise, low, high);
+    const size_t accessor = glb_plan_add(&g->plan, quantise ? GLTF_SHORT : GLTF_FLOAT, "VEC3", n,
+                                         GLTF_VERTICES, 3, low, high);
+    (void)json_array_append_new(targets, json_pack("{s:I}", "POSITION", (json_int_t)accessor));
+    /* At rest: breath scale 0. Stored as the positions are, so that no engine sees another rest. */
+    (void)json_array_append_new(weights, json_real(0 - g->targets.offset[j] / g->targets.unit[j]));
+  }
+  return json_pack("{s:s, s:[{s:{s:i, s:i}, s:i, s:i, s:o}], s:o, s:o}", "name", "lungs",
+                   "primitives", "attributes", "POSITION", 1, "NORMAL", 2, "indices", 0, "material",
+                   0, "targets", targets, "weights", weights, "extras",
+                   glb_extras(g->source, g->options, &g->targets));
+}
+
+/* Node 0, the patient, turns; node 1 takes millimetres LPS, or counts, to metres with y up. */
+static json_t *nodes(const glb *g) {
+  const double half = sqrt(0.5);
+  const double metres = 1e-3 * g->targets.count_mm;
+  return json_pack("[{s:s, s:[i]}, {s:s, s:i, s:[f,f,f,f], s:[f,f,f]}]", "name", "patient",
+                   "children", 1, "name", "lungs", "mesh", 0, "rotation", -half, 0.0, 0.0, half,
+                   "scale", metres, metres, metres);
+}
+
+static json_t *make_json(glb *g) {
+  g->plan = (glb_plan){json_array(), json_array(), 0};
+  json_t *mesh = plan_mesh(g);
+  json_t *root = json_pack(
+      "{s:{s:s, s:s}, s:i, s:[{s:s, s:[i]}], s:o, s:[o], s:[{s:s, s:{s:[f,f,f,f], s:f, s:f}, "
+      "s:b}]}",
+      "asset", "version", "2.0", "generator", "supine", "scene", 0, "scenes", "name", "lungs",
+      "nodes", 0, "nodes", nodes(g), "meshes", mesh, "materials", "name", "pleura",
+      "pbrMetallicRoughness", "baseColorFactor", 0.80, 0.45, 0.42, 1.0, "metallicFactor", 0.0,
+      "roughnessFactor", 0.55, "doubleSided", 1);
+  if (root == NULL) {
+    return NULL;
+  }
+  if (g->options->quantise) {
+    (void)json_object_set_new(root, "extensionsUsed", json_pack("[s]", "KHR_mesh_quantization"));
+    (void)json_object_set_new(root, "extensionsRequired",
+                              json_pack("[s]", "KHR_mesh_quantization"));
+  }
+  if (g->options->animate) {
+    (void)json_object_set_new(root, "animations",
+                              glb_animation_plan(&g->animation, g->targets.count, &g->plan));
+  }
+  const bool good =
+      json_object_set(root, "bufferViews", g->plan.views) == 0 &&
+      json_object_set(root, "accessors", g->plan.accessors) == 0 &&
+      json_object_set_new(root, "buffers",
+                          json_pack("[{s:I}]", "byteLength", (json_int_t)g->plan.bytes)) == 0;
+  if (!good) {
+    json_decref(root);
+    return NULL;
+  }
+  return root;
+}
+
+static void write_target(glb *g, size_t j, FILE *file) {
+  const size_t n = g->source->info->vertex_count;
+  export_targets_fill(g->source, &g->targets, j, g->xyz);
+  if (!g->options->quantise) {
+    (void)fwrite(g->xyz, 3 * sizeof *g->xyz, n, file);
+    return;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      g->short4[4 * i + axis] = (int16_t)rint((double)g->xyz[3 * i + axis]);
+    }
+  }
+  (void)fwrite(g->short4, 4 * sizeof *g->short4, n, file);
+}
+
+static supine_status write_numbers(glb *g, FILE *file, supine_error *error) {
+  const supine_basis_info *info = g->source->info;
+  (void)fwrite(g->source->triangles, 3 * sizeof *g->source->triangles, info->triangle_count, file);
+  export_targets_base(g->source, &g->targets, g->xyz);
+  (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
+  const supine_status status = glb_normals(g->source, g->xyz, error);
+  (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
+  for (size_t j = 0; j < g->targets.count; ++j) {
+    write_target(g, j, file);
+  }
+  if (g->options->animate) {
+    const glb_animation *a = &g->animation;
+    (void)fwrite(a->times, sizeof *a->times, a->frames, file);
+    (void)fwrite(a->weights, g->targets.count * sizeof *a->weights, a->frames, file);
+    (void)fwrite(a->rotations, 4 * sizeof *a->rotations, a->frames, file);
+  }
+  return status;
+}
+
+static supine_status write_file(glb *g, const char *path, const char *text, size_t *bytes,
+                                supine_error *error) {
+  const size_t length = strlen(text);
+  const size_t padded = (length + CHUNK_ALIGNMENT - 1) / CHUNK_ALIGNMENT * CHUNK_ALIGNMENT;
+  const size_t total = 12 + 8 + padded + 8 + g->plan.bytes; /* the numbers are all of 4 bytes */
+  if (total > UINT32_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: %zu bytes, and glTF binary ends at 4 GiB: take fewer modes or "
+                            "vertices",
+                            path, total);
+  }
+  supine_output output = {0};
+  supine_status status = supine_output_open(path, &output, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const uint32_t head[] = {magic, version, (uint32_t)total, (uint32_t)padded, json_chunk};
+  const uint32_t tail[] = {(uint32_t)g->plan.bytes, binary_chunk};
+  (void)fwrite(head, sizeof head, 1, output.file);
+  (void)fwrite(text, 1, length, output.file);
+  (void)fwrite("   ", 1, padded - length, output.file);
+  (void)fwrite(tail, sizeof tail, 1, output.file);
+  status = write_numbers(g, output.file, error);
+  if (status == SUPINE_OK) {
+    status = supine_output_commit(&output, error);
+  }
+  supine_output_abandon(&output);
+  *bytes = total;
+  return status;
+}
+
+supine_status export_glb_write(const char *path, const export_source *source,
+                               const export_glb_options *options, export_glb_report *report,
+                               supine_error *error) {
+  const size_t n = source->info->vertex_count;
+  glb g = {.source = source, .options = options};
+  json_t *root = NULL;
+  char *text = NULL;
+  if (source->info->triangle_count == 0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH, "a basis without triangles shows nothing");
+  }
+  supine_status status = export_targets_choose(source, options, &g.targets, error);
+  if (status == SUPINE_OK && options->animate) {
+    status = glb_animation_make(source, options, &g.targets, &g.animation, error);
+  }
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  g.xyz = malloc(3 * n * sizeof *g.xyz);
+  g.short4 = calloc(options->quantise ? 4 * n : 4, sizeof *g.short4);
+  if (g.xyz != NULL && g.short4 != NULL) {
+    root = make_json(&g);
+    text = root == NULL ? NULL : json_dumps(root, JSON_COMPACT);
+  }
+  if (text == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    goto cleanup;
+  }
+  status = write_file(&g, path, text, &report->bytes, error);
+  report->targets = g.targets.count;
+  report->loss_percent = g.targets.loss_percent;
+
+cleanup:
+  free(text); /* as jansson's default allocator gave it */
+  json_decref(root);
+  json_decref(g.plan.views);
+  json_decref(g.plan.accessors);
+  free(g.xyz);
+  free(g.short4);
+  glb_animation_free(&g.animation);
+  export_targets_free(&g.targets);
+  return status;
+}

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// The basis in the page, and what the run-time library computes once a frame: weights from gravity,
+// the breath scale from a volume.
+
+/** Bytes of a base64 text. */
+function fromBase64(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const padding = text.endsWith('==') ? 2 : text.endsWith('=') ? 1 : 0;
+  const bytes = new Uint8Array((text.length / 4) * 3 - padding);
+  const piece = 1 << 16;
+  for (let from = 0, to = 0; from < text.length; from += piece) {
+    const part = atob(text.slice(from, from + piece));
+    for (let i = 0; i < part.length; ++i) bytes[to++] = part.charCodeAt(i);
+  }
+  return bytes;
+}
+
+/** Takes a tensor out of the page. */
+function takeTensor(name, Numbers) {
+  const element = document.getElementById(`tensor-${name}`);
+  const text = element.textContent;
+  element.remove();
+  return new Numbers(fromBase64(text).buffer);
+}
+
+function readBasis() {
+  const basis = JSON.parse(document.getElementById('basis').textContent);
+  basis.rest = takeTensor('vertices', Float32Array);
+  basis.direction = takeTensor('direction', Float32Array);
+  basis.coefficients = takeTensor('coefficients', Float32Array);
+  basis.corners = takeTensor('triangles', Uint32Array);
+  basis.mixes = takeTensor('modes', Float64Array);
+  if (basis.hasVolume) {
+    basis.linear = takeTensor('linear', Float64Array);
+    basis.quadratic = takeTensor('quadratic', Float64Array);
+    basis.cubic = takeTensor('cubic', Float64Array);
+  }
+  basis.lungs = basis.lungBegin.length - 1;
+  basis.lungNames = (basis.metadata.lungs ?? '').split(',');
+  return basis;
+}
+
+/** Real spherical harmonics Y_lm of a unit vector at l*l + l + m, orthonormal, no Condon-Shortley
+ * phase: q(l, m)(z) times Re, Im of (x + i y)^m, by the recurrence in l. */
+function harmonics(band, [x, y, z]) {
+  const values = new Float64Array((band + 1) ** 2);
+  let top = Math.sqrt(1 / (4 * Math.PI));
+  let re = 1;
+  let im = 0;
+  for (let m = 0; m <= band; ++m) {
+    if (m > 0) {
+      [re, im] = [re * x - im * y, re * y + im * x];
+      top *= m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m));
+    }
+    let before = 0;
+    let q = top;
+    for (let l = m; l <= band; ++l) {
+      values[l * l + l - m] = q * im;
+      values[l * l + l + m] = q * re;
+      const a = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
+      [before, q] = [q / a, a * (z * q - before)];
+    }
+  }
+  return values;
+}
+
+/** Weights of the modes for gravity along a unit vector. */
+function weightsFor(basis, gravity) {
+  const y = harmonics(basis.band, gravity);
+  return Float64Array.from({ length: basis.modes }, (_, k) => {
+    let sum = 0;
+    for (let i = 0; i < y.length; ++i) sum += basis.mixes[k * y.length + i] * y[i];
+    return sum;
+  });
+}
+
+/** Coefficients c of the mL that lung `lung` gains at scale s: c[0] s + c[1] s^2 + c[2] s^3. */
+function lungCubic(basis, lung, w) {
+  const k = basis.modes;
+  const c = [0, 0, 0];
+  for (let a = 0; a < k; ++a) {
+    let square = 0;
+    let cube = 0;
+    for (let b = 0; b < k; ++b) {
+      const ab = (lung * k + a) * k + b;
+      let row = 0;
+      for (let m = 0; m < k; ++m) row += basis.cubic[ab * k + m] * w[m];
+      square += basis.quadratic[ab] * w[b];
+      cube += row * w[b];
+    }
+    c[0] += basis.linear[lung * k + a] * w[a];
+    c[1] += square * w[a];
+    c[2] += cube * w[a];
+  }
+  return c;
+}
+
+const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
+const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
+
+/** The nearest s on one side of 0 where the volume turns back; infinite where it never does. */
+function cubicTurn(c, side) {
+  const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
+  if (discriminant < 0) return side * Infinity;
+  const q = -(c[1] + (c[1] < 0 ? -1 : 1) * Math.sqrt(discriminant));
+  const ahead = [q / (3 * c[2]), c[0] / q].map((root) => root * side).filter((d) => d > 0);
+  return side * Math.min(Infinity, ...ahead);
+}
+
+/** The scale at which the volume is gained, on the branch that grows out of 0; NaN where the
+ * surface would fold before. */
+function scaleForVolume(c, volume) {
+  if (volume === 0) return 0;
+  const side = volume / c[0] > 0 ? 1 : -1;
+  let far = cubicTurn(c, side);
+  if (Number.isFinite(far)) {
+    if (Math.abs(cubicAt(c, far)) < Math.abs(volume)) return NaN;
+  } else {
+    far = volume / c[0];
+    while (Number.isFinite(far) && Math.abs(cubicAt(c, far)) < Math.abs(volume)) far *= 2;
+    if (!Number.isFinite(far)) return NaN;
+    far *= 2;
+  }
+  let [low, high] = side > 0 ? [0, far] : [far, 0];
+  const rising = cubicAt(c, high) > cubicAt(c, low);
+  let s = volume / c[0];
+  for (let i = 0; i < 200; ++i) {
+    if (!(s > low && s < high)) s = low + (high - low) / 2;
+    const residual = cubicAt(c, s) - volume;
+    if (residual === 0 || s === low || s === high) return s;
+    if (residual > 0 === rising) high = s;
+    else low = s;
+    const next = s - residual / cubicSlope(c, s);
+    if (Math.abs(next - s) <= 1e-15 * Math.abs(s)) return s;
+    s = next;
+  }
+  return s;
+}
+
+/** Everything about one moment: the weights with the breath scale in them, and each lung's gain.
+ * `depth` is mL where the surface is closed, else mm of the largest displacement when supine. */
+function momentFor(basis, gravity, depth) {
+  const w = weightsFor(basis, gravity);
+  let scale;
+  let gains = null;
+  if (basis.hasVolume) {
+    const cubics = Array.from({ length: basis.lungs }, (_, lung) => lungCubic(basis, lung, w));
+    const all = [0, 1, 2].map((i) => cubics.reduce((sum, c) => sum + c[i], 0));
+    scale = scaleForVolume(all, depth);
+    gains = cubics.map((c) => cubicAt(c, scale));
+  } else {
+    scale = (depth / basis.breathLargest) * basis.breathScale;
+  }
+  return { gravity, scale, gains, weights: w.map((x) => x * scale) };
+}
+
+/** Displacements of a few thousand vertices, for the range of the colours. */
+function sampleField(basis, moment) {
+  const stride = Math.max(1, Math.ceil(basis.vertices / 6000));
+  const field = [];
+  for (let i = 0; i < basis.vertices; i += stride) {
+    let amount = 0;
+    for (let k = 0; k < basis.modes; ++k) amount += moment.weights[k] * basis.coefficients[i * basis.modes + k];
+    for (let axis = 0; axis < 3; ++axis) field.push(amount * basis.direction[3 * i + axis]);
+  }
+  return field;
+}

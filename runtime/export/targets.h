@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Which morph targets stand for a basis, and what their weights are. */
+#ifndef SUPINE_EXPORT_TARGETS_H
+#define SUPINE_EXPORT_TARGETS_H
+
+#include "export.h"
+
+/** J targets, each a mix of the basis' K modes:
+ *
+ *     target_j = unit_j sum over k of mix[k, j] u_k          base = rest + sum of offset_j mix u
+ *     weight_j = (s sum over lm of modes[j, lm] Y_lm(g) - offset_j) / unit_j */
+typedef struct export_targets {
+  size_t count;
+  bool mixed;          /**< false: mix is the identity */
+  double *mix;         /**< [K, J] */
+  double *modes;       /**< [J, (L+1)^2] */
+  double *offset;      /**< [J] */
+  double *unit;        /**< [J] */
+  double loss_percent; /**< see export_glb_report */
+  double count_mm;     /**< what one stored unit of length is, mm: 1, or a count's when quantised */
+} export_targets;
+
+/** Chooses targets for the options.
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status export_targets_choose(const export_source *source, const export_glb_options *options,
+                                    export_targets *targets, supine_error *error);
+
+/** Releases them; a zeroed one is legal. */
+void export_targets_free(export_targets *targets);
+
+/** Weights [J] at breath scale `scale` from the basis' Y [(L+1)^2]. */
+void export_targets_weights(const export_targets *targets, size_t terms, const double *y,
+                            double scale, double *weights);
+
+/** Target `j` for a weight of 1, in stored units, xyz [N, 3]. */
+void export_targets_fill(const export_source *source, const export_targets *targets, size_t j,
+                         float *xyz);
+
+/** The base, in stored units, xyz [N, 3]. */
+void export_targets_base(const export_source *source, const export_targets *targets, float *xyz);
+
+/** The J <= limit mixes that keep most of the displacement's mean square over vertices and
+ * directions: mix [K, J] and modes [J, (L+1)^2], and what is lost.
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status export_targets_reduce(const export_source *source, size_t limit,
+                                    export_targets *targets, supine_error *error);
+
+#endif

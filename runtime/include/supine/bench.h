@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Measuring the evaluator against the memory it reads and a plain loop. Not part of the run-time
+ * library. */
+#ifndef SUPINE_BENCH_H
+#define SUPINE_BENCH_H
+
+#include <stddef.h>
+
+#include <supine/runtime.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** One measurement: the fastest of several runs. */
+typedef struct supine_bench_row {
+  const char *what;    /**< "supine", "plain_loop", "copy", "triad", ... */
+  const char *storage; /**< "int16", ...; "" where there is none */
+  const char *code;    /**< "avx512", ...; "" where it is the compiler's */
+  size_t vertices;
+  size_t modes;
+  size_t threads;
+  double ns_per_vertex;    /**< of one orientation */
+  double bytes_per_vertex; /**< that it must move, reads and writes */
+  double gb_per_second;
+  double triad_share;     /**< gb_per_second over that of the triad of as many threads */
+  double multiplications; /**< a vertex, counted from the code; 0 where that says nothing */
+  double additions;
+} supine_bench_row;
+
+/** What takes part in a run: `run(context)` does the work of `vertices` once. */
+typedef struct supine_bench_entry {
+  supine_bench_row row;
+  void (*run)(void *context);
+  void *context;
+} supine_bench_entry;
+
+/** Runs every entry in turn, `repeats` times over, subnormals flushed, and fills in the rows'
+ * times, rates and shares from the fastest run of each. */
+void supine_bench_measure(supine_bench_entry *entries, size_t count, size_t repeats);
+
+/** A made basis of any size as a file in memory, for want of a file: the fields of `like` over and
+ * over, or random ones of `modes` modes where it is NULL. `coefficients`, `direction` and `rest`
+ * point into the bytes; free the bytes after the bases that were opened on them. */
+typedef struct supine_bench_image {
+  unsigned char *bytes;
+  size_t size;
+  size_t vertices, modes;
+  const float *coefficients; /**< [N, K] */
+  const float *direction;    /**< [N, 3] */
+  const float *rest;         /**< [N, 3] */
+} supine_bench_image;
+
+/** @retval SUPINE_ERROR_MEMORY
+ * @retval SUPINE_ERROR_UNSUPPORTED  `like` has a vector field */
+supine_status supine_bench_image_create(size_t vertices, size_t modes, const supine_basis *like,
+                                        supine_bench_image *image, supine_error *error);
+void supine_bench_image_destroy(supine_bench_image *image);
+
+/** What to measure; zeros are the defaults. */
+typedef struct supine_bench_options {
+  const size_t *vertices; /**< sizes; NULL: 10,000, 100,000 and 1,000,000 */
+  size_t vertices_count;
+  size_t threads;           /**< measure 1 and this many; 0: 1 and 2 */
+  size_t repeats;           /**< 0: 9 */
+  const supine_basis *like; /**< fields to repeat, or NULL */
+} supine_bench_options;
+
+/** Takes each row as it is measured. */
+typedef void supine_bench_report(void *context, const supine_bench_row *row);
+
+/** Adds entries of the caller's own to those of one size: at most `room`; returns how many. */
+typedef size_t supine_bench_peers(void *context, const supine_bench_image *image, float *xyz,
+                                  supine_bench_entry *entries, size_t room);
+
+/** Measures "supine" (every storage; separate arrays; a frozen step; a batch of 64), "plain_loop",
+ * "copy", "triad" and "arithmetic" (what threads gain where memory plays no part) at each size.
+ * `peers` may be NULL.
+ * @retval SUPINE_ERROR_MEMORY
+ * @retval SUPINE_ERROR_ARGUMENT  no vertices, or more than 256 threads */
+supine_status supine_bench_run(const supine_bench_options *options, supine_bench_peers *peers,
+                               supine_bench_report *report, void *context, supine_error *error);
+
+/** "int16", "avx512", ... */
+const char *supine_bench_storage_name(supine_storage storage);
+const char *supine_bench_code_name(supine_simd simd);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

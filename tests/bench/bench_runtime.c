@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The evaluator against OpenBLAS and plain loops, interleaved in one process.
+ *
+ *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES...]
+ *
+ * OpenBLAS 0.3.21 takes newer processors for old ones; the variable names one that it knows. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cblas.h>
+
+#include <supine/bench.h>
+
+enum { ROWS_MAX = 256, BATCH = 64, BATCH_VERTICES = 50000 };
+
+/* OpenBLAS's own, which cblas.h does not declare everywhere. */
+char *openblas_get_corename(void);
+void openblas_set_num_threads(int threads);
+
+typedef struct peers {
+  const supine_bench_image *image;
+  float *xyz;
+  float weights[BATCH * 256];
+  float *amount;
+  float *product;
+  size_t rows;
+  supine_bench_row row[ROWS_MAX];
+} peers;
+
+static void displace(size_t n, const float *restrict amount, const float *restrict d,
+                     const float *restrict p, float *restrict xyz) {
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[3 * i + axis] = p[3 * i + axis] + amount[i] * d[3 * i + axis];
+    }
+  }
+}
+
+static void run_sgemv(void *context) {
+  peers *p = context;
+  const supine_bench_image *m = p->image;
+  const int modes = (int)m->modes;
+  cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m->vertices, modes, 0.7F, m->coefficients, modes,
+              p->weights, 1, 0, p->amount, 1);
+  displace(m->vertices, p->amount, m->direction, m->rest, p->xyz);
+}
+
+/* The plain loop again, here compiled with -march=native. */
+static void run_native(void *context) {
+  peers *p = context;
+  const supine_bench_image *m = p->image;
+  const float *restrict w = p->weights;
+  const float *restrict c = m->coefficients;
+  float *restrict xyz = p->xyz;
+  for (size_t i = 0; i < m->vertices; ++i) {
+    float amount = 0;
+    for (size_t k = 0; k < 16; ++k) {
+      amount += w[k] * c[16 * i + k];
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[3 * i + axis] = m->rest[3 * i + axis] + amount * m->direction[3 * i + axis];
+    }
+  }
+}
+
+static void run_sgemm(void *context) {
+  peers *p = context;
+  const int modes = (int)p->image->modes;
+  const int n = (int)(p->image->vertices < BATCH_VERTICES ? p->image->vertices : BATCH_VERTICES);
+  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, n, BATCH, modes, 1, p->image->coefficients,
+              modes, p->weights, modes, 0, p->product, BATCH);
+}
+
+/* A product of square matrices, OpenBLAS at its best. */
+static void run_sgemm_square(void *context) {
+  peers *p = context;
+  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 1024, 1024, 1024, 1, p->product, 1024,
+              p->product + 1024 * 1024, 1024, 0, p->product + 2 * 1024 * 1024, 1024);
+}
+
+static size_t add_peers(void *context, const supine_bench_image *image, float *xyz,
+                        supine_bench_entry *entries, size_t room) {
+  peers *p = context;
+  const size_t batch = image->vertices < BATCH_VERTICES ? image->vertices : BATCH_VERTICES;
+  const size_t product = (size_t)BATCH * BATCH_VERTICES;
+  free(p->amount);
+  free(p->product);
+  p->image = image;
+  p->xyz = xyz;
+  p->amount = calloc(image->vertices, sizeof *p->amount);
+  p->product = calloc(product, sizeof *p->product);
+  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 4) {
+    return 0;
+  }
+  for (size_t i = 0; i < sizeof p->weights / sizeof *p->weights; ++i) {
+    p->weights[i] = 0.01F * (float)(i % 97) - 0.4F;
+  }
+  const supine_bench_row common = {.storage = "float32",
+                                   .code = "openblas",
+                                   .vertices = image->vertices,
+                                   .modes = 16,
+                                   .threads = 1};
+  entries[0] = (supine_bench_entry){common, run_sgemv, p};
+  entries[0].row.what = "sgemv_displace";
+  entries[0].row.bytes_per_vertex = 64 + 4 + 4 + 36;
+  entries[0].row.multiplications = 19;
+  entries[0].row.additions = 19;
+  entries[1] = (supine_bench_entry){common, run_native, p};
+  entries[1].row.what = "plain_native";
+  entries[1].row.code = "";
+  entries[1].row.bytes_per_vertex = 100;
+  entries[1].row.multiplications = 19;
+  entries[1].row.additions = 19;
+  entries[2] = (supine_bench_entry){common, run_sgemm, p};
+  entries[2].row.what = "sgemm64";
+  entries[2].row.vertices = BATCH * batch;
+  entries[2].row.bytes_per_vertex = 4 + 1;
+  entries[2].row.multiplications = 16;
+  entries[2].row.additions = 16;
+  entries[3] = (supine_bench_entry){common, run_sgemm_square, p};
+  entries[3].row.what = "sgemm_square";
+  entries[3].row.vertices = (size_t)1024 * 1024;
+  entries[3].row.multiplications = 1024;
+  entries[3].row.additions = 1024;
+  return 4;
+}
+
+static void report(void *context, const supine_bench_row *row) {
+  peers *p = context;
+  if (p->rows < ROWS_MAX) {
+    p->row[p->rows++] = *row;
+  }
+}
+
+static double find(const peers *p, size_t from, const char *what, const char *storage,
+                   size_t threads) {
+  for (size_t i = from; i < p->rows; ++i) {
+    if (strcmp(p->row[i].what, what) == 0 && p->row[i].threads == threads &&
+        (storage[0] == '\0' || strcmp(p->row[i].storage, storage) == 0)) {
+      return p->row[i].ns_per_vertex;
+    }
+  }
+  return 0;
+}
+
+static void print(const peers *p, size_t from) {
+  printf("%-16s %-8s %-8s %9s %3s %8s %6s %7s %6s %5s %5s %9s\n", "what", "storage", "code",
+         "vertices", "thr", "ns/vert", "bytes", "GB/s", "triad", "mul", "add", "mul/ns");
+  for (size_t i = from; i < p->rows; ++i) {
+    const supine_bench_row *r = &p->row[i];
+    printf("%-16s %-8s %-8s %9zu %3zu %8.4f %6.1f %7.2f %6.3f %5.0f %5.0f %9.2f\n", r->what,
+           r->storage, r->code, r->vertices, r->threads, r->ns_per_vertex, r->bytes_per_vertex,
+           r->gb_per_second, r->triad_share, r->multiplications, r->additions,
+           r->multiplications / r->ns_per_vertex);
+  }
+  const double sgemv = find(p, from, "sgemv_displace", "", 1);
+  const double plain = find(p, from, "plain_loop", "", 1);
+  const double native = find(p, from, "plain_native", "", 1);
+  static const char *const storages[] = {"int16", "float16", "float32", "exact"};
+  for (size_t i = 0; i < 4; ++i) {
+    const double own = find(p, from, "supine", storages[i], 1);
+    printf("%-8s  sgemv+displace %.2f  plain loop %.2f  plain native %.2f  two threads %.2f "
+           "(arithmetic %.2f)\n",
+           storages[i], sgemv / own, plain / own, native / own,
+           own / find(p, from, "supine", storages[i], 2),
+           find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2));
+  }
+  const double batch = find(p, from, "supine_batch64", "", 1);
+  printf("batch of 64, multiplications a ns: %.1f; sgemm of the same shape %.1f, square %.1f\n\n",
+         19 / batch, 16 / find(p, from, "sgemm64", "", 1),
+         1024 / find(p, from, "sgemm_square", "", 1));
+}
+
+/* What fewer modes cost, at the same size. */
+static int run_modes(size_t vertices) {
+  static const size_t modes[] = {1, 4, 8, 16, 32, 64};
+  double sixteen = 0;
+  for (size_t turn = 0; turn < 2; ++turn) {
+    for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
+      supine_bench_image image;
+      supine_basis *basis = NULL;
+      peers *p = calloc(1, sizeof *p);
+      supine_bench_options options = {.vertices = &vertices, .vertices_count = 1, .threads = 1};
+      if (p == NULL ||
+          supine_bench_image_create(100000, modes[i], NULL, &image, NULL) != SUPINE_OK) {
+        free(p);
+        return 1;
+      }
+      if (supine_basis_open_memory(image.bytes, image.size, &basis, NULL) != SUPINE_OK) {
+        supine_bench_image_destroy(&image);
+        free(p);
+        return 1;
+      }
+      options.like = basis;
+      (void)supine_bench_run(&options, NULL, report, p, NULL);
+      const double own = find(p, 0, "supine", "int16", 1);
+      sixteen = modes[i] == 16 ? own : sixteen;
+      if (turn == 1) {
+        printf("%2zu modes, %zu vertices: %.4f ns a vertex, %.2f of sixteen\n", modes[i], vertices,
+               own, own / sixteen);
+      }
+      supine_basis_close(basis);
+      supine_bench_image_destroy(&image);
+      free(p);
+    }
+  }
+  return 0;
+}
+
+int main(int argc, char **argv) {
+  static const size_t usual[] = {10000, 100000, 1000000, 16000000};
+  size_t sizes[32];
+  size_t count = 0;
+  for (int i = 1; i < argc && count < 32; ++i) {
+    sizes[count++] = strtoul(argv[i], NULL, 10);
+  }
+  if (count == 0) {
+    memcpy(sizes, usual, sizeof usual);
+    count = sizeof usual / sizeof *usual;
+  }
+  openblas_set_num_threads(1);
+  printf("OpenBLAS says that this is a %s\n", openblas_get_corename());
+  peers *p = calloc(1, sizeof *p);
+  if (p == NULL) {
+    return 1;
+  }
+  int code = 0;
+  for (size_t i = 0; i < count; ++i) {
+    supine_error error = {0};
+    const size_t from = p->rows;
+    const supine_bench_options options = {.vertices = &sizes[i], .vertices_count = 1};
+    if (supine_bench_run(&options, add_peers, report, p, &error) != SUPINE_OK) {
+      (void)fprintf(stderr, "%s\n", error.message);
+      code = 1;
+      break;
+    }
+    print(p, from);
+  }
+  free(p->amount);
+  free(p->product);
+  free(p);
+  return code != 0 ? code : run_modes(1000000);
+}

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Writes a small made basis to the path given. */
+#include "runtime_fixture.h"
+
+int main(int argc, char **argv) {
+  if (argc != 2) {
+    return 1;
+  }
+  fixture *f = fixture_create(100, 5, 2, 2, false, true, 5, 2008);
+  fixture_write(f, argv[1]);
+  fixture_destroy(f);
+  return 0;
+}

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON GSL::gsl)
+supine_test(export_command runtime_fixture supine_commands GSL::gsl)
+supine_test(export_html runtime_fixture supine_commands GSL::gsl)
+
+# What other programs make of exported files, against the C evaluator: needs node and npm's packages
+# in tests/export (npm install there), the page a Chromium too; skipped where they are not.
+add_executable(export_positions export/positions.c)
+target_link_libraries(export_positions PRIVATE supine_options supine_runtime)
+find_program(NODE_PROGRAM NAMES node nodejs)
+find_program(CHROMIUM_PROGRAM NAMES chromium chromium-browser google-chrome)
+set(SUPINE_NODE_MODULES ${CMAKE_CURRENT_SOURCE_DIR}/export CACHE PATH
+  "Folder whose node_modules the tests of exported files use")
+foreach(what glb page)
+  if(NODE_PROGRAM)
+    add_test(NAME export_${what}_node
+      COMMAND ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)
+  else()
+    add_test(NAME export_${what}_node
+      COMMAND sh -c "echo 'skipped: node is not installed'; exit 77")
+  endif()
+  set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 ENVIRONMENT
+    "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
+endforeach()

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .glb files: Khronos' validator has nothing to say, and three.js, given weights from Y_lm(g) as
+// the file's own extras describe them, makes the positions that the C evaluator makes.
+import assert from 'node:assert/strict';
+import { readFileSync, statSync } from 'node:fs';
+import { join } from 'node:path';
+import {
+  evaluate, folder, largestDistance, load, loadCommon, randomDirections, randomSource, supine,
+} from './support.mjs';
+import { harmonics } from './harmonics.mjs';
+
+const validator = loadCommon('gltf-validator');
+const three = await load('three/build/three.module.js');
+const { GLTFLoader } = await load('three/examples/jsm/loaders/GLTFLoader.js');
+
+const FLOAT_MM = 0.001;
+const QUANTISED_MM = 0.01;
+const BREATH = 700; // mL
+
+/** Asserts that the validator finds neither error nor warning. */
+async function validate(path) {
+  const report = await validator.validateBytes(new Uint8Array(readFileSync(path)));
+  const bad = report.issues.messages.filter((message) => message.severity <= 1);
+  assert.deepEqual(bad, [], path);
+  assert.equal(report.issues.numErrors + report.issues.numWarnings, 0);
+}
+
+async function open(path) {
+  const bytes = readFileSync(path);
+  const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+  const gltf = await new GLTFLoader().parseAsync(buffer, '');
+  gltf.scene.updateMatrixWorld(true);
+  let mesh = null;
+  gltf.scene.traverse((object) => { mesh = object.isMesh ? object : mesh; });
+  return { gltf, mesh };
+}
+
+/** Root of volume(s) = mL that grows out of 0, from the forms in the extras. */
+function breathScale(volume, v, mL) {
+  const k = v.length;
+  const c = [0, 0, 0];
+  for (let j = 0; j < volume.linear.length / k; ++j) {
+    for (let a = 0; a < k; ++a) {
+      c[0] += volume.linear[j * k + a] * v[a];
+      for (let b = 0; b < k; ++b) {
+        const ab = (j * k + a) * k + b;
+        c[1] += volume.quadratic[ab] * v[a] * v[b];
+        for (let d = 0; d < k; ++d) c[2] += volume.cubic[ab * k + d] * v[a] * v[b] * v[d];
+      }
+    }
+  }
+  let s = mL / c[0];
+  for (let i = 0; i < 50; ++i) {
+    s -= (s * (c[0] + s * (c[1] + s * c[2])) - mL) / (c[0] + s * (2 * c[1] + 3 * s * c[2]));
+  }
+  return s;
+}
+
+/** Weights for a gravity and a volume, as extras.supine.weights says. */
+function weightsFor(extras, gravity, mL) {
+  const y = harmonics(extras.band, gravity);
+  const v = extras.modes.map((row) => row.reduce((sum, m, i) => sum + m * y[i], 0));
+  const s = breathScale(extras.volume, v, mL);
+  return { s, weights: v.map((x, k) => (s * x - extras.offset[k]) / extras.unit[k]) };
+}
+
+/** Positions as three.js morphs them, in the patient's axes and millimetres. */
+function morphed(mesh) {
+  const inverse = new three.Matrix4() // metres, y up -> millimetres, LPS
+    .set(1000, 0, 0, 0, 0, 0, -1000, 0, 0, 1000, 0, 0, 0, 0, 0, 1);
+  const count = mesh.geometry.attributes.position.count;
+  const xyz = new Float64Array(3 * count);
+  const point = new three.Vector3();
+  for (let i = 0; i < count; ++i) {
+    mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld).applyMatrix4(inverse);
+    point.toArray(xyz, 3 * i);
+  }
+  return xyz;
+}
+
+/** One profile of one basis; returns the largest distance, mm. */
+async function check(basis, words, tolerance, targets, clamped) {
+  const path = join(folder, 'lungs.glb');
+  supine('export', basis, '-o', path, '--volume', String(BREATH), ...words);
+  await validate(path);
+  const { mesh } = await open(path);
+  const extras = mesh.userData.supine;
+  assert.equal(mesh.morphTargetInfluences.length, targets);
+  assert.deepEqual(Object.keys(mesh.morphTargetDictionary), mesh.userData.targetNames);
+  const random = randomSource(77);
+  const pairs = randomDirections(10, 20241).map((g) => [g, BREATH * random()]);
+  const truth = evaluate(basis, [[[0, 1, 0], 0], ...pairs]);
+  let worst = largestDistance(morphed(mesh), truth[0].xyz); // weights as stored: at rest
+  pairs.forEach(([g, mL], i) => {
+    const { s, weights } = weightsFor(extras, g, mL);
+    assert.ok(Math.abs(s / truth[i + 1].scale - 1) < 1e-9 || extras.lossPercent > 0);
+    if (clamped) assert.ok(weights.every((w) => w >= 0 && w <= 1), `weights ${weights}`);
+    mesh.morphTargetInfluences.splice(0, targets, ...weights);
+    worst = Math.max(worst, largestDistance(morphed(mesh), truth[i + 1].xyz));
+  });
+  const least = largestDistance(truth[0].xyz, truth[1].xyz);
+  assert.ok(least > 100 * tolerance, 'nothing moved, so nothing was tested');
+  assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
+  console.log(`${words.join(' ')}: ${targets} targets, ${statSync(path).size} bytes, ` +
+    `${worst.toExponential(2)} mm`);
+}
+
+/** The clip plays: it is there, turns the patient, and moves the lungs. */
+async function checkAnimation(basis) {
+  const path = join(folder, 'animated.glb');
+  supine('export', basis, '-o', path, '--animate', '--profile', 'clamp-safe');
+  await validate(path);
+  const { gltf, mesh } = await open(path);
+  assert.equal(gltf.animations.length, 1);
+  const mixer = new three.AnimationMixer(gltf.scene);
+  mixer.clipAction(gltf.animations[0]).play();
+  // At 1.5 s the patient lies on the back, at the top of a 500 mL breath; at 13.5 s on the belly.
+  for (const [seconds, gravity] of [[1.5, [0, 1, 0]], [13.5, [0, -1, 0]]]) {
+    mixer.setTime(seconds);
+    gltf.scene.updateMatrixWorld(true);
+    assert.ok(mesh.morphTargetInfluences.every((w) => w >= 0 && w <= 1));
+    const down = new three.Vector3(...gravity).transformDirection(mesh.matrixWorld);
+    assert.ok(down.distanceTo(new three.Vector3(0, -1, 0)) < 1e-5, 'gravity is not down');
+    mesh.parent.quaternion.identity();
+    gltf.scene.updateMatrixWorld(true);
+    const [truth] = evaluate(basis, [[gravity, 500]]);
+    const off = largestDistance(morphed(mesh), truth.xyz);
+    assert.ok(off < FLOAT_MM, `animation at ${seconds} s: ${off} mm off`);
+  }
+}
+
+const mesh = join(folder, 'lungs.ply');
+const modes = join(folder, 'modes.safetensors');
+const many = join(folder, 'harmonics.safetensors');
+supine('phantom', '-o', mesh, '--vertices', '600');
+supine('precompute', mesh, '-o', modes);
+supine('precompute', mesh, '-o', many, '--band', '3', '--modes', 'harmonics');
+for (const [basis, raw, eight] of [[modes, 4, 4], [many, 16, 8]]) {
+  for (const [extra, tolerance] of [[[], FLOAT_MM], [['--quantise'], QUANTISED_MM]]) {
+    await check(basis, ['--profile', 'raw', ...extra], tolerance, raw, false);
+    await check(basis, ['--profile', '8', ...extra], tolerance, eight, false);
+    await check(basis, ['--profile', 'clamp-safe', ...extra], tolerance, raw, true);
+    await check(basis, ['--profile', '8,clamp-safe', ...extra], tolerance, eight, true);
+  }
+}
+await checkAnimation(modes);

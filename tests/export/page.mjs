@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page in headless Chromium: it loads from disk without a request or a complaint, computes the
+// C evaluator's positions on the graphics side, and answers to its controls.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import {
+  evaluate, folder, largestDistance, load, randomDirections, randomSource, skip, supine,
+} from './support.mjs';
+
+const TOLERANCE_MM = 0.001;
+const { chromium } = await load('playwright-core/index.mjs');
+if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
+
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM,
+  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
+    '--disable-sync', '--no-first-run'],
+});
+
+/** Opens a page and collects everything that it should not do. */
+async function open(path, options = {}) {
+  const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
+  const complaints = [];
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type()) && !message.text().includes('GPU stall')) complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(error.stack));
+  const own = pathToFileURL(path).href;
+  page.on('request', (request) => { if (request.url() !== own && !request.url().startsWith('data:')) complaints.push(`asked for ${request.url()}`); });
+  await page.goto(own);
+  await page.waitForFunction(() => window.supine?.state.moment, null, { timeout: 60000 });
+  return { page, complaints };
+}
+
+/** The picture after it has been drawn. */
+async function picture(page) {
+  await page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+  return page.locator('#picture').screenshot();
+}
+
+/** Positions read back from the graphics card, against the C evaluator. */
+async function checkPositions(page, basis, volume) {
+  const random = randomSource(5);
+  const pairs = randomDirections(10, 999).map((g) => [g, volume * (0.1 + 0.9 * random())]);
+  const truth = evaluate(basis, pairs);
+  const rest = evaluate(basis, [[[0, 1, 0], 0]])[0].xyz;
+  let worst = 0;
+  for (const [i, [g, mL]] of pairs.entries()) {
+    const found = await page.evaluate(([gravity, depth]) => Array.from(window.supine.positions(gravity, depth)), [g, mL]);
+    worst = Math.max(worst, largestDistance(found, truth[i].xyz));
+    assert.ok(largestDistance(found, rest) > 0.5, 'nothing moved, so nothing was tested');
+  }
+  assert.ok(worst < TOLERANCE_MM, `${worst} mm off`);
+  console.log(`positions: ${worst.toExponential(2)} mm`);
+}
+
+/** Postures, drags, sliders and keys change what is seen. */
+async function checkControls(page) {
+  let before = await picture(page);
+  const changes = async (what, act) => {
+    await act();
+    const after = await picture(page);
+    assert.ok(!after.equals(before), `${what} changed nothing`);
+    before = after;
+  };
+  assert.ok((await picture(page)).equals(before), 'the picture changes by itself');
+  await changes('the posture button', () => page.getByRole('button', { name: 'Prone' }).click());
+  assert.equal(await page.locator('#posture-name').textContent(), 'prone');
+  const drag = async (selector, dx, dy) => {
+    const box = await page.locator(selector).boundingBox();
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + dx, y + dy, { steps: 4 });
+    await page.mouse.up();
+    await page.mouse.move(5, 5);
+  };
+  await changes('dragging the picture', () => drag('#picture', 90, 30));
+  await changes('dragging the ball', () => drag('#ball', 30, 10));
+  await changes('the tilt slider', () => page.locator('#tilt').fill('30'));
+  await changes('the volume slider', () => page.locator('#depth').fill('900'));
+  await changes('a key', () => page.keyboard.press('5'));
+  assert.equal(await page.locator('#posture-name').textContent(), 'upright');
+  await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
+  await changes('pinning', () => page.getByRole('button', { name: 'Pin this posture' }).click());
+  await changes('room', () => page.locator('[name=frame][value=room]').check({ force: true }));
+  await changes('the breath', async () => {
+    await page.locator('#play').click();
+    await page.waitForFunction(() => window.supine.state.depth < 300);
+    await page.locator('#play').click();
+  });
+  await changes('light and dark', async () => {
+    await page.locator('[name=kind][value=displacement]').check({ force: true });
+    await page.locator('#theme').click();
+  });
+}
+
+/** The value under the pointer is the displacement there. */
+async function checkPointer(page) {
+  const box = await page.locator('#picture').boundingBox();
+  await page.evaluate(() => window.supine.state.camera);
+  for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {
+    await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
+    await picture(page);
+    if (await page.locator('#pointed').isVisible()) {
+      const value = parseFloat(await page.locator('#pointed strong').textContent());
+      const [low, high] = await page.evaluate(() => {
+        const { gravity, depth } = window.supine.state;
+        const [rest, moved] = [window.supine.positions(gravity, 0), window.supine.positions(gravity, depth)];
+        const lengths = [];
+        for (let i = 0; i < rest.length; i += 3) lengths.push(Math.hypot(moved[i] - rest[i], moved[i + 1] - rest[i + 1], moved[i + 2] - rest[i + 2]));
+        return [Math.min(...lengths), Math.max(...lengths)];
+      });
+      assert.ok(value >= low - 0.01 && value <= high + 0.01, `${value} is not within ${low} and ${high}`);
+      return;
+    }
+  }
+  assert.fail('no lung was found under the pointer');
+}
+
+const mesh = join(folder, 'lungs.ply');
+const open_mesh = join(folder, 'open.obj');
+const bases = ['modes', 'harmonics', 'open'].map((name) => join(folder, `${name}.safetensors`));
+supine('phantom', '-o', mesh, '--vertices', '2000');
+supine('precompute', mesh, '-o', bases[0]);
+supine('precompute', mesh, '-o', bases[1], '--band', '3', '--modes', 'harmonics');
+const html = join(folder, 'lungs.html');
+
+supine('export', bases[0], '-o', html, '--title', 'Lungs </title><script>alert("1")</script> & "more"');
+const { page, complaints } = await open(html);
+assert.equal(await page.title(), 'Lungs </title><script>alert("1")</script> & "more"');
+await checkPositions(page, bases[0], 700);
+await checkPointer(page);
+await checkControls(page);
+assert.deepEqual(complaints, []);
+await page.close();
+
+supine('export', bases[1], '-o', html);
+const dark = await open(html, { colorScheme: 'dark', viewport: { width: 400, height: 780 } });
+assert.equal(await dark.page.evaluate(() => document.documentElement.dataset.theme), 'dark');
+await checkPositions(dark.page, bases[1], 700);
+assert.ok(await dark.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'too wide for a phone');
+assert.deepEqual(dark.complaints, []);
+await browser.close();

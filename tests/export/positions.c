@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* positions BASIS X,Y,Z,ML...: what the run-time library makes of each gravity and volume. Writes,
+ * for each, the breath scale (float64) and the positions (float32, [N, 3]) to standard output. A
+ * basis of an open surface takes a breath scale in place of the volume. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <supine/runtime.h>
+
+static bool write_positions(const supine_basis *basis, const double gravity[3], double depth,
+                            float *xyz) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  double scale = depth;
+  if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK ||
+      (info->has_volume && supine_basis_scale(basis, weights, depth, &scale, NULL) != SUPINE_OK)) {
+    return false;
+  }
+  for (size_t j = 0; j < info->lung_count; ++j) {
+    scales[j] = scale;
+  }
+  supine_deform(basis, weights, scales, xyz);
+  return fwrite(&scale, sizeof scale, 1, stdout) == 1 &&
+         fwrite(xyz, 3 * sizeof *xyz, info->vertex_count, stdout) == info->vertex_count;
+}
+
+int main(int argc, char **argv) {
+  static const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  supine_error error = {SUPINE_ERROR_ARGUMENT, "usage: positions BASIS X,Y,Z,ML..."};
+  float *xyz = NULL;
+  int result = EXIT_FAILURE;
+  if (argc < 3 || supine_basis_open_with(argv[1], &exact, &basis, &error) != SUPINE_OK) {
+    (void)fprintf(stderr, "%s\n", error.message);
+    return EXIT_FAILURE;
+  }
+  xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
+  for (int i = 2; i < argc; ++i) {
+    double v[4];
+    char *at = argv[i];
+    for (int j = 0; j < 4; ++j) {
+      v[j] = strtod(at, &at);
+      at += *at == ',' ? 1 : 0;
+    }
+    if (xyz == NULL || *at != '\0' || !write_positions(basis, v, v[3], xyz)) {
+      (void)fprintf(stderr, "positions: '%s' cannot be done\n", argv[i]);
+      goto cleanup;
+    }
+  }
+  result = EXIT_SUCCESS;
+cleanup:
+  free(xyz);
+  supine_basis_close(basis);
+  return result;
+}

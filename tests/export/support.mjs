@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the tests of exported files share. SUPINE and POSITIONS name the two programs, MODULES the
+// folder of npm's packages. A test that cannot run ends with 77, which CTest reports as skipped.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+export function skip(reason) {
+  console.log(`skipped: ${reason}`);
+  process.exit(77);
+}
+
+/** Imports a file of an npm package, or skips. */
+export async function load(path) {
+  const file = join(process.env.MODULES, 'node_modules', path);
+  if (!existsSync(file)) skip(`${path} is not installed: npm install in tests/export`);
+  return import(pathToFileURL(file));
+}
+
+/** The same for packages that are CommonJS. */
+export function loadCommon(name) {
+  const require = createRequire(pathToFileURL(join(process.env.MODULES, 'package.json')));
+  try {
+    return require(name);
+  } catch {
+    return skip(`${name} is not installed: npm install in tests/export`);
+  }
+}
+
+export function supine(...words) {
+  return execFileSync(process.env.SUPINE, words, { encoding: 'utf8' });
+}
+
+/** A folder that goes when the test ends. */
+export const folder = mkdtempSync(join(tmpdir(), 'supine-export-'));
+process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
+
+/** Numbers from 0 to 1 (mulberry32). */
+export function randomSource(seed) {
+  let state = seed >>> 0;
+  return () => {
+    state = (state + 0x6d2b79f5) >>> 0;
+    let t = Math.imul(state ^ (state >>> 15), state | 1);
+    t ^= t + Math.imul(t ^ (t >>> 7), t | 61);
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+}
+
+/** Directions all over the sphere. */
+export function randomDirections(count, seed) {
+  const random = randomSource(seed);
+  return Array.from({ length: count }, () => {
+    const z = 2 * random() - 1;
+    const turn = 2 * Math.PI * random();
+    const r = Math.sqrt(1 - z * z);
+    return [r * Math.cos(turn), r * Math.sin(turn), z];
+  });
+}
+
+/** What the C evaluator makes of [gravity, mL] pairs: {scale, xyz} each. */
+export function evaluate(basis, pairs) {
+  const bytes = execFileSync(
+    process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))],
+    { maxBuffer: 1 << 30 });
+  const size = bytes.length / pairs.length;
+  return pairs.map((_, i) => {
+    const part = Uint8Array.prototype.slice.call(bytes, i * size, (i + 1) * size).buffer;
+    return { scale: new Float64Array(part, 0, 1)[0], xyz: new Float32Array(part, 8) };
+  });
+}
+
+/** Largest distance between two arrays of points. */
+export function largestDistance(a, b) {
+  assert.equal(a.length, b.length);
+  let largest = 0;
+  for (let i = 0; i < a.length; i += 3) {
+    const d = Math.hypot(a[i] - b[i], a[i + 1] - b[i + 1], a[i + 2] - b[i + 2]);
+    assert.ok(Number.isFinite(d));
+    if (d > largest) largest = d;
+  }
+  return largest;
+}

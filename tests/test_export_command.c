@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine export: exit codes, and messages that name the remedy. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "export_helpers.h"
+
+static char *folder;
+static char basis[256], still[256], glb[256], page[256];
+static char text[8192];
+
+static int setup(void **state) {
+  (void)state;
+  folder = fixture_folder();
+  export_basis_make(folder, "basis", 4, 3, false, true, basis);
+  (void)snprintf(still, sizeof still, "%s/still", folder);
+  (void)snprintf(glb, sizeof glb, "%s/lungs.glb", folder);
+  (void)snprintf(page, sizeof page, "%s/lungs.html", folder);
+  fixture *f = fixture_create(40, 4, 3, 1, false, false, 0, 3);
+  fixture_write(f, still);
+  fixture_destroy(f);
+  return 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  fixture_folder_remove(folder);
+  return 0;
+}
+
+#define EXPECT(code, message, ...)                                                                 \
+  do {                                                                                             \
+    const int got = EXPORT_RUN(folder, text, __VA_ARGS__);                                         \
+    if (got != (code) || strstr(text, message) == NULL) {                                          \
+      fail_msg("exit %d, \"%s\"", got, text);                                                      \
+    }                                                                                              \
+  } while (0)
+
+static void test_export_help_teaches(void **state) {
+  (void)state;
+  EXPECT(0, "clamp-safe", "--help");
+  assert_non_null(strstr(text, "Examples:"));
+}
+
+static void test_export_usage_errors_are_1(void **state) {
+  (void)state;
+  EXPECT(1, "name one basis file", "-o", glb);
+  EXPECT(1, "-o FILE is missing", basis);
+  EXPECT(1, "must end in .html or .glb", basis, "-o", "lungs.gltf");
+  EXPECT(1, "must end in .html or .glb", basis, "-o", ".glb");
+  EXPECT(1, "did you mean clamp-safe", basis, "-o", glb, "--profile", "clampsafe");
+  EXPECT(1, "raw, 8 or clamp-safe", basis, "-o", glb, "--profile", "wonderful");
+  EXPECT(1, "above 0", basis, "-o", glb, "--volume", "-3");
+  EXPECT(1, "above 0", basis, "-o", glb, "--scale", "x");
+  EXPECT(1, "are for .glb", basis, "-o", page, "--animate");
+  EXPECT(1, "is for .html", basis, "-o", glb, "--title", "x");
+  EXPECT(1, "did you mean '--profile'", basis, "--profle", "raw");
+}
+
+static void test_export_input_errors_are_2(void **state) {
+  (void)state;
+  EXPECT(2, "/nonexistent/b", "/nonexistent/b", "-o", glb);
+}
+
+static void test_export_output_errors_are_4(void **state) {
+  (void)state;
+  EXPECT(4, "/nonexistent/l.glb", basis, "-o", "/nonexistent/l.glb");
+  EXPECT(4, "/nonexistent/l.html", basis, "-o", "/nonexistent/l.html");
+}
+
+static void test_export_numerical_errors_are_5(void **state) {
+  (void)state;
+  EXPECT(5, "nothing moves", still, "-o", glb);
+  EXPECT(5, "mL", basis, "-o", glb, "--profile", "clamp-safe", "--volume", "1e12");
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_export_help_teaches),
+      cmocka_unit_test(test_export_usage_errors_are_1),
+      cmocka_unit_test(test_export_input_errors_are_2),
+      cmocka_unit_test(test_export_output_errors_are_4),
+      cmocka_unit_test(test_export_numerical_errors_are_5),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

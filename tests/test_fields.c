@@ -1,0 +1,466 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Fields of another simulator: loading, fitting, cross-validation, and everything that can be
+ * wrong. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <cmocka.h>
+
+#include <supine/fields.h>
+#include <supine/grid.h>
+#include <supine/phantom.h>
+#include <supine/precompute.h>
+#include <supine/runtime.h>
+#include <supine/safetensors.h>
+#include <supine/sh.h>
+
+#include "lungs_helpers.h"
+
+static char folder[] = "/tmp/supine-fields-XXXXXX";
+static supine_lungs lungs;
+
+static const char *in_folder(const char *name) {
+  static char path[4][128];
+  static size_t next;
+  next = (next + 1) % 4;
+  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
+  return path[next];
+}
+
+static int setup(void **state) {
+  (void)state;
+  supine_mesh mesh = {0};
+  if (mkdtemp(folder) == NULL || supine_phantom_create(400, 2500.0, &mesh, NULL) != SUPINE_OK ||
+      supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) != SUPINE_OK) {
+    return -1;
+  }
+  supine_mesh_free(&mesh);
+  return 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  char command[64];
+  supine_lungs_free(&lungs);
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c) */
+}
+
+/* Displacements of the full physics for random directions. */
+static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64_t seed,
+                                    double soften) {
+  const size_t n = of->mesh.vertex_count;
+  supine_fields fields = {.direction_count = count, .vertex_count = n};
+  supine_model model = supine_model_default();
+  model.force.soften = soften;
+  fields.directions = malloc(3 * count * sizeof(double));
+  fields.displacement = malloc(3 * count * n * sizeof(double));
+  for (size_t d = 0; d < count; ++d) {
+    supine_solution solution;
+    double *u = fields.displacement + 3 * d * n;
+    random_direction(&seed, fields.directions + 3 * d);
+    assert_int_equal(supine_solve(of, &model, fields.directions + 3 * d, &solution, NULL),
+                     SUPINE_OK);
+    supine_solution_apply(&solution, &of->mesh, 1.0, u);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      u[i] -= of->mesh.vertices[i];
+    }
+    supine_solution_free(&solution);
+  }
+  return fields;
+}
+
+/* Random fields of exactly this band at given directions. */
+static supine_fields band_limited_fields(size_t band, size_t count, const double *directions) {
+  const size_t n = lungs.mesh.vertex_count;
+  const size_t terms = supine_sh_count(band);
+  supine_fields fields = {.direction_count = count, .vertex_count = n};
+  double *c = malloc(3 * n * terms * sizeof *c);
+  double *y = malloc(terms * sizeof *y);
+  uint64_t seed = 5;
+  for (size_t i = 0; i < 3 * n * terms; ++i) {
+    c[i] = random_signed(&seed);
+  }
+  fields.directions = malloc(3 * count * sizeof(double));
+  fields.displacement = calloc(3 * count * n, sizeof(double));
+  memcpy(fields.directions, directions, 3 * count * sizeof(double));
+  for (size_t d = 0; d < count; ++d) {
+    assert_int_equal(supine_sh_evaluate(band, directions + 3 * d, y), SUPINE_OK);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      for (size_t t = 0; t < terms; ++t) {
+        fields.displacement[3 * d * n + i] += c[i * terms + t] * y[t];
+      }
+    }
+  }
+  free(c);
+  free(y);
+  return fields;
+}
+
+static void check_band_limited(const supine_fields *fields, size_t band, bool grid) {
+  const supine_fit_options options = {.band = -1, .modes = 0};
+  supine_compression field;
+  supine_fit_report report;
+  supine_error error;
+  if (supine_fields_fit(fields, &options, NULL, &field, &report, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(report.band, band);
+  assert_int_equal(report.grid, grid);
+  assert_true(report.accuracy.relative_rms < 1e-6); /* coefficients are floats */
+  assert_close(report.scalar_loss, 0.0, 0.0);
+  assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
+  supine_compression_free(&field);
+}
+
+static void test_fit_band_limited_fields_come_back(void **state) {
+  (void)state;
+  enum { COUNT = 40 };
+  double directions[3 * COUNT];
+  uint64_t seed = 17;
+  for (size_t d = 0; d < COUNT; ++d) {
+    random_direction(&seed, directions + 3 * d);
+  }
+  supine_fields fields = band_limited_fields(3, COUNT, directions);
+  check_band_limited(&fields, 3, false);
+  supine_fields_free(&fields);
+}
+
+static void test_fit_grid_directions_in_any_order_use_the_rule(void **state) {
+  (void)state;
+  enum { LATITUDES = 5, LONGITUDES = 9, COUNT = LATITUDES * LONGITUDES };
+  double directions[3 * COUNT];
+  supine_sh_grid *grid = NULL;
+  assert_int_equal(supine_sh_grid_create(LATITUDES, LONGITUDES, &grid), SUPINE_OK);
+  for (size_t d = 0; d < COUNT; ++d) {
+    const size_t node = (d * 7 + 3) % COUNT;
+    supine_sh_grid_direction(grid, node / LONGITUDES, node % LONGITUDES, directions + 3 * d);
+  }
+  supine_fields fields = band_limited_fields(3, COUNT, directions);
+  check_band_limited(&fields, 3, true);
+  supine_fields_free(&fields);
+  supine_sh_grid_destroy(grid);
+}
+
+/* The closed form of the leave-one-out error against fitting without each direction in turn. */
+static void test_fit_leave_one_out_equals_fitting_without(void **state) {
+  (void)state;
+  enum { COUNT = 24, BAND = 2 };
+  supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
+  const size_t n = fields.vertex_count;
+  const supine_fit_options options = {.band = BAND, .modes = 0};
+  supine_compression field;
+  supine_fit_report report;
+  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  supine_compression_free(&field);
+  double error2 = 0.0;
+  double field2 = 0.0;
+  for (size_t out = 0; out < COUNT; ++out) {
+    supine_fields rest = {.direction_count = COUNT - 1, .vertex_count = n};
+    double y[9];
+    rest.directions = malloc(3 * (COUNT - 1) * sizeof(double));
+    rest.displacement = malloc(3 * (COUNT - 1) * n * sizeof(double));
+    for (size_t d = 0, at = 0; d < COUNT; ++d) {
+      if (d != out) {
+        memcpy(rest.directions + 3 * at, fields.directions + 3 * d, 3 * sizeof(double));
+        memcpy(rest.displacement + 3 * n * at, fields.displacement + 3 * n * d,
+               3 * n * sizeof(double));
+        ++at;
+      }
+    }
+    supine_fit_report ignored;
+    assert_int_equal(supine_fields_fit(&rest, &options, NULL, &field, &ignored, NULL), SUPINE_OK);
+    assert_int_equal(supine_sh_evaluate(BAND, fields.directions + 3 * out, y), SUPINE_OK);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      double is = 0.0;
+      for (size_t t = 0; t < 9; ++t) {
+        is += (double)field.coefficients[i * 9 + t] * y[t];
+      }
+      const double should = fields.displacement[3 * n * out + i];
+      error2 += (is - should) * (is - should);
+      field2 += should * should;
+    }
+    supine_compression_free(&field);
+    supine_fields_free(&rest);
+  }
+  const double direct = sqrt(error2 / field2);
+  assert_close(report.error[BAND], direct, 1e-5 * direct);
+  assert_close(report.accuracy.relative_rms, direct, 1e-5 * direct);
+  supine_fields_free(&fields);
+}
+
+/* Error of a basis of 60 scattered directions, found on 40 others, against what it states. */
+static void check_stated_error(const supine_lungs *of, bool scalar, const char *what) {
+  supine_fields fields = physics_fields(of, 60, 2008, 1.0);
+  supine_fields others = physics_fields(of, 40, 1999, 1.0);
+  const supine_fit_options options = {.scalar = scalar, .band = -1, .modes = 16};
+  const char *path = in_folder("basis.safetensors");
+  supine_fit_report report;
+  supine_error error;
+  if (supine_precompute_fields(of, &fields, &options, NULL, path, &report, NULL, &error) !=
+      SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_get_info(basis)->vector, !scalar);
+  const size_t n = of->mesh.vertex_count;
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  double error2 = 0.0;
+  double field2 = 0.0;
+  for (size_t d = 0; d < others.direction_count; ++d) {
+    double weights[SUPINE_MODES_MAX];
+    const double scales[2] = {1.0, 1.0};
+    assert_int_equal(supine_basis_weights(basis, others.directions + 3 * d, weights), SUPINE_OK);
+    supine_deform(basis, weights, scales, xyz);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      const double should = others.displacement[3 * n * d + i];
+      const double is = (double)xyz[i] - (double)(float)of->mesh.vertices[i];
+      error2 += (is - should) * (is - should);
+      field2 += should * should;
+    }
+  }
+  const double truth = sqrt(error2 / field2);
+  printf("%s, %s, 60 directions, band %zu: stated %.2f %%, found on 40 others %.2f %%\n", what,
+         scalar ? "scalar" : "vector", report.band, 100.0 * report.accuracy.relative_rms,
+         100.0 * truth);
+  assert_true(report.accuracy.relative_rms > truth / 1.3333 &&
+              report.accuracy.relative_rms < truth * 1.3333);
+  free(xyz);
+  supine_basis_close(basis);
+  supine_fields_free(&fields);
+  supine_fields_free(&others);
+}
+
+static void test_fit_stated_error_is_found_on_other_directions(void **state) {
+  (void)state;
+  check_stated_error(&lungs, false, "phantom");
+  check_stated_error(&lungs, true, "phantom");
+}
+
+static void test_fit_real_lung_stated_error_is_found_on_other_directions(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left_5k.obj"};
+  supine_lungs real = {0};
+  if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &real)) {
+    skip();
+    return;
+  }
+  check_stated_error(&real, false, "chaste_left_5k");
+  supine_lungs_free(&real);
+}
+
+static void test_fit_scalar_states_what_it_loses(void **state) {
+  (void)state;
+  supine_fields fields = physics_fields(&lungs, 12, 3, 0.0);
+  double *d = malloc(3 * fields.vertex_count * sizeof *d);
+  const supine_fit_options options = {.scalar = true, .band = 1, .modes = 0};
+  supine_compression field;
+  supine_fit_report report;
+  assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
+  assert_true(report.scalar_loss < 1e-6); /* these fields do keep one direction a vertex */
+  supine_compression_free(&field);
+  uint64_t seed = 8;
+  for (size_t i = 0; i < 3 * 12 * fields.vertex_count; ++i) {
+    fields.displacement[i] = random_signed(&seed);
+  }
+  assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
+  assert_true(report.scalar_loss > 0.4 && report.scalar_loss < 0.9); /* these do not */
+  assert_true(report.accuracy.relative_rms >= report.scalar_loss);
+  supine_compression_free(&field);
+  supine_fields_free(&fields);
+  free(d);
+}
+
+static void test_fit_vector_volumes_exact(void **state) {
+  (void)state;
+  supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
+  const supine_fit_options options = {.band = -1, .modes = 8};
+  const char *path = in_folder("volume.safetensors");
+  supine_fit_report report;
+  assert_int_equal(
+      supine_precompute_fields(&lungs, &fields, &options, NULL, path, &report, NULL, NULL),
+      SUPINE_OK);
+  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
+  const size_t n = lungs.mesh.vertex_count;
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  double *moved = malloc(3 * n * sizeof *moved);
+  supine_mesh mesh = lungs.mesh;
+  uint64_t seed = 77;
+  for (size_t d = 0; d < 10; ++d) {
+    double g[3];
+    double weights[SUPINE_MODES_MAX];
+    double scales[2];
+    random_direction(&seed, g);
+    assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
+    assert_int_equal(supine_basis_scale(basis, weights, 200.0, scales, NULL), SUPINE_OK);
+    scales[1] = scales[0];
+    supine_deform(basis, weights, scales, xyz);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      moved[i] = (double)xyz[i];
+    }
+    mesh.vertices = moved;
+    const double full = supine_mesh_volume(&mesh);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      moved[i] = (double)(float)lungs.mesh.vertices[i];
+    }
+    assert_close(1e-3 * (full - supine_mesh_volume(&mesh)), 200.0, 0.05);
+  }
+  free(xyz);
+  free(moved);
+  supine_basis_close(basis);
+  supine_fields_free(&fields);
+}
+
+static void test_fit_few_directions_say_what_they_reach(void **state) {
+  (void)state;
+  supine_fields fields = physics_fields(&lungs, 10, 4, 1.0);
+  supine_fit_options options = {.band = -1, .modes = 16};
+  supine_compression field;
+  supine_fit_report report;
+  supine_error error;
+  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  assert_in_range(report.band_highest, 1, 2);
+  assert_true(report.band <= report.band_highest);
+  supine_compression_free(&field);
+  options.band = 4;
+  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "10 directions do not determine band 4 (25 harmonics)"));
+  memset(fields.displacement, 0, 3 * 10 * fields.vertex_count * sizeof(double));
+  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  supine_fields_free(&fields);
+}
+
+static void write_text(const char *name, const char *text) {
+  FILE *file = fopen(in_folder(name), "wb");
+  assert_non_null(file);
+  (void)fputs(text, file);
+  assert_int_equal(fclose(file), 0);
+}
+
+/* Asks for a failure of this kind whose message has these words. */
+static void expect_failure(const char *name, supine_status status, const char *words) {
+  supine_fields fields = {0};
+  supine_error error = {0};
+  const supine_status got = supine_fields_load(in_folder(name), &lungs, NULL, &fields, &error);
+  if (got != status || strstr(error.message, words) == NULL) {
+    fail_msg("%d, not %d, or no \"%s\" in: %s", (int)got, (int)status, words, error.message);
+  }
+  assert_null(fields.directions);
+}
+
+static void save_deformed(const char *name, double shift) {
+  supine_mesh mesh = lungs.mesh;
+  double *moved = malloc(3 * mesh.vertex_count * sizeof *moved);
+  for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+    moved[i] = lungs.mesh.vertices[i] + shift * (double)(i % 5);
+  }
+  mesh.vertices = moved;
+  assert_int_equal(supine_mesh_save(in_folder(name), &mesh, NULL, NULL), SUPINE_OK);
+  free(moved);
+}
+
+static void test_load_list_of_surfaces_gives_displacements(void **state) {
+  (void)state;
+  save_deformed("a.ply", 0.5);
+  save_deformed("b.ply", -0.25);
+  write_text("list.csv", "# two fields\ngx,gy,gz,file\n0,2,0,a.ply\n0,0,-1,b.ply\n");
+  supine_fields fields = {0};
+  supine_error error;
+  if (supine_fields_load(in_folder("list.csv"), &lungs, NULL, &fields, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(fields.direction_count, 2);
+  assert_close(fields.directions[1], 1.0, 0.0);              /* normalised */
+  for (size_t i = 0; i < 3 * lungs.mesh.vertex_count; ++i) { /* PLY keeps floats */
+    assert_close(fields.displacement[i], 0.5 * (double)(i % 5), 5e-5);
+    assert_close(fields.displacement[3 * lungs.mesh.vertex_count + i], -0.25 * (double)(i % 5),
+                 5e-5);
+  }
+  supine_fields_free(&fields);
+}
+
+static void test_load_bad_lists_name_line_and_remedy(void **state) {
+  (void)state;
+  save_deformed("a.ply", 0.5);
+  supine_mesh other = helper_lump(3, 50.0, 3);
+  assert_int_equal(supine_mesh_save(in_folder("other.ply"), &other, NULL, NULL), SUPINE_OK);
+  supine_mesh_free(&other);
+  supine_mesh turned = lungs.mesh;
+  turned.triangles = malloc(3 * turned.triangle_count * sizeof(uint32_t));
+  memcpy(turned.triangles, lungs.mesh.triangles, 3 * turned.triangle_count * sizeof(uint32_t));
+  memcpy(turned.triangles, lungs.mesh.triangles + 3, 3 * sizeof(uint32_t));
+  memcpy(turned.triangles + 3, lungs.mesh.triangles, 3 * sizeof(uint32_t));
+  assert_int_equal(supine_mesh_save(in_folder("turned.ply"), &turned, NULL, NULL), SUPINE_OK);
+  free(turned.triangles);
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,missing.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_READ, "missing.ply");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,other.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_MESH, "bad.csv:3");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,turned.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_MESH, "triangle 0 joins other vertices");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n1,0,0,a.ply\n0,3,0,a.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "line 2 and 4 have the same direction");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,nan,0,a.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "bad.csv:3");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,0,a.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "no direction");
+  write_text("bad.csv", "gx,gy,file\n0,1,a.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "gz");
+  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n");
+  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "at least two");
+  expect_failure("nothing.csv", SUPINE_ERROR_READ, "nothing.csv");
+}
+
+static void test_load_tensors_checked(void **state) {
+  (void)state;
+  const size_t n = lungs.mesh.vertex_count;
+  double gravity[6] = {0, 1, 0, 0, 0, -2};
+  float *displacement = calloc(6 * n, sizeof *displacement);
+  displacement[3 * n + 4] = 0.5F;
+  supine_tensor tensors[2] = {{"gravity", SUPINE_F64, 2, {2, 3}, gravity},
+                              {"displacement", SUPINE_F32, 3, {2, n, 3}, displacement}};
+  const char *path = in_folder("fields.safetensors");
+  supine_fields fields = {0};
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_load(path, &lungs, NULL, &fields, NULL), SUPINE_OK);
+  assert_close(fields.directions[5], -1.0, 0.0);
+  assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
+  supine_fields_free(&fields);
+  displacement[3 * n + 4] = NAN;
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
+  tensors[1].shape[1] = n / 2;
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the rest surface has");
+  assert_int_equal(supine_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
+  expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
+  free(displacement);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_fit_band_limited_fields_come_back),
+      cmocka_unit_test(test_fit_grid_directions_in_any_order_use_the_rule),
+      cmocka_unit_test(test_fit_leave_one_out_equals_fitting_without),
+      cmocka_unit_test(test_fit_stated_error_is_found_on_other_directions),
+      cmocka_unit_test(test_fit_real_lung_stated_error_is_found_on_other_directions),
+      cmocka_unit_test(test_fit_scalar_states_what_it_loses),
+      cmocka_unit_test(test_fit_vector_volumes_exact),
+      cmocka_unit_test(test_fit_few_directions_say_what_they_reach),
+      cmocka_unit_test(test_load_list_of_surfaces_gives_displacements),
+      cmocka_unit_test(test_load_bad_lists_name_line_and_remedy),
+      cmocka_unit_test(test_load_tensors_checked),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,57 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs the run-time library to a folder of its own and builds the example against it, through
+# CMake and through pkg-config; checks what the library needs and what it shows.
+#
+#     test_install.sh CMAKE BUILD_FOLDER EXAMPLE_FOLDER MAKE_BASIS CC CXX
+set -eu
+cmake=$1 build=$2 example=$3 make_basis=$4 cc=$5 cxx=$6
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+prefix=$work/prefix
+"$cmake" --install "$build" --prefix "$prefix" --component runtime >"$work/log"
+"$make_basis" "$work/basis.safetensors"
+
+check() {
+  "$@" "$work/basis.safetensors" prone 5 >"$work/out" || { echo "failed: $*"; exit 1; }
+  grep -q '^100 vertices; the first is at' "$work/out" || { cat "$work/out"; exit 1; }
+}
+
+# CMake. The folder has no other way to the headers.
+CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
+"$cmake" --build "$work/build" >>"$work/log"
+check "$work/build/example_static"
+check "$work/build/example_shared"
+"$work/build/header_cpp"
+
+# pkg-config.
+PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name supine-runtime.pc)")
+export PKG_CONFIG_PATH
+lib=$(dirname "$PKG_CONFIG_PATH")
+# shellcheck disable=SC2046
+"$cc" -std=c17 -Wall -Wextra -Werror "$example/example.c" $(pkg-config --cflags --libs supine-runtime) -o "$work/shared"
+check env LD_LIBRARY_PATH="$lib" "$work/shared"
+# shellcheck disable=SC2046
+"$cc" -std=c17 "$example/example.c" $(pkg-config --cflags supine-runtime) "$lib/libsupine_runtime.a" -lm -o "$work/static"
+check "$work/static"
+"$work/static" "$work/basis.safetensors" pron 20 2>"$work/out" && exit 1
+grep -q 'prone?' "$work/out"
+
+# Needs libc and libm alone, links against nothing of FFTW, GSL or assimp.
+needed=$(objdump -p "$lib/libsupine_runtime.so" | awk '/NEEDED/ {print $2}' | sort | tr '\n' ' ')
+case $needed in
+"libc.so.6 libm.so.6 " | "ld-linux-x86-64.so.2 libc.so.6 libm.so.6 " | "libc.so.6 ") ;;
+*) echo "needs $needed"; exit 1 ;;
+esac
+
+# Shows supine_ names alone, each with a version; the archive defines none but those either.
+nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
+grep -q '^supine_deform@@SUPINE_0$' "$work/names"
+if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
+if grep -E 'supine_(fold|hash|json|tiles|basis_pack|kernels)' "$work/names"; then exit 1; fi
+nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
+if grep -v '^supine_' "$work/names"; then exit 1; fi
+
+# Undefined names of the archive are of libc, libm or its own.
+nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
+if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi

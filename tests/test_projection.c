@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The two routes of projection against each other, and modes against a plain singular value
+ * decomposition. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <gsl/gsl_linalg.h>
+
+#include <supine/grid.h>
+#include <supine/phantom.h>
+#include <supine/precompute.h>
+#include <supine/sh.h>
+
+#include "lungs_helpers.h"
+
+static int setup(void **state) {
+  supine_mesh mesh = {0};
+  supine_lungs *lungs = calloc(1, sizeof *lungs);
+  assert_int_equal(supine_phantom_create(700, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, lungs, NULL), SUPINE_OK);
+  supine_mesh_free(&mesh);
+  *state = lungs;
+  return 0;
+}
+
+static int teardown(void **state) {
+  supine_lungs_free(*state);
+  free(*state);
+  return 0;
+}
+
+/* Coefficients [N, P] of a projection, from its factors. */
+static double *coefficients_of(const supine_projection *projection) {
+  const size_t terms = supine_sh_count(projection->band);
+  double *c = calloc(projection->vertex_count * terms, sizeof *c);
+  for (size_t i = 0; i < projection->vertex_count; ++i) {
+    for (size_t r = 0; r < projection->rank; ++r) {
+      for (size_t t = 0; t < terms; ++t) {
+        const double function =
+            projection->functions != NULL ? projection->functions[r * terms + t] : (double)(r == t);
+        c[i * terms + t] += projection->columns[i * projection->rank + r] * function;
+      }
+    }
+  }
+  return c;
+}
+
+/* Both routes are sums of the same solves: they agree to rounding where they use the same rule. */
+static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
+  const supine_lungs *lungs = *state;
+  enum { BAND = 5 };
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t terms = supine_sh_count(BAND);
+  supine_projection linear;
+  supine_projection sampled;
+  const supine_force_law law = {.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
+  double *stiffness = malloc(n * sizeof *stiffness);
+  for (size_t i = 0; i < n; ++i) {
+    stiffness[i] = exp(0.01 * lungs->mesh.vertices[3 * i + 2]);
+  }
+  size_t latitudes;
+  size_t longitudes;
+  assert_int_equal(supine_sh_grid_size(BAND, 0.0, &latitudes, &longitudes), SUPINE_OK);
+  assert_int_equal(supine_project_linear_rule(lungs, &law, stiffness, BAND, latitudes, longitudes,
+                                              &linear, NULL),
+                   SUPINE_OK);
+  assert_int_equal(
+      supine_project_sampled(lungs, &law, stiffness, BAND, 0.0, NULL, NULL, &sampled, NULL),
+      SUPINE_OK);
+  assert_int_equal(linear.rank, 5);
+  assert_int_equal(sampled.rank, terms);
+  double *a = coefficients_of(&linear);
+  double *b = coefficients_of(&sampled);
+  const double difference = helper_difference(n * terms, a, b) / helper_largest(n * terms, a);
+  printf("linear and sampled routes: %.1e of the largest coefficient\n", difference);
+  assert_true(difference <= 1e-10);
+  free(a);
+  free(b);
+  free(stiffness);
+  supine_projection_free(&linear);
+  supine_projection_free(&sampled);
+}
+
+/* Singular values and reproduced fields against a dense decomposition of the weighted matrix. */
+static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
+  const size_t n = projection->vertex_count;
+  const size_t terms = supine_sh_count(projection->band);
+  double *c = coefficients_of(projection);
+  gsl_matrix *u = gsl_matrix_alloc(n, terms);
+  gsl_matrix *v = gsl_matrix_alloc(terms, terms);
+  gsl_vector *s = gsl_vector_alloc(terms);
+  double energy = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t t = 0; t < terms; ++t) {
+      gsl_matrix_set(u, i, t, sqrt(weight[i]) * c[i * terms + t]);
+      energy += weight[i] * c[i * terms + t] * c[i * terms + t];
+    }
+  }
+  gsl_linalg_SV_decomp_jacobi(u, v, s);
+  supine_compression modes;
+  double singular[SUPINE_MODES_MADE_MAX];
+  double total;
+  assert_int_equal(supine_compress_modes(projection, weight, most, &modes, singular, &total, NULL),
+                   SUPINE_OK);
+  assert_close(total, energy, 1e-12 * energy);
+  double tail = 0.0;
+  for (size_t k = 0; k < terms; ++k) {
+    const double should = gsl_vector_get(s, k);
+    if (k < modes.mode_count) { /* the Gram matrix costs half the digits of small ones */
+      assert_close(singular[k], should, 1e-7 * gsl_vector_get(s, 0));
+    } else {
+      tail += should * should;
+    }
+  }
+  double error = 0.0; /* what the modes leave is what the best approximation of that rank leaves */
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t t = 0; t < terms; ++t) {
+      double is = 0.0;
+      for (size_t k = 0; k < modes.mode_count; ++k) {
+        is += (double)modes.coefficients[i * modes.mode_count + k] * modes.modes[k * terms + t];
+      }
+      error += weight[i] * (is - c[i * terms + t]) * (is - c[i * terms + t]);
+    }
+  }
+  assert_close(sqrt(error / energy), sqrt(tail / energy), 1e-6);
+  for (size_t a = 0; a < modes.mode_count; ++a) { /* orthonormal functions */
+    for (size_t b = 0; b <= a; ++b) {
+      double dot = 0.0;
+      for (size_t t = 0; t < terms; ++t) {
+        dot += modes.modes[a * terms + t] * modes.modes[b * terms + t];
+      }
+      assert_close(dot, a == b ? 1.0 : 0.0, 1e-6);
+    }
+  }
+  supine_compression_free(&modes);
+  gsl_matrix_free(u);
+  gsl_matrix_free(v);
+  gsl_vector_free(s);
+  free(c);
+}
+
+static void test_modes_equal_dense_decomposition(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  double *weight = malloc(n * sizeof *weight);
+  for (size_t i = 0; i < n; ++i) {
+    weight[i] = 1.0 + fabs(lungs->mesh.vertices[3 * i]);
+  }
+  supine_force_law law = supine_force_law_default();
+  supine_projection projection;
+  assert_int_equal(supine_project_linear(lungs, &law, NULL, 5, &projection, NULL), SUPINE_OK);
+  check_modes(&projection, weight, 3);
+  check_modes(&projection, weight, 16);
+  supine_projection_free(&projection);
+  law.soften = 1.0;
+  assert_int_equal(supine_project_sampled(lungs, &law, NULL, 5, 0.0, NULL, NULL, &projection, NULL),
+                   SUPINE_OK);
+  check_modes(&projection, weight, 7);
+  check_modes(&projection, weight, 16);
+  supine_projection_free(&projection);
+  free(weight);
+}
+
+static void test_modes_beat_harmonics_of_the_same_number(void **state) {
+  const supine_lungs *lungs = *state;
+  static const double softens[] = {0.0, 1.0};
+  char path[] = "/tmp/supine-projection-XXXXXX";
+  (void)close(mkstemp(path));
+  for (size_t s = 0; s < 2; ++s) {
+    double error[2];
+    for (int k = 0; k < 2; ++k) {
+      supine_precompute_options options = {
+          .model = supine_model_default(), .band = k == 0 ? 3 : 15, .modes = k == 0 ? 0 : 16};
+      supine_precompute_report report;
+      options.model.force.soften = softens[s];
+      assert_int_equal(supine_precompute(lungs, &options, path, &report, NULL), SUPINE_OK);
+      error[k] = report.accuracy.relative_rms;
+    }
+    printf("soften %g: 16 harmonics %.2f %%, 16 modes of band 15 %.2f %%\n", softens[s],
+           100.0 * error[0], 100.0 * error[1]);
+    assert_true(error[1] < 0.25 * error[0]);
+  }
+  (void)unlink(path);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_routes_agree_where_stiffness_does_not_turn),
+      cmocka_unit_test(test_modes_equal_dense_decomposition),
+      cmocka_unit_test(test_modes_beat_harmonics_of_the_same_number),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

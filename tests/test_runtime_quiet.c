@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the library asks of the system: memory and files when opening, nothing afterwards; and what
+ * it does when an allocation fails. Linked with --wrap, so that every call passes through here. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+
+#include <cmocka.h>
+
+#include <supine/posture.h>
+#include <supine/runtime.h>
+
+#include "runtime_fixture.h"
+
+static size_t calls;    /* of anything wrapped */
+static size_t live;     /* blocks that are allocated and not yet freed */
+static size_t fail_at;  /* which allocation to refuse, from 1; 0: none */
+static size_t attempts; /* allocations so far */
+static bool counting;
+
+static bool refuse(void) {
+  calls += counting;
+  attempts += counting;
+  return counting && attempts == fail_at;
+}
+
+/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): the linker's names */
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *old, size_t size);
+void *__real_aligned_alloc(size_t alignment, size_t size);
+char *__real_strdup(const char *text);
+void __real_free(void *block);
+void *__real_mmap(void *address, size_t size, int protection, int flags, int file, off_t offset);
+int __real_munmap(void *address, size_t size);
+int __real_open(const char *path, int flags, ...);
+int __real_close(int file);
+
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *old, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+char *__wrap_strdup(const char *text);
+void __wrap_free(void *block);
+void *__wrap_mmap(void *address, size_t size, int protection, int flags, int file, off_t offset);
+int __wrap_munmap(void *address, size_t size);
+int __wrap_open(const char *path, int flags);
+int __wrap_close(int file);
+
+static void *count_block(void *block) {
+  live += counting && block != NULL;
+  return block;
+}
+
+void *__wrap_malloc(size_t size) {
+  return refuse() ? NULL : count_block(__real_malloc(size));
+}
+void *__wrap_calloc(size_t count, size_t size) {
+  return refuse() ? NULL : count_block(__real_calloc(count, size));
+}
+void *__wrap_realloc(void *old, size_t size) {
+  if (refuse()) {
+    return NULL;
+  }
+  void *block = __real_realloc(old, size);
+  live += counting && old == NULL && block != NULL;
+  return block;
+}
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+  return refuse() ? NULL : count_block(__real_aligned_alloc(alignment, size));
+}
+char *__wrap_strdup(const char *text) {
+  return refuse() ? NULL : count_block(__real_strdup(text));
+}
+void __wrap_free(void *block) {
+  calls += counting;
+  live -= counting && block != NULL;
+  __real_free(block);
+}
+void *__wrap_mmap(void *address, size_t size, int protection, int flags, int file, off_t offset) {
+  calls += counting;
+  return count_block(__real_mmap(address, size, protection, flags, file, offset));
+}
+int __wrap_munmap(void *address, size_t size) {
+  calls += counting;
+  live -= counting;
+  return __real_munmap(address, size);
+}
+int __wrap_open(const char *path, int flags) {
+  calls += counting;
+  live += counting;
+  return __real_open(path, flags);
+}
+int __wrap_close(int file) {
+  calls += counting;
+  live -= counting;
+  return __real_close(file);
+}
+/* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
+
+/* Everything that may be called on an open basis. */
+static void use_all(const supine_basis *basis, float *xyz) {
+  double gravity[3];
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  double scale = 0;
+  supine_error error;
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  (void)supine_posture_gravity("prone", gravity);
+  (void)supine_posture_tilt(gravity, 15, gravity);
+  (void)supine_posture_nearest("pron");
+  (void)supine_basis_weights(basis, gravity, weights);
+  (void)supine_basis_scale(basis, weights, 3, &scale, NULL);
+  (void)supine_basis_scale(basis, weights, 1e9, &scale, &error);
+  (void)supine_basis_lung_scale(basis, 0, weights, 1, &scale, NULL);
+  (void)supine_basis_lung_volume(basis, 0, weights, 1);
+  for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
+    scales[i] = 0.5;
+  }
+  (void)supine_basis_error(basis, weights, scales);
+  supine_deform(basis, weights, scales, xyz);
+  supine_deform_range(basis, weights, scales, 3, n - 1, xyz);
+  supine_deform_separate(basis, weights, scales, 0, n, xyz, xyz + n, xyz + 2 * n);
+  supine_displace_range(basis, weights, scales, 0, n, xyz + 3 * n);
+  supine_deform_batch(basis, 1, weights, scales, 0, n, xyz);
+  supine_step(n, xyz + 3 * n, xyz);
+  supine_normals(basis, xyz, xyz + 3 * n);
+  (void)supine_gl_pack(basis, 0, n, xyz);
+  (void)supine_gl_weights(basis, weights, 1, xyz);
+  (void)supine_basis_metadata(basis, "kind");
+  (void)supine_basis_vertices(basis);
+  (void)supine_basis_triangles(basis);
+}
+
+typedef struct setting {
+  fixture *f;
+  char *folder;
+  char path[128];
+  float *xyz;
+} setting;
+
+static setting setting_open(void) {
+  setting s = {.f = fixture_create(100, 5, 2, 2, false, true, 5, 9), .folder = fixture_folder()};
+  (void)snprintf(s.path, sizeof s.path, "%s/a", s.folder);
+  fixture_write(s.f, s.path);
+  s.xyz = calloc(100 * SUPINE_GL_FLOATS, sizeof *s.xyz);
+  assert_non_null(s.xyz);
+  return s;
+}
+
+static void setting_close(setting *s) {
+  free(s->xyz);
+  fixture_destroy(s->f);
+  fixture_folder_remove(s->folder);
+}
+
+static void test_open_basis_asks_nothing_of_the_system(void **state) {
+  (void)state;
+  setting s = setting_open();
+  supine_basis *basis = NULL;
+  calls = live = attempts = fail_at = 0;
+  counting = true;
+  const supine_status status = supine_basis_open(s.path, &basis, NULL);
+  const size_t opening = calls;
+  if (status == SUPINE_OK) {
+    use_all(basis, s.xyz);
+  }
+  const size_t using = calls - opening;
+  supine_basis_close(basis);
+  counting = false;
+  assert_int_equal(status, SUPINE_OK);
+  assert_true(opening > 5); /* the count counts */
+  assert_int_equal(using, 0);
+  assert_int_equal(live, 0);
+  setting_close(&s);
+}
+
+static void test_open_each_allocation_failing_reports_memory(void **state) {
+  (void)state;
+  setting s = setting_open();
+  supine_status status = SUPINE_ERROR_MEMORY;
+  size_t failures = 0;
+  for (fail_at = 1; status != SUPINE_OK && fail_at < 1000; ++fail_at) {
+    supine_basis *basis = NULL;
+    supine_error error = {0};
+    calls = live = attempts = 0;
+    counting = true;
+    status = supine_basis_open(s.path, &basis, &error);
+    supine_basis_close(basis);
+    counting = false;
+    assert_int_equal(live, 0);
+    if (status != SUPINE_OK) {
+      assert_int_equal(status, SUPINE_ERROR_MEMORY);
+      assert_non_null(strstr(error.message, s.path));
+      ++failures;
+    }
+  }
+  fail_at = 0;
+  assert_int_equal(status, SUPINE_OK);
+  assert_true(failures > 5);
+  setting_close(&s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_open_basis_asks_nothing_of_the_system),
+      cmocka_unit_test(test_open_each_allocation_failing_reports_memory),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
