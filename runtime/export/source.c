@@ -11,7 +11,8 @@ static const void *tensor(const supine_safetensors *file, const char *name) {
 
 supine_status export_source_open(const char *path, export_source *source, supine_error *error) {
   export_source made = {0};
-  supine_status status = supine_basis_open(path, &made.basis, error);
+  static const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  supine_status status = supine_basis_open_with(path, &exact, &made.basis, error);
   if (status == SUPINE_OK) {
     status = supine_safetensors_open(path, &made.file, error);
   }

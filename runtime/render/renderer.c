@@ -134,7 +134,13 @@ cleanup:
 
 void supine_renderer_destroy(supine_renderer *renderer) {
   if (renderer != NULL) {
-    supine_gl_close(&renderer->gl); /* with everything in it */
+    if (renderer->program != 0 && supine_gl_use(&renderer->gl)) {
+      glDeleteTextures(1, &renderer->colours); /* names that are 0 are passed over */
+      glDeleteBuffers(4, renderer->buffer);
+      glDeleteVertexArrays(1, &renderer->array);
+      glDeleteProgram(renderer->program);
+    }
+    supine_gl_close(&renderer->gl);
     free(renderer->scratch);
     free(renderer);
   }

@@ -26,11 +26,12 @@ static bool write_positions(const supine_basis *basis, const double gravity[3], 
 }
 
 int main(int argc, char **argv) {
+  static const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   supine_error error = {SUPINE_ERROR_ARGUMENT, "usage: positions BASIS X,Y,Z,ML..."};
   float *xyz = NULL;
   int result = EXIT_FAILURE;
-  if (argc < 3 || supine_basis_open(argv[1], &basis, &error) != SUPINE_OK) {
+  if (argc < 3 || supine_basis_open_with(argv[1], &exact, &basis, &error) != SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);
     return EXIT_FAILURE;
   }

@@ -230,10 +230,10 @@ function start() {
     look();
   });
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('input, summary')) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const posture = POSTURES[Number(event.key) - 1];
     if (posture) buttons[Number(event.key) - 1].button.click();
-    else if (event.key === ' ' && !event.target.closest('button')) { event.preventDefault(); play(); }
+    else if (event.key === ' ' && !event.target.closest('button, input, summary')) { event.preventDefault(); play(); }
     else if (event.key === 'p') pin();
     else if (event.key === 'd') colourBy(state.kind === 'displacement' ? 'difference' : 'displacement');
     else if (event.key === 'r') holdStill(!state.room);
