@@ -22,7 +22,7 @@ static double *solve(const supine_lungs *lungs, const double *stiffness, const d
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
-  double *out = malloc(n * sizeof *out);
+  double *out = calloc(n, sizeof *out);
   supine_error error = {0};
   assert_int_equal(supine_lungs_network(lungs, &network), SUPINE_OK);
   assert_int_equal(supine_equilibrium_create(network, 1, 0, &equilibrium), SUPINE_OK);
@@ -44,7 +44,7 @@ static supine_lungs lungs_of(supine_mesh mesh, double reach) {
 }
 
 static double *irregular(size_t count, double low, double span, uint64_t seed) {
-  double *values = malloc(count * sizeof *values);
+  double *values = calloc(count, sizeof *values);
   for (size_t i = 0; i < count; ++i) {
     values[i] = low + span * helper_random(&seed);
   }
@@ -73,14 +73,14 @@ static void test_reach_equals_dense_definition(void **state) {
   for (size_t i = 0; i < n; ++i) {
     mean_log += log(e[i]) / (double)n;
   }
-  double *area = malloc(n * sizeof *area);
+  double *area = calloc(n + 1, sizeof *area);
   double mean = 0.0;
   supine_mesh_vertex_area(mesh, area);
   for (size_t i = 0; i < n; ++i) {
     mean += area[i] / (double)n;
   }
   gsl_matrix *weight = gsl_matrix_calloc(nodes, nodes); /* 1 / D */
-  double *s = malloc(nodes * sizeof *s);
+  double *s = calloc(nodes, sizeof *s);
   for (size_t i = 0; i < n; ++i) {
     s[i] = 1.0 / (e[i] / exp(mean_log));
     gsl_matrix_set(weight, i, i, area[i] / mean);
@@ -174,8 +174,8 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
   supine_mesh mesh = {.vertex_count = supine_geodesic_vertex_count(frequency),
                       .triangle_count = supine_geodesic_triangle_count(frequency)};
   uint64_t seed = 99;
-  mesh.vertices = malloc(3 * mesh.vertex_count * sizeof *mesh.vertices);
-  mesh.triangles = malloc(3 * mesh.triangle_count * sizeof *mesh.triangles);
+  mesh.vertices = calloc(3 * mesh.vertex_count, sizeof *mesh.vertices);
+  mesh.triangles = calloc(3 * mesh.triangle_count, sizeof *mesh.triangles);
   supine_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
@@ -195,7 +195,7 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
 static double harmonic_error(size_t frequency, double irregularity, double reach, size_t l, int m) {
   supine_lungs lungs = lungs_of(sphere(frequency, irregularity), reach);
   const size_t n = lungs.mesh.vertex_count;
-  double *force = malloc(n * sizeof *force);
+  double *force = calloc(n, sizeof *force);
   double y[49];
   for (size_t i = 0; i < n; ++i) {
     assert_int_equal(supine_sh_evaluate(6, lungs.mesh.vertices + 3 * i, y), SUPINE_OK);
@@ -240,7 +240,7 @@ static double spread(size_t frequency, double reach) {
   supine_lungs lungs = lungs_of(sphere(frequency, 0.1), reach);
   const size_t n = lungs.mesh.vertex_count;
   double *force = calloc(n, sizeof *force);
-  double *area = malloc(n * sizeof *area);
+  double *area = calloc(n, sizeof *area);
   force[7] = 1.0;
   double *found = solve(&lungs, NULL, force);
   supine_mesh_vertex_area(&lungs.mesh, area);

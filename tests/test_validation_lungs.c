@@ -43,8 +43,8 @@ static void test_displacement_is_linear_in_volume_along_one_direction(void **sta
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open(path, &basis, NULL), SUPINE_OK);
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  float *full = malloc(3 * n * sizeof *full);
-  float *part = malloc(3 * n * sizeof *part);
+  float *full = calloc(3 * n, sizeof *full);
+  float *part = calloc(3 * n, sizeof *part);
   const float *rest = supine_basis_vertices(basis);
   for (size_t p = 0; p < 4; ++p) {
     double weights[SUPINE_MODES_MAX];
@@ -130,10 +130,10 @@ static void test_resolution_reach_shrinks_the_drift(void **state) {
     supine_lungs_free(&coarse);
     skip();
   }
-  double *moves[2] = {malloc(3 * coarse.mesh.vertex_count * sizeof(double)),
-                      malloc(3 * fine.mesh.vertex_count * sizeof(double))};
+  double *moves[2] = {calloc(3 * coarse.mesh.vertex_count + 1, sizeof(double)),
+                      calloc(3 * fine.mesh.vertex_count + 1, sizeof(double))};
   double drift[2];
-  double spread[2][2];
+  double spread[2][2] = {{0.0}};
   nearest_grid grid = nearest_create(&fine.mesh, 5.0);
   const size_t vertex = coarse.mesh.vertex_count / 3;
   const size_t same = nearest_find(&grid, coarse.mesh.vertices + 3 * vertex);

@@ -19,8 +19,8 @@ static void test_plane_equals_mass_spring_damper_at_rest(void **state) {
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
   double *stiffness = ones(n);
-  double *ours = malloc(n * sizeof *ours);
-  double *theirs = malloc(n * sizeof *theirs);
+  double *ours = calloc(n, sizeof *ours);
+  double *theirs = calloc(n, sizeof *theirs);
   assert_int_equal(frame_solve(&f, NULL, force, 0.0, ours, NULL), SUPINE_OK);
   mass_spring_damper system = damper_create(&f, stiffness, force);
   assert_true(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL));
@@ -48,7 +48,7 @@ static void test_plane_irregular_equals_mass_spring_damper_at_rest(void **state)
   (void)state;
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
-  double *stiffness = malloc(n * sizeof *stiffness);
+  double *stiffness = calloc(n, sizeof *stiffness);
   for (size_t i = 0; i < n; ++i) {
     f.mesh.vertices[3 * i] += 2.5 * sin(7.0 * (double)i);
     f.mesh.vertices[3 * i + 2] = 3.0 * cos(5.0 * (double)i);
@@ -56,8 +56,8 @@ static void test_plane_irregular_equals_mass_spring_damper_at_rest(void **state)
   }
   normalise_stiffness(n, stiffness);
   double *force = plane_force(&f);
-  double *ours = malloc(n * sizeof *ours);
-  double *theirs = malloc(n * sizeof *theirs);
+  double *ours = calloc(n, sizeof *ours);
+  double *theirs = calloc(n, sizeof *theirs);
   assert_int_equal(frame_solve(&f, stiffness, force, 0.0, ours, NULL), SUPINE_OK);
   mass_spring_damper system = damper_create(&f, stiffness, force);
   assert_true(damper_integrate(&system, stiffness, 60.0, 1, theirs, NULL, NULL));
@@ -78,7 +78,7 @@ static void test_ring_uniform_stays_a_circle(void **state) {
   enum { COUNT = 60 };
   frame f = frame_ring(COUNT, 50.0);
   double *force = ones(COUNT);
-  double catch_[COUNT];
+  double catch_[COUNT] = {0.0};
   assert_int_equal(frame_solve(&f, NULL, force, 0.0, catch_, NULL), SUPINE_OK);
   double low = INFINITY;
   double high = 0.0;
@@ -106,7 +106,7 @@ static void test_ring_mixed_moves_less_where_it_is_stiff(void **state) {
   double last = INFINITY;
   for (size_t k = 0; k < 6; ++k) {
     double *stiffness = ring_stiffness(COUNT, factors[k]);
-    double catch_[COUNT];
+    double catch_[COUNT] = {0.0};
     assert_int_equal(frame_solve(&f, stiffness, force, 0.0, catch_, NULL), SUPINE_OK);
     const double middle = catch_[COUNT / 2];
     const double opposite = catch_[0];
@@ -137,9 +137,9 @@ static void test_convergence_conjugate_gradients_need_least_work(void **state) {
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
   double *stiffness = ones(n);
-  double *exact = malloc(n * sizeof *exact);
-  double *found = malloc(n * sizeof *found);
-  supine_solve_report report;
+  double *exact = calloc(n, sizeof *exact);
+  double *found = calloc(n, sizeof *found);
+  supine_solve_report report = {0};
   size_t distributions = 0;
   assert_int_equal(frame_solve(&f, NULL, force, 0.0, exact, NULL), SUPINE_OK);
   assert_int_equal(frame_solve(&f, NULL, force, 1e-7, found, &report), SUPINE_OK);

@@ -33,7 +33,7 @@ static inline void frame_free(frame *f) {
 static inline frame frame_plane(size_t side, double spacing) {
   frame f = {.mesh = {.vertex_count = side * side, .triangle_count = 2 * (side - 1) * (side - 1)}};
   f.mesh.vertices = calloc(3 * f.mesh.vertex_count, sizeof *f.mesh.vertices);
-  f.mesh.triangles = malloc(3 * f.mesh.triangle_count * sizeof *f.mesh.triangles);
+  f.mesh.triangles = calloc(3 * f.mesh.triangle_count, sizeof *f.mesh.triangles);
   uint32_t *t = f.mesh.triangles;
   for (size_t i = 0; i < side * side; ++i) {
     const size_t x = i % side;
@@ -57,7 +57,7 @@ static inline frame frame_plane(size_t side, double spacing) {
 static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
-  f.topology.edges = malloc(2 * count * sizeof *f.topology.edges);
+  f.topology.edges = calloc(2 * count, sizeof *f.topology.edges);
   for (size_t i = 0; i < count; ++i) {
     const double angle = 2.0 * M_PI * (double)i / (double)count;
     const size_t next = (i + 1) % count;
@@ -114,9 +114,9 @@ static inline mass_spring_damper damper_create(const frame *f, const double *sti
   const size_t n = f->mesh.vertex_count;
   mass_spring_damper system = {.count = n, .links = f->topology.edge_count, .damping = 2.5};
   system.ends = f->topology.edges;
-  system.k = malloc(system.links * sizeof *system.k);
-  system.ground = malloc(n * sizeof *system.ground);
-  system.push = malloc(n * sizeof *system.push);
+  system.k = calloc(system.links, sizeof *system.k);
+  system.ground = calloc(n, sizeof *system.ground);
+  system.push = calloc(n, sizeof *system.push);
   for (size_t i = 0; i < n; ++i) {
     system.ground[i] = 1.0;
     system.push[i] = force[i] * stiffness[i];
@@ -210,7 +210,7 @@ static inline double relative_rms(size_t count, const double *a, const double *b
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
-  double *force = malloc(n * sizeof *force);
+  double *force = calloc(n, sizeof *force);
   for (size_t i = 0; i < n; ++i) {
     const double x = f->mesh.vertices[3 * i] / last[0];
     const double y = f->mesh.vertices[3 * i + 1] / last[1];
@@ -221,7 +221,7 @@ static inline double *plane_force(const frame *f) {
 }
 
 static inline double *ones(size_t count) {
-  double *values = malloc(count * sizeof *values);
+  double *values = calloc(count, sizeof *values);
   for (size_t i = 0; i < count; ++i) {
     values[i] = 1.0;
   }
@@ -241,7 +241,7 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
 
 /* A ring whose middle third has `factor` times the stiffness of the rest. */
 static inline double *ring_stiffness(size_t count, double factor) {
-  double *stiffness = malloc(count * sizeof *stiffness);
+  double *stiffness = calloc(count, sizeof *stiffness);
   for (size_t i = 0; i < count; ++i) {
     stiffness[i] = i >= count / 3 && i < 2 * count / 3 ? factor : 1.0;
   }
@@ -269,8 +269,8 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
   double low;
   double high;
   double scale = 0.0;
-  double *area = malloc(n * sizeof *area);
-  double *vertices = malloc(3 * n * sizeof *vertices);
+  double *area = calloc(n + 1, sizeof *area);
+  double *vertices = calloc(3 * n, sizeof *vertices);
   supine_status status = area == NULL || vertices == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
     status = supine_solve(lungs, &model, g, &solution, NULL);
@@ -383,7 +383,7 @@ static inline nearest_grid nearest_create(const supine_mesh *mesh, double size) 
     total *= grid.cells[k];
   }
   grid.begin = calloc(total + 2, sizeof *grid.begin);
-  grid.order = malloc(mesh->vertex_count * sizeof *grid.order);
+  grid.order = calloc(mesh->vertex_count, sizeof *grid.order);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     ++grid.begin[nearest_cell(&grid, mesh->vertices + 3 * i, cell) + 2];
   }
@@ -454,8 +454,8 @@ static inline supine_status spread_of(supine_lungs *lungs, double reach, size_t 
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
-  double *area = malloc(n * sizeof *area);
-  double *column = malloc(n * sizeof *column);
+  double *area = calloc(n, sizeof *area);
+  double *column = calloc(n, sizeof *column);
   lungs->reach = reach;
   supine_status status = supine_lungs_network(lungs, &network);
   if (status == SUPINE_OK) {

@@ -87,8 +87,8 @@ static void convergence(void) {
   const double links = 2.0 * (double)f.topology.edge_count;
   double *force = plane_force(&f);
   double *stiffness = ones(n);
-  double *exact = malloc(n * sizeof *exact);
-  double *found = malloc(n * sizeof *found);
+  double *exact = calloc(n, sizeof *exact);
+  double *found = calloc(n, sizeof *found);
   need(frame_solve(&f, NULL, force, 0.0, exact, NULL) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
   curve c = {csv, "conjugate gradients", n, exact, links};
@@ -131,8 +131,8 @@ static void plane(void) {
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
   double *stiffness = ones(n);
-  double *ours = malloc(n * sizeof *ours);
-  double *theirs = malloc(n * sizeof *theirs);
+  double *ours = calloc(n, sizeof *ours);
+  double *theirs = calloc(n, sizeof *theirs);
   need(frame_solve(&f, NULL, force, 0.0, ours, NULL) == SUPINE_OK, "no solution");
   mass_spring_damper system = damper_create(&f, stiffness, force);
   need(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL), "no integration");
@@ -285,7 +285,7 @@ static void resolution(void) {
   size_t vertex[3];
   for (int r = 0; r < 3; ++r) {
     (void)load_lungs(r, &lungs[r]);
-    moves[r] = malloc(3 * lungs[r].mesh.vertex_count * sizeof(double));
+    moves[r] = calloc(3 * lungs[r].mesh.vertex_count, sizeof(double));
     need(moves[r] != NULL, "out of memory");
   }
   vertex[0] = lungs[0].mesh.vertex_count / 3;
