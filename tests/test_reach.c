@@ -22,7 +22,7 @@ static double *solve(const supine_lungs *lungs, const double *stiffness, const d
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
-  double *out = calloc(n, sizeof *out);
+  double *out = calloc(n + 1, sizeof *out);
   supine_error error = {0};
   assert_int_equal(supine_lungs_network(lungs, &network), SUPINE_OK);
   assert_int_equal(supine_equilibrium_create(network, 1, 0, &equilibrium), SUPINE_OK);

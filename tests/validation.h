@@ -270,7 +270,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
   double high;
   double scale = 0.0;
   double *area = calloc(n + 1, sizeof *area);
-  double *vertices = calloc(3 * n, sizeof *vertices);
+  double *vertices = calloc(3 * n + 1, sizeof *vertices);
   supine_status status = area == NULL || vertices == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
     status = supine_solve(lungs, &model, g, &solution, NULL);
@@ -383,7 +383,7 @@ static inline nearest_grid nearest_create(const supine_mesh *mesh, double size) 
     total *= grid.cells[k];
   }
   grid.begin = calloc(total + 2, sizeof *grid.begin);
-  grid.order = calloc(mesh->vertex_count, sizeof *grid.order);
+  grid.order = calloc(mesh->vertex_count + 1, sizeof *grid.order);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     ++grid.begin[nearest_cell(&grid, mesh->vertices + 3 * i, cell) + 2];
   }
@@ -454,7 +454,7 @@ static inline supine_status spread_of(supine_lungs *lungs, double reach, size_t 
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
-  double *area = calloc(n, sizeof *area);
+  double *area = calloc(n + 1, sizeof *area);
   double *column = calloc(n, sizeof *column);
   lungs->reach = reach;
   supine_status status = supine_lungs_network(lungs, &network);
