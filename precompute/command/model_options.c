@@ -42,6 +42,9 @@ const char supine_model_options_help[] =
     "                       order of the vertices (left lung first, each as its file first names\n"
     "                       them: the order that 'supine solve' writes), or vertex,value counted\n"
     "                       from 0\n"
+    "  --expandability ply:PROPERTY  a of every vertex, from a property of that name of the "
+    "vertices\n"
+    "                       of the surfaces themselves, all of them PLY files\n"
     "  --lesion X,Y,Z,RADIUS,FACTOR   a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to "
     "half\n"
     "                       of RADIUS (mm), less and less from there, and not at all from RADIUS\n"
@@ -200,7 +203,7 @@ int supine_model_options_take(supine_model_options *options, const char *command
         parse_expandability(value, options)
             ? NULL
             : "--expandability takes uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS "
-              "x, y or z and both ends above 0, or a file";
+              "x, y or z and both ends above 0, ply:PROPERTY, or a file";
     break;
   case OPTION_LESION:
     wanted = parse_lesion(value, options)
@@ -263,7 +266,24 @@ static void mention(const char *command, const char *path, const supine_mesh_rep
   }
 }
 
-static supine_status set_expandability(supine_model_options *options, const supine_lungs *lungs,
+static const char ply_prefix[] = "ply:";
+
+/* From the files themselves: each has some of the vertices. */
+static supine_status load_ply(const supine_model_options *options, const load_work *work,
+                              size_t count, const supine_lungs *lungs, double *a,
+                              supine_error *error) {
+  const char *property = options->expandability + strlen(ply_prefix);
+  supine_status status = SUPINE_OK;
+  memset(a, 0, lungs->mesh.vertex_count * sizeof *a);
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    status = supine_expandability_load_ply(work->paths[i], property, work->reports[i].axes,
+                                           options->load.millimetres_per_unit, lungs, a, error);
+  }
+  return status;
+}
+
+static supine_status set_expandability(supine_model_options *options, const load_work *work,
+                                       size_t count, const supine_lungs *lungs,
                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   if (options->expandability == NULL && options->law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
@@ -275,9 +295,14 @@ static supine_status set_expandability(supine_model_options *options, const supi
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   options->model.stiffness = a;
-  supine_status status = options->expandability != NULL
-                             ? supine_expandability_load(options->expandability, n, a, error)
-                             : supine_expandability_regional(lungs, &options->law, a, error);
+  supine_status status = SUPINE_OK;
+  if (options->expandability == NULL) {
+    status = supine_expandability_regional(lungs, &options->law, a, error);
+  } else if (strncmp(options->expandability, ply_prefix, strlen(ply_prefix)) == 0) {
+    status = load_ply(options, work, count, lungs, a, error);
+  } else {
+    status = supine_expandability_load(options->expandability, n, a, error);
+  }
   if (status == SUPINE_OK) {
     status = supine_expandability_stiffness(n, a, a, error);
   }
@@ -365,7 +390,7 @@ int supine_model_load(supine_model_options *options, const char *command, char *
                        lungs->topology.inconsistent_edges);
   }
   lungs->reach = options->reach;
-  if (set_expandability(options, lungs, &error) != SUPINE_OK ||
+  if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||
       set_shares(options, lungs, &error) != SUPINE_OK) {
     result = supine_command_fail(command, &error);

@@ -75,7 +75,8 @@ static bool band_energy(const supine_safetensors *file, const supine_basis_info 
 
 static const char *const shown[] = {
     "route",     "force",      "direction",      "direction_constants",
-    "stiffness", "midline_mm", "rest_volume_ml", "made_by"};
+    "stiffness", "midline_mm", "rest_volume_ml", "lung_share",
+    "lesions",   "reach_mm",   "made_by"};
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rms_mm",
                                      "error_p95_mm",      "error_max_mm"};
