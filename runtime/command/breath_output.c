@@ -1,0 +1,327 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Where the frames of a breath go: a series for ParaView, or one safetensors file. */
+#include <dirent.h>
+#include <errno.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <supine/output.h>
+#include <supine/safetensors.h>
+
+#include "breath_output.h"
+
+struct breath_output {
+  const supine_mesh *rest;
+  const breath_course *course;
+  char *path;
+  char *folder;     /* of the series, when it is done; NULL: safetensors */
+  char *temporary;  /* where it grows, beside `folder`; empty: nowhere */
+  char *index;      /* the PVD file beside it; NULL: it is inside */
+  double *vertices; /* [N, 3] */
+  float *positions; /* [T, N, 3] */
+  size_t next;
+};
+
+static bool ends_in(const char *text, const char *suffix) {
+  const size_t length = strlen(text);
+  const size_t end = strlen(suffix);
+  return length > end && strcmp(text + length - end, suffix) == 0;
+}
+
+static char *join(const char *first, const char *second) {
+  char *text = malloc(strlen(first) + strlen(second) + 1);
+  if (text != NULL) {
+    (void)stpcpy(stpcpy(text, first), second);
+  }
+  return text;
+}
+
+static supine_status fail(const char *path, const char *what, supine_error *error) {
+  const int code = errno;
+  return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", path, what,
+                          strerror(code)); /* NOLINT(concurrency-mt-unsafe) */
+}
+
+static supine_status no_memory(const char *path, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+}
+
+/* Removes a folder of files, as far as it can. */
+static void remove_folder(const char *path) {
+  DIR *entries = opendir(path);
+  if (entries != NULL) {
+    const struct dirent *entry;
+    while ((entry = readdir(entries)) != NULL) { /* NOLINT(concurrency-mt-unsafe) */
+      if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) {
+        (void)unlinkat(dirfd(entries), entry->d_name, 0);
+      }
+    }
+    (void)closedir(entries);
+  }
+  (void)rmdir(path);
+}
+
+static supine_status folder_is_free(const char *path, supine_error *error) {
+  DIR *entries = opendir(path);
+  if (entries == NULL) {
+    return errno == ENOENT ? SUPINE_OK : fail(path, "cannot use this name for a folder", error);
+  }
+  size_t count = 0;
+  while (readdir(entries) != NULL) { /* NOLINT(concurrency-mt-unsafe) */
+    ++count;
+  }
+  (void)closedir(entries);
+  return count <= 2 ? SUPINE_OK
+                    : supine_error_set(error, SUPINE_ERROR_WRITE,
+                                       "%s: there is something in this folder already: remove it, "
+                                       "or choose another name",
+                                       path);
+}
+
+static supine_status open_series(breath_output *made, supine_error *error) {
+  made->folder = join(made->path, "");
+  if (made->folder == NULL) {
+    return no_memory(made->path, error);
+  }
+  size_t length = strlen(made->folder);
+  if (ends_in(made->path, ".pvd")) {
+    made->index = made->path;
+    length -= strlen(".pvd");
+  } else {
+    while (length > 1 && made->folder[length - 1] == '/') {
+      --length;
+    }
+  }
+  made->folder[length] = '\0';
+  made->vertices = malloc(3 * made->rest->vertex_count * sizeof *made->vertices);
+  made->temporary = join(made->folder, ".part-XXXXXX");
+  if (made->vertices == NULL || made->temporary == NULL) {
+    return no_memory(made->path, error);
+  }
+  const supine_status status = folder_is_free(made->folder, error);
+  if (status != SUPINE_OK || mkdtemp(made->temporary) == NULL) {
+    made->temporary[0] = '\0';
+    return status != SUPINE_OK ? status : fail(made->path, "cannot create its folder", error);
+  }
+  const mode_t mask = umask(0);
+  (void)umask(mask);
+  (void)chmod(made->temporary, 0777 & ~mask);
+  return SUPINE_OK;
+}
+
+static supine_status open_tensors(breath_output *made, supine_error *error) {
+  const size_t frame = 3 * made->rest->vertex_count;
+  if (frame <= SIZE_MAX / sizeof(float) / made->course->count) {
+    made->positions = malloc(made->course->count * frame * sizeof *made->positions);
+  }
+  if (made->positions == NULL) {
+    return supine_error_set(
+        error, SUPINE_ERROR_MEMORY,
+        "%s: no memory for %zu frames of %zu vertices (%.1f GB): take fewer, or "
+        "write a series",
+        made->path, made->course->count, made->rest->vertex_count,
+        4e-9 * (double)frame * (double)made->course->count);
+  }
+  supine_output probe = {0}; /* whether the name can be written is found before the work */
+  const supine_status status = supine_output_open(made->path, &probe, error);
+  supine_output_abandon(&probe);
+  return status;
+}
+
+supine_status breath_output_open(const char *path, const supine_mesh *rest,
+                                 const breath_course *course, breath_output **output,
+                                 supine_error *error) {
+  breath_output *made = calloc(1, sizeof *made);
+  *output = NULL;
+  if (made == NULL) {
+    return no_memory(path, error);
+  }
+  made->rest = rest;
+  made->course = course;
+  made->path = join(path, "");
+  supine_status status = SUPINE_OK;
+  if (made->path == NULL) {
+    status = no_memory(path, error);
+  } else {
+    status = ends_in(path, ".safetensors") ? open_tensors(made, error) : open_series(made, error);
+  }
+  if (status != SUPINE_OK) {
+    breath_output_close(made);
+    return status;
+  }
+  *output = made;
+  return SUPINE_OK;
+}
+
+void breath_output_close(breath_output *output) {
+  if (output == NULL) {
+    return;
+  }
+  if (output->temporary != NULL && output->temporary[0] != '\0') {
+    remove_folder(output->temporary);
+  }
+  free(output->path);
+  free(output->folder);
+  free(output->temporary);
+  free(output->vertices);
+  free(output->positions);
+  free(output);
+}
+
+enum { FRAME_NAME_SIZE = 32 };
+
+static void frame_name(size_t frame, char name[FRAME_NAME_SIZE]) {
+  (void)snprintf(name, FRAME_NAME_SIZE, "frame_%05zu.vtp", frame);
+}
+
+supine_status breath_output_add(breath_output *output, const float *xyz, supine_error *error) {
+  const size_t count = 3 * output->rest->vertex_count;
+  const size_t frame = output->next++;
+  if (output->positions != NULL) {
+    memcpy(output->positions + frame * count, xyz, count * sizeof *xyz);
+    return SUPINE_OK;
+  }
+  char name[FRAME_NAME_SIZE + 1];
+  name[0] = '/';
+  frame_name(frame, name + 1);
+  char *path = join(output->temporary, name);
+  if (path == NULL) {
+    return no_memory(output->path, error);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    output->vertices[i] = (double)xyz[i];
+  }
+  supine_mesh mesh = *output->rest;
+  mesh.vertices = output->vertices;
+  const supine_mesh_save_options options = {.rest = output->rest->vertices};
+  const supine_status status = supine_mesh_save(path, &mesh, &options, error);
+  free(path);
+  return status;
+}
+
+/* Writes text into an XML attribute. */
+static void write_attribute(FILE *file, const char *text) {
+  for (; *text != '\0'; ++text) {
+    switch (*text) {
+    case '&':
+      (void)fputs("&amp;", file);
+      break;
+    case '<':
+      (void)fputs("&lt;", file);
+      break;
+    case '"':
+      (void)fputs("&quot;", file);
+      break;
+    default:
+      (void)fputc(*text, file);
+    }
+  }
+}
+
+/* The list of the frames; `folder` before each name, "" where they lie beside it. */
+static supine_status write_index(const breath_output *output, const char *path, const char *folder,
+                                 supine_error *error) {
+  supine_output file = {0};
+  const supine_status status = supine_output_open(path, &file, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+              "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
+              "<Collection>\n",
+              file.file);
+  for (size_t t = 0; t < output->course->count; ++t) {
+    char name[FRAME_NAME_SIZE];
+    frame_name(t, name);
+    (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
+                  output->course->time[t]);
+    write_attribute(file.file, folder);
+    (void)fprintf(file.file, "%s%s\"/>\n", folder[0] == '\0' ? "" : "/", name);
+  }
+  (void)fputs("</Collection>\n</VTKFile>\n", file.file);
+  return supine_output_commit(&file, error);
+}
+
+/* Time, volumes and gravity of each frame, beside its surface. */
+static supine_status write_table(const breath_output *output, const double *volumes,
+                                 supine_error *error) {
+  const breath_course *course = output->course;
+  supine_output file = {0};
+  char *path = join(output->temporary, "/breath.csv");
+  if (path == NULL) {
+    return no_memory(output->path, error);
+  }
+  supine_status status = supine_output_open(path, &file, error);
+  free(path);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  (void)fputs("frame,time_s", file.file);
+  for (size_t lung = 0; lung < course->lungs; ++lung) {
+    (void)fprintf(file.file, ",volume_%zu_mL", lung);
+  }
+  (void)fputs(",gravity_x,gravity_y,gravity_z\n", file.file);
+  for (size_t t = 0; t < course->count; ++t) {
+    const double *g = course->gravity + 3 * t;
+    (void)fprintf(file.file, "%zu,%.9g", t, course->time[t]);
+    for (size_t lung = 0; lung < course->lungs; ++lung) {
+      (void)fprintf(file.file, ",%.9g", volumes[t * course->lungs + lung]);
+    }
+    (void)fprintf(file.file, ",%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+  }
+  return supine_output_commit(&file, error);
+}
+
+static supine_status commit_series(breath_output *output, const double *volumes,
+                                   supine_error *error) {
+  supine_status status = write_table(output, volumes, error);
+  if (status == SUPINE_OK && output->index == NULL) {
+    char *inside = join(output->temporary, "/breath.pvd");
+    status =
+        inside == NULL ? no_memory(output->path, error) : write_index(output, inside, "", error);
+    free(inside);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (rename(output->temporary, output->folder) != 0) {
+    return fail(output->folder, "cannot give the series its name", error);
+  }
+  output->temporary[0] = '\0';
+  if (output->index != NULL) {
+    const char *slash = strrchr(output->folder, '/');
+    status = write_index(output, output->index, slash == NULL ? output->folder : slash + 1, error);
+    if (status != SUPINE_OK) {
+      remove_folder(output->folder);
+    }
+  }
+  return status;
+}
+
+static supine_status commit_tensors(const breath_output *output, const double *volumes,
+                                    const char *made_by, supine_error *error) {
+  const size_t t = output->course->count;
+  const size_t n = output->rest->vertex_count;
+  const supine_tensor tensors[] = {
+      {"positions", SUPINE_F32, 3, {t, n, 3}, output->positions},
+      {"triangles", SUPINE_U32, 2, {output->rest->triangle_count, 3}, output->rest->triangles},
+      {"time", SUPINE_F64, 1, {t}, output->course->time},
+      {"volume", SUPINE_F64, 2, {t, output->course->lungs}, volumes},
+      {"gravity", SUPINE_F64, 2, {t, 3}, output->course->gravity}};
+  const supine_metadata metadata[] = {{"format", "supine-breath"},
+                                      {"version", "1"},
+                                      {"units", "mm, s, mL above rest"},
+                                      {"axes", "LPS"},
+                                      {"made_by", made_by}};
+  return supine_safetensors_write(output->path, tensors, sizeof tensors / sizeof *tensors, metadata,
+                                  sizeof metadata / sizeof *metadata, error);
+}
+
+supine_status breath_output_commit(breath_output *output, const double *volumes,
+                                   const char *made_by, supine_error *error) {
+  return output->positions != NULL ? commit_tensors(output, volumes, made_by, error)
+                                   : commit_series(output, volumes, error);
+}

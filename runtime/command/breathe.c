@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine breathe: the lungs of a basis, breathing, frame by frame. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "basis_input.h"
+#include "breath_frames.h"
+#include "breath_output.h"
+#include "orientation.h"
+
+static const char name[] = "breathe";
+
+static const char help[] =
+    "Usage: supine breathe BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]\n"
+    "\n"
+    "Lets the lungs of a basis file breathe, in one posture or while the body turns, and writes "
+    "the\n"
+    "surface of every frame. The volume follows the pressure-volume relation and is exact in each\n"
+    "frame. Prints how long computing a frame took, beside the 15 ms of a display that must not\n"
+    "wait.\n"
+    "\n"
+    "  -o, --output OUT     NAME.pvd: that file, and a folder NAME of VTP files, for ParaView;\n"
+    "                       NAME.safetensors: one file with positions [T,N,3], triangles [M,3],\n"
+    "                       time [T], volume [T,G] and gravity [T,3]; anything else: a folder "
+    "with\n"
+    "                       breath.pvd and the VTP files. A folder must be new or empty\n"
+    "  --turn FROM:TO:SECONDS  turns gravity from one posture to another at constant speed, as\n"
+    "                       supine:left:10s; to the opposite posture over the left side\n"
+    "\n"
+    "The breath:\n"
+    "  --tidal ML           air of a breath above rest, both lungs together; default 500\n"
+    "  --rate N             breaths a minute; default 12\n"
+    "  --inhale SHARE       of the breath's time that is inhalation, between 0 and 1; default 1/3\n"
+    "  --pv FILE            pressure-volume relation, of 'supine pv fit'; default: a normal "
+    "adult's\n"
+    "  --rest-pressure P    cmH2O at the end of an exhalation; default 5\n"
+    "  --course NAME        how pressure rises and falls: cosine (default), ramp; or flow: the\n"
+    "                       volume goes in straight lines, whatever the pressure\n"
+    "  --step ML            the paper's own breath instead: constant flow of this volume a frame,\n"
+    "                       in and out; 1.5 takes 5 s to inhale 500 mL at 66.66 frames a second\n"
+    "\n"
+    "The frames:\n"
+    "  --fps N              frames a second; default 66.66, one every 15 ms\n"
+    "  --seconds S          how long; default: the turn, or one breath\n"
+    "\n";
+
+static const char examples[] =
+    "\n"
+    "Examples:\n"
+    "  supine breathe lungs.safetensors --posture prone -o prone.pvd\n"
+    "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.pvd\n"
+    "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors\n";
+
+static const double budget = 15e-3; /* s a frame */
+
+typedef struct request {
+  supine_orientation orientation;
+  bool turns;
+  breath_turn turn;
+  supine_pv_breath breath;
+  const char *pv;
+  const char *path;
+  double fps, seconds, step; /* 0: not given */
+} request;
+
+/* "supine:left:10s" */
+static int take_turn(request *wanted, const char *value) {
+  char text[128];
+  char *colon[2];
+  (void)snprintf(text, sizeof text, "%s", value);
+  colon[0] = strchr(text, ':');
+  colon[1] = colon[0] == NULL ? NULL : strchr(colon[0] + 1, ':');
+  if (strlen(value) >= sizeof text || colon[1] == NULL) {
+    return supine_command_usage(name, "--turn takes FROM:TO:SECONDS, not '%s'", value);
+  }
+  *colon[0] = *colon[1] = '\0';
+  char *seconds = colon[1] + 1;
+  const size_t length = strlen(seconds);
+  if (length > 0 && seconds[length - 1] == 's') {
+    seconds[length - 1] = '\0';
+  }
+  if (!supine_parse_number(seconds, &wanted->turn.seconds) || !(wanted->turn.seconds > 0.0)) {
+    return supine_command_usage(name, "--turn takes a time above 0 s, not '%s'", value);
+  }
+  wanted->turns = true;
+  const int result = supine_orientation_posture(name, text, wanted->turn.from);
+  return result == SUPINE_EXIT_OK ? supine_orientation_posture(name, colon[0] + 1, wanted->turn.to)
+                                  : result;
+}
+
+static int take_positive(const char *option, const char *value, double *number) {
+  if (supine_parse_number(value, number) && *number > 0.0) {
+    return SUPINE_EXIT_OK;
+  }
+  return supine_command_usage(name, "--%s takes a number above 0, not '%s'", option, value);
+}
+
+static int take_course(const char *value, supine_pv_course *course) {
+  static const char *const names[] = {"cosine", "ramp", "flow"};
+  for (int i = 0; i < 3; ++i) {
+    if (strcmp(value, names[i]) == 0) {
+      *course = (supine_pv_course)i;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  return supine_command_usage(name, "--course takes cosine, ramp or flow, not '%s'", value);
+}
+
+enum { TURN = OPTION_ORIENTATION_END, TIDAL, RATE, INHALE, PV, REST, COURSE, STEP, FPS, SECONDS };
+
+static int take(request *wanted, int option, const char *value) {
+  switch (option) {
+  case 'o':
+    wanted->path = value;
+    return SUPINE_EXIT_OK;
+  case TURN:
+    return take_turn(wanted, value);
+  case TIDAL:
+    return take_positive("tidal", value, &wanted->breath.tidal);
+  case RATE:
+    return take_positive("rate", value, &wanted->breath.rate);
+  case INHALE:
+    if (!supine_parse_number(value, &wanted->breath.inhale_fraction) ||
+        !(wanted->breath.inhale_fraction > 0.0 && wanted->breath.inhale_fraction < 1.0)) {
+      return supine_command_usage(name, "--inhale takes a share between 0 and 1, not '%s'", value);
+    }
+    return SUPINE_EXIT_OK;
+  case PV:
+    wanted->pv = value;
+    return SUPINE_EXIT_OK;
+  case REST:
+    if (!supine_parse_number(value, &wanted->breath.rest_pressure)) {
+      return supine_command_usage(name, "--rest-pressure takes cmH2O, not '%s'", value);
+    }
+    return SUPINE_EXIT_OK;
+  case COURSE:
+    return take_course(value, &wanted->breath.course);
+  case STEP:
+    return take_positive("step", value, &wanted->step);
+  case FPS:
+    return take_positive("fps", value, &wanted->fps);
+  case SECONDS:
+    return take_positive("seconds", value, &wanted->seconds);
+  default:
+    return supine_orientation_take(&wanted->orientation, name, option, value);
+  }
+}
+
+/* Number of frames and what was left to default; an exit code. */
+static int complete(request *wanted, size_t *count) {
+  enum { FRAMES_MAX = 1000000 };
+  supine_pv_breath *breath = &wanted->breath;
+  if (wanted->step > 0.0) { /* in and out alike, at this volume a frame */
+    breath->course = SUPINE_PV_CONSTANT_FLOW;
+    breath->inhale_fraction = 0.5;
+    breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
+  }
+  if (wanted->turns && wanted->orientation.given) {
+    return supine_command_usage(name, "give --turn, or one posture, not both");
+  }
+  if (!wanted->turns) {
+    const int result = supine_orientation_finish(&wanted->orientation, name, wanted->turn.to);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+    memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
+  }
+  double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;
+  seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
+  const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
+  if (!(frames <= FRAMES_MAX)) {
+    return supine_command_usage(name, "%g s at %g frames a second are more than %d frames", seconds,
+                                wanted->fps, FRAMES_MAX);
+  }
+  *count = (size_t)frames;
+  return SUPINE_EXIT_OK;
+}
+
+static int compare(const void *a, const void *b) {
+  const double x = *(const double *)a;
+  const double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
+                   double *seconds) {
+  const double *volumes = breath_frames_volumes(frames);
+  double peak = 0.0;
+  double worst = 0.0;
+  for (size_t t = 0; t < course->count; ++t) {
+    double sum = 0.0;
+    for (size_t lung = 0; lung < course->lungs; ++lung) {
+      sum += volumes[t * course->lungs + lung];
+    }
+    peak = fmax(peak, sum);
+    worst = fmax(worst, fabs(sum - course->volume[t]));
+  }
+  qsort(seconds, course->count, sizeof *seconds, compare);
+  const double median = seconds[course->count / 2];
+  const double most = seconds[course->count - 1];
+  (void)printf("%s: %zu frames, %.2f s at %.4g a second; up to %.2f mL above rest, volumes within "
+               "%.2g mL\n",
+               wanted->path, course->count, course->time[course->count - 1], wanted->fps, peak,
+               worst);
+  if (course->fixed) {
+    (void)printf("one posture: %zu of the frames by three additions a vertex\n",
+                 breath_frames_stepped(frames));
+  }
+  (void)printf("compute time a frame: median %.3f ms, longest %.3f ms, of %.0f ms\n", 1e3 * median,
+               1e3 * most, 1e3 * budget);
+}
+
+static supine_status play(const supine_basis *basis, const request *wanted, size_t count,
+                          const char *made_by, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_pv pv = *supine_pv_normal();
+  supine_mesh rest = {0};
+  breath_course course = {0};
+  breath_frames *frames = NULL;
+  breath_output *output = NULL;
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  double *seconds = malloc(count * sizeof *seconds);
+  supine_progress progress = {0};
+  supine_status status = SUPINE_OK;
+  if (xyz == NULL || seconds == NULL || supine_basis_rest_mesh(basis, &rest) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    goto cleanup;
+  }
+  if (wanted->pv != NULL) {
+    status = supine_pv_load(wanted->pv, &pv, error);
+  }
+  if (status == SUPINE_OK) {
+    status = breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
+                                  info->lung_count, &course, error);
+  }
+  if (status == SUPINE_OK) {
+    status = breath_frames_create(basis, &course, &frames, error);
+  }
+  if (status == SUPINE_OK) {
+    status = breath_output_open(wanted->path, &rest, &course, &output, error);
+  }
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  supine_interrupts_catch();
+  progress = supine_progress_begin(name);
+  for (size_t t = 0; t < count && status == SUPINE_OK; ++t) {
+    seconds[t] = breath_frames_next(frames, xyz);
+    status = breath_output_add(output, xyz, error);
+    if (!supine_progress_step(&progress, (double)(t + 1) / (double)count)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  if (status == SUPINE_OK) {
+    status = breath_output_commit(output, breath_frames_volumes(frames), made_by, error);
+  }
+  supine_progress_end(&progress);
+  if (status == SUPINE_OK) {
+    report(wanted, &course, frames, seconds);
+  }
+cleanup:
+  breath_output_close(output);
+  breath_frames_destroy(frames);
+  breath_course_free(&course);
+  supine_mesh_free(&rest);
+  free(xyz);
+  free(seconds);
+  return status;
+}
+
+/* The command line in one line; names of files without their folders. */
+static void describe(int argc, char **argv, char *text, size_t size) {
+  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc && used < size; ++i) {
+    const char *slash = strrchr(argv[i], '/');
+    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
+  }
+}
+
+int supine_command_breathe(int argc, char **argv) {
+  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                          {"turn", required_argument, NULL, TURN},
+                                          {"tidal", required_argument, NULL, TIDAL},
+                                          {"rate", required_argument, NULL, RATE},
+                                          {"inhale", required_argument, NULL, INHALE},
+                                          {"pv", required_argument, NULL, PV},
+                                          {"rest-pressure", required_argument, NULL, REST},
+                                          {"course", required_argument, NULL, COURSE},
+                                          {"step", required_argument, NULL, STEP},
+                                          {"fps", required_argument, NULL, FPS},
+                                          {"seconds", required_argument, NULL, SECONDS},
+                                          SUPINE_ORIENTATION_OPTIONS,
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+  request wanted = {.breath = supine_pv_breath_default(), .fps = 66.66};
+  char made_by[512];
+  describe(argc, argv, made_by, sizeof made_by);
+  int option;
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
+    if (option == 'h') {
+      (void)fputs(help, stdout);
+      (void)fputs(supine_orientation_help, stdout);
+      (void)fputs(examples, stdout);
+      return supine_command_finish(name);
+    }
+    if (option == '?' || option == ':') {
+      return supine_command_bad_option(name, options, option, argv);
+    }
+    const int result = take(&wanted, option, optarg);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+  }
+  if (argc - optind != 1) {
+    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+  }
+  if (wanted.path == NULL) {
+    return supine_command_usage(name, "-o OUT is missing");
+  }
+  size_t count = 0;
+  int result = complete(&wanted, &count);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  supine_basis *basis = NULL;
+  supine_error error;
+  supine_status status = supine_basis_open(argv[optind], &basis, &error);
+  if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
+    status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
+                              "%s: its surface is open and encloses no volume: close the mesh "
+                              "before 'supine precompute'",
+                              argv[optind]);
+  }
+  if (status == SUPINE_OK) {
+    status = play(basis, &wanted, count, made_by, &error);
+  }
+  result = status == SUPINE_OK ? supine_command_finish(name) : supine_command_fail(name, &error);
+  supine_basis_close(basis);
+  return result;
+}

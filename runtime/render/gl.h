@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* What the files that draw share: the context, the program, the buffers. */
+#ifndef SUPINE_RENDER_GL_H
+#define SUPINE_RENDER_GL_H
+
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <GLES3/gl3.h>
+
+#include "render.h"
+
+/* An OpenGL ES 3 context without a window. */
+typedef struct supine_gl_context {
+  EGLDisplay display;
+  EGLContext context;
+} supine_gl_context;
+
+/* Opens one and makes it current.
+ * SUPINE_ERROR_UNSUPPORTED: no driver here draws off screen. */
+supine_status supine_gl_open(supine_gl_context *context, supine_error *error);
+bool supine_gl_use(const supine_gl_context *context);
+void supine_gl_close(supine_gl_context *context);
+
+/* Vertex attributes of the program, by location. */
+enum {
+  ATTRIBUTE_REST = 0,
+  ATTRIBUTE_DIRECTION,
+  ATTRIBUTE_COEFFICIENTS, /* and the three after it */
+  ATTRIBUTE_NORMAL = ATTRIBUTE_COEFFICIENTS + 4,
+  ATTRIBUTE_VALUE,
+  ATTRIBUTE_COUNT
+};
+
+/* Compiles and links; 0 after filling `error`. */
+GLuint supine_gl_program(supine_error *error);
+
+struct supine_renderer {
+  const supine_basis *basis;
+  supine_gl_context gl;
+  GLuint program;
+  GLuint array;
+  GLuint buffer[4]; /* rest; what the weights multiply; normals and values; triangles by lung */
+  GLuint colours;
+  bool packed; /* the basis has at most 16 modes and one direction a vertex: the GPU displaces */
+  size_t index_begin[SUPINE_LUNGS_MAX + 1]; /* triangles of each lung */
+  float *scratch;                           /* [N, 7]: positions, normals, values */
+};
+
+#endif

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+/* A basis on the GPU. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "../internal.h"
+#include "gl.h"
+
+enum { MODES = 16, COLOURS = 256, STRIDE = 3 + MODES };
+
+/* Direction and 16 coefficients of each vertex, [N, 19]; zeros beyond K. */
+static void pack(const supine_basis *basis, float *packed) {
+  const size_t modes = basis->info.mode_count;
+  for (size_t i = 0; i < basis->info.vertex_count; ++i, packed += STRIDE) {
+    memcpy(packed, basis->direction + 3 * i, 3 * sizeof *packed);
+    memcpy(packed + 3, basis->coefficients + i * modes, modes * sizeof *packed);
+  }
+}
+
+static void attribute(GLuint location, GLint count, size_t stride, size_t offset) {
+  glEnableVertexAttribArray(location);
+  glVertexAttribPointer(location, count, GL_FLOAT, GL_FALSE, (GLsizei)(stride * sizeof(float)),
+                        (const char *)NULL + offset * sizeof(float));
+}
+
+static void load_colours(supine_renderer *r) {
+  unsigned char texels[COLOURS][4];
+  for (int i = 0; i < COLOURS; ++i) {
+    double rgb[3];
+    supine_colour(i / (double)(COLOURS - 1), rgb);
+    for (int k = 0; k < 3; ++k) {
+      texels[i][k] = (unsigned char)(255 * rgb[k] + 0.5);
+    }
+    texels[i][3] = 255;
+  }
+  glGenTextures(1, &r->colours);
+  glBindTexture(GL_TEXTURE_2D, r->colours);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, COLOURS, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+}
+
+/* Triangles in the order of their lungs. */
+static void group_triangles(supine_renderer *r, uint32_t *grouped) {
+  const supine_basis_info *info = &r->basis->info;
+  size_t count = 0;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    r->index_begin[lung] = count;
+    for (size_t t = 0; t < info->triangle_count; ++t) {
+      const uint32_t *corner = r->basis->triangles + 3 * t;
+      if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
+        memcpy(grouped + 3 * count++, corner, 3 * sizeof *corner);
+      }
+    }
+  }
+  r->index_begin[info->lung_count] = count;
+}
+
+static supine_status load_surface(supine_renderer *r, supine_error *error) {
+  const supine_basis_info *info = &r->basis->info;
+  const size_t n = info->vertex_count;
+  uint32_t *grouped = malloc(3 * info->triangle_count * sizeof *grouped + 1);
+  float *packed = calloc(n, STRIDE * sizeof *packed);
+  supine_status status = SUPINE_OK;
+  if (grouped == NULL || packed == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    goto cleanup;
+  }
+  if (r->packed) {
+    pack(r->basis, packed);
+  }
+  group_triangles(r, grouped);
+  glGenVertexArrays(1, &r->array);
+  glGenBuffers(4, r->buffer);
+  glBindVertexArray(r->array);
+  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
+  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->basis->vertices,
+               GL_STATIC_DRAW);
+  attribute(ATTRIBUTE_REST, 3, 3, 0);
+  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[1]);
+  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(STRIDE * n * sizeof(float)), packed, GL_STATIC_DRAW);
+  attribute(ATTRIBUTE_DIRECTION, 3, STRIDE, 0);
+  for (GLuint k = 0; k < 4; ++k) {
+    attribute(ATTRIBUTE_COEFFICIENTS + k, 4, STRIDE, 3 + 4 * (size_t)k);
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[2]);
+  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(4 * n * sizeof(float)), NULL, GL_DYNAMIC_DRAW);
+  attribute(ATTRIBUTE_NORMAL, 3, 3, 0);
+  attribute(ATTRIBUTE_VALUE, 1, 1, 3 * n);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, r->buffer[3]);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(3 * info->triangle_count * sizeof *grouped),
+               grouped, GL_STATIC_DRAW);
+  if (glGetError() != GL_NO_ERROR) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
+                              "the OpenGL driver cannot hold %zu vertices", n);
+  }
+cleanup:
+  free(grouped);
+  free(packed);
+  return status;
+}
+
+supine_status supine_renderer_create(const supine_basis *basis, supine_renderer **renderer,
+                                     supine_error *error) {
+  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_renderer *r = calloc(1, sizeof *r);
+  if (r == NULL) {
+    return supine_error_set(error, status, "out of memory");
+  }
+  r->basis = basis;
+  r->packed = !basis->info.vector && basis->info.mode_count <= MODES;
+  r->scratch = calloc(basis->info.vertex_count, 7 * sizeof *r->scratch);
+  if (r->scratch == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  status = supine_gl_open(&r->gl, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  r->program = supine_gl_program(error);
+  status = r->program != 0 ? load_surface(r, error) : SUPINE_ERROR_UNSUPPORTED;
+  if (status == SUPINE_OK) {
+    load_colours(r);
+    *renderer = r;
+    r = NULL;
+  }
+cleanup:
+  supine_renderer_destroy(r);
+  return status;
+}
+
+void supine_renderer_destroy(supine_renderer *renderer) {
+  if (renderer != NULL) {
+    supine_gl_close(&renderer->gl); /* with everything in it */
+    free(renderer->scratch);
+    free(renderer);
+  }
+}

@@ -1,0 +1,448 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine breathe: volumes of every frame, as measured on its surface; what it writes and refuses.
+ */
+#include <dirent.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/mesh.h>
+#include <supine/phantom.h>
+#include <supine/precompute.h>
+#include <supine/safetensors.h>
+
+#include "../runtime/command/breath_course.h"
+#include "../runtime/command/command.h"
+#include "lungs_helpers.h"
+
+static char folder[] = "/tmp/supine-breathe-XXXXXX";
+static char basis[64], breath[64], series[64], series_folder[64], open_basis[64];
+static char text[16384]; /* what the command said, stdout and stderr */
+
+static supine_status make_basis(const supine_lungs *lungs, const char *path) {
+  const supine_precompute_options options = {
+      .model = supine_model_default(), .band = 5, .modes = 16, .held_out = 5};
+  supine_precompute_report report;
+  return supine_precompute(lungs, &options, path, &report, NULL);
+}
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(basis, sizeof basis, "%s/basis", folder);
+  (void)snprintf(open_basis, sizeof open_basis, "%s/open", folder);
+  (void)snprintf(breath, sizeof breath, "%s/out.safetensors", folder);
+  (void)snprintf(series, sizeof series, "%s/a & b.pvd", folder);
+  (void)snprintf(series_folder, sizeof series_folder, "%s/a & b", folder);
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
+  bool good = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
+              supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) == SUPINE_OK &&
+              make_basis(&lungs, basis) == SUPINE_OK;
+  supine_lungs_free(&lungs);
+  --mesh.triangle_count; /* a hole */
+  good = good && supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) == SUPINE_OK &&
+         make_basis(&lungs, open_basis) == SUPINE_OK;
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&mesh);
+  return good ? 0 : -1;
+}
+
+/* Removes what is in a folder, and counts it. */
+static size_t empty(const char *path) {
+  size_t count = 0;
+  DIR *entries = opendir(path);
+  const struct dirent *entry;
+  while (entries != NULL && (entry = readdir(entries)) != NULL) {
+    if (entry->d_name[0] != '.') {
+      ++count;
+      (void)unlinkat(dirfd(entries), entry->d_name, 0);
+    }
+  }
+  if (entries != NULL) {
+    (void)closedir(entries);
+  }
+  return count;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  (void)empty(series_folder);
+  (void)rmdir(series_folder);
+  (void)empty(folder);
+  return rmdir(folder);
+}
+
+/* Entries of the folder whose names begin so. */
+static size_t count_names(const char *prefix) {
+  size_t count = 0;
+  DIR *entries = opendir(folder);
+  assert_non_null(entries);
+  const struct dirent *entry;
+  while ((entry = readdir(entries)) != NULL) {
+    count += strncmp(entry->d_name, prefix, strlen(prefix)) == 0;
+  }
+  (void)closedir(entries);
+  return count;
+}
+
+/* Runs "breathe WORDS..." */
+static int run(const char *const *words) {
+  char *argv[24] = {strdup("breathe")};
+  int argc = 1;
+  for (; words[argc - 1] != NULL; ++argc) {
+    argv[argc] = strdup(words[argc - 1]);
+  }
+  (void)fflush(stdout);
+  (void)fflush(stderr);
+  const int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)};
+  FILE *file = tmpfile();
+  assert_non_null(file);
+  assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
+  optind = 0;
+  const int code = supine_command_breathe(argc, argv);
+  (void)fflush(stdout);
+  (void)fflush(stderr);
+  assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
+  (void)close(kept[0]);
+  (void)close(kept[1]);
+  rewind(file);
+  text[fread(text, 1, sizeof text - 1, file)] = '\0';
+  (void)fclose(file);
+  for (int i = 0; i < argc; ++i) {
+    free(argv[i]);
+  }
+  return code;
+}
+
+#define RUN(...) run((const char *const[]){__VA_ARGS__, NULL})
+
+/* Volume, mL, of the triangles whose vertices lie from `begin` to `end`, about the box's centre. */
+static double measure(const float *xyz, const uint32_t *triangles, size_t count, size_t begin,
+                      size_t end) {
+  const double centre[3] = {0.0, -150.0, -95.0};
+  double sum = 0.0;
+  for (size_t t = 0; t < count; ++t) {
+    if (triangles[3 * t] < begin || triangles[3 * t] >= end) {
+      continue;
+    }
+    double p[3][3];
+    for (size_t c = 0; c < 3; ++c) {
+      for (size_t k = 0; k < 3; ++k) {
+        p[c][k] = (double)xyz[3 * (size_t)triangles[3 * t + c] + k] - centre[k];
+      }
+    }
+    sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+           p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+           p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+  }
+  return sum / 6000.0;
+}
+
+/* Largest differences, mL, between the volumes measured on the frames of `breath` and its own, lung
+ * by lung, and between their sum and `wanted` [T]. */
+static void check_volumes(const char *basis_path, const double *wanted, size_t frames) {
+  supine_safetensors *file = NULL;
+  supine_basis *opened = NULL;
+  assert_int_equal(supine_safetensors_open(breath, &file, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_open(basis_path, &opened, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(opened);
+  const supine_tensor *positions = supine_safetensors_find(file, "positions");
+  const supine_tensor *volume = supine_safetensors_find(file, "volume");
+  const supine_tensor *triangles = supine_safetensors_find(file, "triangles");
+  assert_true(positions != NULL && volume != NULL && triangles != NULL);
+  assert_int_equal(positions->shape[0], frames);
+  assert_int_equal(positions->shape[1], info->vertex_count);
+  assert_int_equal(volume->shape[1], info->lung_count);
+  double by_lung = 0.0;
+  double total = 0.0;
+  for (size_t t = 0; t < frames; ++t) {
+    const float *xyz = (const float *)positions->data + 3 * t * info->vertex_count;
+    double sum = 0.0;
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      const size_t begin = info->lung_begin[lung];
+      const size_t end = info->lung_begin[lung + 1];
+      const double gained =
+          measure(xyz, triangles->data, triangles->shape[0], begin, end) -
+          measure(supine_basis_vertices(opened), triangles->data, triangles->shape[0], begin, end);
+      const double said = ((const double *)volume->data)[t * info->lung_count + lung];
+      by_lung = fmax(by_lung, fabs(gained - said));
+      sum += gained;
+    }
+    total = fmax(total, fabs(sum - wanted[t]));
+  }
+  printf("%zu frames: volumes within %.4f mL by lung, %.4f mL in all\n", frames, by_lung, total);
+  assert_true(by_lung < 0.05);
+  assert_true(total < 0.05);
+  supine_safetensors_close(file);
+  supine_basis_close(opened);
+}
+
+/* V(t) of the default breath, as `supine pv` knows it. */
+static double *breath_of(const supine_pv_breath *course, double fps, size_t frames) {
+  double *time = malloc(frames * sizeof *time);
+  double *volume = malloc(frames * sizeof *volume);
+  for (size_t t = 0; t < frames; ++t) {
+    time[t] = (double)t / fps;
+  }
+  assert_int_equal(
+      supine_pv_breath_evaluate(supine_pv_normal(), course, frames, time, volume, NULL, NULL),
+      SUPINE_OK);
+  free(time);
+  return volume;
+}
+
+static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  char real[80];
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+  }
+  (void)snprintf(real, sizeof real, "%s/real", folder);
+  for (int ill = 0; ill < 2; ++ill) { /* then with the left lung collapsed */
+    lungs.share[0] = ill == 1 ? 0.3 : 1.0;
+    assert_int_equal(make_basis(&lungs, real), SUPINE_OK);
+    assert_int_equal(RUN(real, "--turn", "supine:left:5s", "-o", breath), SUPINE_EXIT_OK);
+    const supine_pv_breath course = supine_pv_breath_default();
+    double *wanted = breath_of(&course, 66.66, 334);
+    check_volumes(real, wanted, 334);
+    free(wanted);
+  }
+  (void)unlink(real);
+  supine_lungs_free(&lungs);
+}
+
+static void test_breathe_one_posture_three_additions_keep_volumes(void **state) {
+  (void)state;
+  supine_pv_breath course = supine_pv_breath_default();
+  assert_int_equal(RUN(basis, "--posture", "prone", "--step", "1.5", "-o", breath), SUPINE_EXIT_OK);
+  course.course = SUPINE_PV_CONSTANT_FLOW; /* 1.5 mL a frame: 5 s of inhalation */
+  course.inhale_fraction = 0.5;
+  course.rate = 60.0 / (2.0 * 500.0 / (1.5 * 66.66));
+  double *wanted = breath_of(&course, 66.66, 667);
+  for (size_t t = 0; t < 333; ++t) {
+    assert_true(fabs(wanted[t] - 1.5 * (double)t) < 1e-9);
+  }
+  check_volumes(basis, wanted, 667);
+  size_t stepped = 0;
+  const char *said = strstr(text, "one posture: ");
+  assert_non_null(said);
+  assert_int_equal(sscanf(said, "one posture: %zu", &stepped), 1);
+  assert_true(stepped > 600);
+  assert_non_null(strstr(text, "of 15 ms"));
+  free(wanted);
+
+  course = supine_pv_breath_default();
+  assert_int_equal(RUN(basis, "--posture", "left", "--seconds", "6", "-o", breath), SUPINE_EXIT_OK);
+  wanted = breath_of(&course, 66.66, 400);
+  check_volumes(basis, wanted, 400);
+  free(wanted);
+}
+
+static void test_breathe_options_shape_the_breath(void **state) {
+  (void)state;
+  const supine_pv_breath course = {.tidal = 300.0,
+                                   .rate = 20.0,
+                                   .inhale_fraction = 0.4,
+                                   .rest_pressure = 8.0,
+                                   .course = SUPINE_PV_RAMP};
+  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "300", "--rate", "20", "--inhale",
+                       "0.4", "--rest-pressure", "8", "--course", "ramp", "--fps", "30", "-o",
+                       breath),
+                   SUPINE_EXIT_OK);
+  double *wanted = breath_of(&course, 30.0, 91); /* 3 s */
+  check_volumes(basis, wanted, 91);
+  free(wanted);
+}
+
+static void test_breathe_series_lists_every_frame_and_its_time(void **state) {
+  (void)state;
+  assert_int_equal(RUN(basis, "--turn", "supine:left:2s", "--fps", "5", "-o", series),
+                   SUPINE_EXIT_OK);
+  FILE *file = fopen(series, "rb");
+  assert_non_null(file);
+  static char index[16384];
+  index[fread(index, 1, sizeof index - 1, file)] = '\0';
+  (void)fclose(file);
+  for (size_t t = 0; t <= 10; ++t) {
+    char line[128];
+    char path[128];
+    struct stat found;
+    (void)snprintf(line, sizeof line,
+                   "timestep=\"%.9g\" part=\"0\" file=\"a &amp; b/frame_%05zu.vtp\"",
+                   (double)t / 5.0, t);
+    assert_non_null(strstr(index, line));
+    (void)snprintf(path, sizeof path, "%s/frame_%05zu.vtp", series_folder, t);
+    assert_int_equal(stat(path, &found), 0);
+    assert_true(found.st_size > 1000);
+  }
+  assert_null(strstr(index, "frame_00011"));
+  assert_int_equal(empty(series_folder), 12); /* and the table */
+  assert_int_equal(rmdir(series_folder), 0);
+}
+
+static void test_breathe_folder_in_use_is_left_alone(void **state) {
+  (void)state;
+  char inside[128];
+  struct stat found;
+  (void)snprintf(inside, sizeof inside, "%s/precious", series_folder);
+  assert_int_equal(mkdir(series_folder, 0777), 0);
+  FILE *file = fopen(inside, "wb");
+  assert_non_null(file);
+  (void)fclose(file);
+  assert_int_equal(RUN(basis, "--posture", "supine", "-o", series_folder), SUPINE_EXIT_OUTPUT);
+  assert_non_null(strstr(text, "something in this folder already"));
+  assert_int_equal(stat(inside, &found), 0);
+  assert_int_equal(empty(series_folder), 1);
+  /* An empty one is fine. */
+  assert_int_equal(
+      RUN(basis, "--posture", "supine", "--fps", "4", "--seconds", "1", "-o", series_folder),
+      SUPINE_EXIT_OK);
+  assert_int_equal(empty(series_folder), 7); /* 5 frames, breath.pvd, breath.csv */
+  assert_int_equal(rmdir(series_folder), 0);
+  assert_int_equal(RUN(basis, "--posture", "supine", "-o", "/nowhere/a.pvd"), SUPINE_EXIT_OUTPUT);
+  assert_int_equal(RUN(basis, "--posture", "supine", "-o", "/nowhere/a.safetensors"),
+                   SUPINE_EXIT_OUTPUT);
+  assert_int_equal(count_names("a & b"), 1); /* the series' index of the test before */
+}
+
+static void test_breathe_bad_arguments_are_usage_errors(void **state) {
+  (void)state;
+  static const char *const bad[][2] = {{"--rate", "0"},
+                                       {"--rate", "-3"},
+                                       {"--rate", "often"},
+                                       {"--tidal", "0"},
+                                       {"--inhale", "1"},
+                                       {"--inhale", "0"},
+                                       {"--fps", "0"},
+                                       {"--seconds", "-1"},
+                                       {"--step", "0"},
+                                       {"--course", "sine"},
+                                       {"--turn", "supine:left"},
+                                       {"--turn", "supine:left:0s"},
+                                       {"--turn", "supine:up:3"},
+                                       {"--turn", "supine:left:soon"},
+                                       {"--rest-pressure", "x"},
+                                       {"--fps", "1e9"},
+                                       {"--posture", "suppine"},
+                                       {"--bogus", "1"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    const bool posture = strcmp(bad[i][0], "--turn") != 0 && strcmp(bad[i][0], "--posture") != 0;
+    const int code = posture ? RUN(basis, "--posture", "supine", "-o", breath, bad[i][0], bad[i][1])
+                             : RUN(basis, "-o", breath, bad[i][0], bad[i][1]);
+    if (code != SUPINE_EXIT_USAGE) {
+      fail_msg("%s %s: exit code %d: %s", bad[i][0], bad[i][1], code, text);
+    }
+  }
+  assert_int_equal(RUN(basis, "-o", breath), SUPINE_EXIT_USAGE);
+  assert_int_equal(RUN(basis, "--posture", "supine"), SUPINE_EXIT_USAGE);
+  assert_int_equal(RUN("--posture", "supine", "-o", breath), SUPINE_EXIT_USAGE);
+  assert_int_equal(RUN(basis, "--posture", "left", "--turn", "supine:left:3", "-o", breath),
+                   SUPINE_EXIT_USAGE);
+}
+
+static void test_breathe_bad_input_names_the_remedy(void **state) {
+  (void)state;
+  assert_int_equal(RUN("/nowhere", "--posture", "supine", "-o", breath), SUPINE_EXIT_INPUT);
+  assert_int_equal(RUN(open_basis, "--posture", "supine", "-o", breath), SUPINE_EXIT_INPUT);
+  assert_non_null(strstr(text, "close the mesh"));
+  assert_int_equal(RUN(basis, "--posture", "supine", "--pv", "/nowhere", "-o", breath),
+                   SUPINE_EXIT_INPUT);
+  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "90000", "-o", breath),
+                   SUPINE_EXIT_USAGE);
+  assert_non_null(strstr(text, "90000"));
+}
+
+static void test_breathe_interrupted_leaves_nothing(void **state) {
+  (void)state;
+  const size_t before = count_names("");
+  const pid_t child = fork();
+  if (child == 0) {
+    (void)freopen("/dev/null", "wb", stderr);
+    char *argv[] = {"breathe", basis, "--posture",   "supine", "--seconds",
+                    "3000",    "-o",  series_folder, NULL};
+    optind = 0;
+    _exit(supine_command_breathe(8, argv));
+  }
+  assert_true(child > 0);
+  for (int i = 0; i < 200 && count_names("a & b.part-") == 0; ++i) {
+    (void)nanosleep(&(struct timespec){0, 10000000}, NULL);
+  }
+  (void)nanosleep(&(struct timespec){0, 50000000}, NULL);
+  assert_int_equal(kill(child, SIGINT), 0);
+  int how = 0;
+  assert_int_equal(waitpid(child, &how, 0), child);
+  assert_true(WIFEXITED(how));
+  assert_int_equal(WEXITSTATUS(how), SUPINE_EXIT_OUTPUT);
+  assert_int_equal(count_names(""), before);
+}
+
+static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
+  (void)state;
+  static const double turns[][6] = {{0, 1, 0, 1, 0, 0},  {0, 1, 0, 0, -1, 0},
+                                    {0, 0, -1, 0, 0, 1}, {1, 0, 0, -1, 0, 0},
+                                    {0, 1, 0, 0, 1, 0},  {0.6, 0, -0.8, 0, 0.28, 0.96}};
+  static const double middles[][3] = {
+      {M_SQRT1_2, M_SQRT1_2, 0}, {1, 0, 0}, {0, 1, 0}, {0, 1, 0}, {0, 1, 0}};
+  for (size_t i = 0; i < 6; ++i) {
+    breath_turn turn = {.seconds = 8.0};
+    memcpy(turn.from, turns[i], sizeof turn.from);
+    memcpy(turn.to, turns[i] + 3, sizeof turn.to);
+    double last[3];
+    double angle = -1.0;
+    for (int s = 0; s <= 8; ++s) {
+      double g[3];
+      breath_turn_gravity(&turn, s, g);
+      assert_true(fabs(hypot(hypot(g[0], g[1]), g[2]) - 1.0) < 1e-12);
+      if (s > 0) {
+        const double step = hypot(hypot(g[0] - last[0], g[1] - last[1]), g[2] - last[2]);
+        assert_true(angle < 0.0 || fabs(step - angle) < 1e-7);
+        angle = step;
+      } else {
+        assert_true(fabs(g[0] - turn.from[0]) + fabs(g[1] - turn.from[1]) +
+                        fabs(g[2] - turn.from[2]) <
+                    1e-12);
+      }
+      if (s == 4 && i < 5) {
+        for (size_t k = 0; k < 3; ++k) {
+          assert_true(fabs(g[k] - middles[i][k]) < 1e-7);
+        }
+      }
+      memcpy(last, g, sizeof last);
+    }
+    assert_memory_equal(last, turn.to, sizeof last);
+    breath_turn_gravity(&turn, 100.0, last);
+    assert_memory_equal(last, turn.to, sizeof last);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_breathe_real_lungs_turning_volumes_exact_in_every_frame),
+      cmocka_unit_test(test_breathe_one_posture_three_additions_keep_volumes),
+      cmocka_unit_test(test_breathe_options_shape_the_breath),
+      cmocka_unit_test(test_breathe_series_lists_every_frame_and_its_time),
+      cmocka_unit_test(test_breathe_folder_in_use_is_left_alone),
+      cmocka_unit_test(test_breathe_bad_arguments_are_usage_errors),
+      cmocka_unit_test(test_breathe_bad_input_names_the_remedy),
+      cmocka_unit_test(test_breathe_interrupted_leaves_nothing),
+      cmocka_unit_test(test_turn_is_even_and_stays_on_the_sphere),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

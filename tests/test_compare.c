@@ -1,0 +1,591 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Comparing orientations: the Gram matrices against every vertex, the search, slabs by height. */
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/compare.h>
+
+#include "runtime_fixture.h"
+
+enum { LUNGS_MAX = 3 };
+
+static void check_near(double found, double wanted, double tolerance, int line) {
+  if (!(fabs(found - wanted) <= tolerance)) {
+    fail_msg("line %d: %.17g instead of %.17g +- %g", line, found, wanted, tolerance);
+  }
+}
+#define assert_near(found, wanted, tolerance) check_near(found, wanted, tolerance, __LINE__)
+
+/* A made basis, opened, with its comparison. */
+typedef struct made {
+  fixture *f;
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_compare *compare;
+} made;
+
+static made make(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
+                 bool volume) {
+  made m = {.f = fixture_create(vertices, modes, band, lungs, vector, volume, 6.3, 20041)};
+  size_t size = 0;
+  m.bytes = fixture_bytes(m.f, &size);
+  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  assert_int_equal(supine_basis_open_memory_with(m.bytes, size, &exact, &m.basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
+  return m;
+}
+
+static void unmake(made *m) {
+  supine_compare_destroy(m->compare);
+  supine_basis_close(m->basis);
+  free(m->bytes);
+  fixture_destroy(m->f);
+}
+
+static void random_direction(uint64_t *state, double g[3]) {
+  do {
+    for (int i = 0; i < 3; ++i) {
+      g[i] = fixture_random(state);
+    }
+  } while (g[0] * g[0] + g[1] * g[1] + g[2] * g[2] < 0.01);
+}
+
+/* Area of each vertex over that of all, by Heron's formula. */
+static double *area_shares(const fixture *f) {
+  double *share = calloc(f->vertices, sizeof *share);
+  assert_non_null(share);
+  double total = 0;
+  for (size_t t = 0; t < f->triangles; ++t) {
+    const uint32_t *corner = f->triangle + 3 * t;
+    double side[3];
+    for (int v = 0; v < 3; ++v) {
+      const float *a = f->vertex + 3 * corner[v];
+      const float *b = f->vertex + 3 * corner[(v + 1) % 3];
+      side[v] = hypot(hypot((double)a[0] - (double)b[0], (double)a[1] - (double)b[1]),
+                      (double)a[2] - (double)b[2]);
+    }
+    const double s = (side[0] + side[1] + side[2]) / 2;
+    const double area = sqrt(s * (s - side[0]) * (s - side[1]) * (s - side[2]));
+    total += area;
+    for (int v = 0; v < 3; ++v) {
+      share[corner[v]] += area / 3;
+    }
+  }
+  for (size_t i = 0; i < f->vertices; ++i) {
+    share[i] /= total;
+  }
+  return share;
+}
+
+typedef struct pair {
+  double weights[2][SUPINE_MODES_MAX];
+  double scales[2][LUNGS_MAX];
+} pair;
+
+static pair random_pair(const made *m, uint64_t *state) {
+  pair p;
+  for (int side = 0; side < 2; ++side) {
+    double g[3];
+    random_direction(state, g);
+    assert_int_equal(supine_basis_weights(m->basis, g, p.weights[side]), SUPINE_OK);
+    for (int lung = 0; lung < LUNGS_MAX; ++lung) {
+      p.scales[side][lung] = 1.5 + fixture_random(state);
+    }
+  }
+  return p;
+}
+
+/* Distances of every vertex in double precision, from two deformed surfaces. */
+static double *direct_distances(const made *m, const pair *p) {
+  const size_t n = m->f->vertices;
+  double *a = malloc(3 * n * sizeof *a);
+  double *b = malloc(3 * n * sizeof *b);
+  double *distance = malloc(n * sizeof *distance);
+  assert_true(a && b && distance);
+  fixture_deform(m->f, p->weights[0], p->scales[0], a);
+  fixture_deform(m->f, p->weights[1], p->scales[1], b);
+  for (size_t i = 0; i < n; ++i) {
+    distance[i] =
+        hypot(hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1]), a[3 * i + 2] - b[3 * i + 2]);
+  }
+  free(a);
+  free(b);
+  return distance;
+}
+
+static void check_rms(bool vector, size_t modes, size_t lungs) {
+  made m = make(2003, modes, 4, lungs, vector, false);
+  double *share = area_shares(m.f);
+  uint64_t state = 77;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const pair p = random_pair(&m, &state);
+    double *distance = direct_distances(&m, &p);
+    double square = 0;
+    for (size_t i = 0; i < m.f->vertices; ++i) {
+      square += share[i] * distance[i] * distance[i];
+    }
+    const double rms =
+        supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]);
+    assert_near(rms, sqrt(square), 1e-6 * sqrt(square));
+    assert_true(
+        rms == supine_compare_rms(m.compare, p.weights[1], p.scales[1], p.weights[0], p.scales[0]));
+    assert_true(
+        0 == supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[0], p.scales[0]));
+    free(distance);
+  }
+  free(share);
+  unmake(&m);
+}
+
+static void test_rms_scalar_basis_equals_every_vertex(void **state) {
+  (void)state;
+  check_rms(false, 16, 2);
+  check_rms(false, 5, 3);
+  check_rms(false, 1, 1);
+}
+
+static void test_rms_vector_basis_equals_every_vertex(void **state) {
+  (void)state;
+  check_rms(true, 9, 2);
+}
+
+static void test_rms_to_rest_equals_scale_zero(void **state) {
+  (void)state;
+  made m = make(501, 7, 3, 2, false, false);
+  uint64_t random = 5;
+  pair p = random_pair(&m, &random);
+  p.scales[1][0] = p.scales[1][1] = 0;
+  assert_true(supine_compare_rms(m.compare, p.weights[0], p.scales[0], NULL, NULL) ==
+              supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]));
+  unmake(&m);
+}
+
+typedef struct ranked {
+  double distance, share;
+} ranked;
+
+static int by_distance(const void *a, const void *b) {
+  const double x = ((const ranked *)a)->distance;
+  const double y = ((const ranked *)b)->distance;
+  return (x > y) - (x < y);
+}
+
+static void test_statistics_random_pairs_equal_sorting(void **state) {
+  (void)state;
+  made m = make(3001, 11, 3, 2, false, false);
+  double *share = area_shares(m.f);
+  float *distance = malloc(m.f->vertices * sizeof *distance);
+  ranked *sorted = malloc(m.f->vertices * sizeof *sorted);
+  assert_true(distance && sorted);
+  uint64_t random = 991;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    const pair p = random_pair(&m, &random);
+    double *direct = direct_distances(&m, &p);
+    double mean = 0;
+    double square = 0;
+    double total = 0;
+    for (size_t i = 0; i < m.f->vertices; ++i) {
+      mean += share[i] * direct[i];
+      square += share[i] * direct[i] * direct[i];
+      sorted[i] = (ranked){direct[i], share[i]};
+    }
+    qsort(sorted, m.f->vertices, sizeof *sorted, by_distance);
+    size_t at = 0;
+    while (total + sorted[at].share < 0.95) {
+      total += sorted[at++].share;
+    }
+    supine_distance_statistics found;
+    supine_compare_distances(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1],
+                             distance);
+    supine_compare_statistics(m.compare, distance, &found);
+    assert_near(found.mean, mean, 1e-6 * mean);
+    assert_near(found.rms, sqrt(square), 1e-6 * sqrt(square));
+    assert_near(found.p95, sorted[at].distance, 1e-6 * mean);
+    assert_near(found.max, sorted[m.f->vertices - 1].distance, 1e-6 * found.max);
+    assert_near(found.rms,
+                supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]),
+                1e-6 * found.rms);
+    free(direct);
+  }
+  memset(distance, 0, m.f->vertices * sizeof *distance);
+  supine_distance_statistics none;
+  supine_compare_statistics(m.compare, distance, &none);
+  assert_true(none.mean == 0 && none.rms == 0 && none.p95 == 0 && none.max == 0);
+  free(sorted);
+  free(distance);
+  free(share);
+  unmake(&m);
+}
+
+static void test_energy_sums_to_mean_square_over_sphere(void **state) {
+  (void)state;
+  enum { LATITUDES = 12, LONGITUDES = 25, BAND = 4 };
+  made m = make(301, 6, BAND, 2, true, false);
+  double energy[BAND + 1];
+  supine_compare_energy(m.compare, energy);
+  double total = 0;
+  for (int l = 0; l <= BAND; ++l) {
+    assert_true(energy[l] >= 0);
+    total += energy[l];
+  }
+  /* Longitudes equispaced, exact to band 2 BAND; latitudes by Fejer's first rule, exact to degree
+   * LATITUDES - 1 >= 2 BAND in z. */
+  double mean = 0;
+  for (int j = 0; j < LATITUDES; ++j) {
+    const double turn = 3.14159265358979323846 * (2 * j + 1) / (2.0 * LATITUDES);
+    double weight = 1;
+    for (int k = 1; k <= LATITUDES / 2; ++k) {
+      weight -= 2 * cos(2 * k * turn) / (4.0 * k * k - 1);
+    }
+    weight *= 2.0 / LATITUDES;
+    for (int k = 0; k < LONGITUDES; ++k) {
+      const double around = 2 * 3.14159265358979323846 * k / LONGITUDES;
+      const double g[3] = {sin(turn) * cos(around), sin(turn) * sin(around), cos(turn)};
+      double weights[SUPINE_MODES_MAX];
+      const double scales[2] = {1, 1};
+      assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
+      const double rms = supine_compare_rms(m.compare, weights, scales, NULL, NULL);
+      mean += weight / (2.0 * LONGITUDES) * rms * rms;
+    }
+  }
+  assert_near(total, mean, 1e-12 * mean);
+  unmake(&m);
+}
+
+static void test_scale_each_inflation_reaches_it(void **state) {
+  (void)state;
+  made m = make(401, 6, 3, 2, false, true);
+  const double g[3] = {0.3, -0.5, 0.7};
+  double weights[SUPINE_MODES_MAX];
+  double scale = 0;
+  assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
+  supine_inflation inflation = {SUPINE_INFLATION_RMS, 3.7};
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  const double scales[2] = {scale, scale};
+  assert_near(supine_compare_rms(m.compare, weights, scales, NULL, NULL), 3.7, 1e-12);
+  inflation = (supine_inflation){SUPINE_INFLATION_SCALE, 0.37};
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  assert_true(scale == 0.37);
+  const double volume = supine_basis_lung_volume(m.basis, 0, weights, 0.11) +
+                        supine_basis_lung_volume(m.basis, 1, weights, 0.11);
+  inflation = (supine_inflation){SUPINE_INFLATION_VOLUME, volume};
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  assert_near(scale, 0.11, 1e-9);
+  unmake(&m);
+}
+
+static void test_scale_open_or_still_is_refused(void **state) {
+  (void)state;
+  made m = make(401, 6, 3, 2, false, false);
+  const double still[6] = {0};
+  double scale = 0;
+  supine_error error;
+  supine_inflation inflation = {SUPINE_INFLATION_VOLUME, 100};
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, &scale, &error),
+                   SUPINE_ERROR_OPEN_SURFACE);
+  inflation.kind = SUPINE_INFLATION_RMS;
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, &scale, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  unmake(&m);
+}
+
+static void test_create_surface_without_area_is_refused(void **state) {
+  (void)state;
+  fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
+  memset(f->vertex, 0, 3 * f->vertices * sizeof *f->vertex);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  supine_compare *compare = NULL;
+  supine_error error;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(basis, &compare, &error), SUPINE_ERROR_MESH);
+  assert_null(compare);
+  supine_compare_destroy(NULL);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+static double rms_of_directions(const made *m, const supine_inflation *inflation, const double a[3],
+                                const double b[3]) {
+  double weights[2][SUPINE_MODES_MAX];
+  double scales[2][LUNGS_MAX];
+  const double *g[2] = {a, b};
+  for (int side = 0; side < 2; ++side) {
+    double scale = 0;
+    assert_int_equal(supine_basis_weights(m->basis, g[side], weights[side]), SUPINE_OK);
+    assert_int_equal(supine_compare_scale(m->compare, inflation, weights[side], &scale, NULL),
+                     SUPINE_OK);
+    scales[side][0] = scales[side][1] = scales[side][2] = scale;
+  }
+  return supine_compare_rms(m->compare, weights[0], scales[0], weights[1], scales[1]);
+}
+
+static void test_search_finds_what_no_random_direction_beats(void **state) {
+  (void)state;
+  static const double supine[3] = {0, 1, 0};
+  made m = make(601, 9, 3, 2, false, false);
+  const supine_inflation inflation = {SUPINE_INFLATION_SCALE, 0.8};
+  supine_extremes found;
+  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 1000, &found, NULL),
+                   SUPINE_OK);
+  assert_int_equal(found.directions, 1000);
+  assert_near(found.pair_rms, rms_of_directions(&m, &inflation, found.pair[0], found.pair[1]),
+              1e-9);
+  assert_near(found.farthest_rms, rms_of_directions(&m, &inflation, supine, found.farthest), 1e-9);
+  uint64_t random = 3;
+  for (int repeat = 0; repeat < 20000; ++repeat) {
+    double a[3];
+    double b[3];
+    random_direction(&random, a);
+    random_direction(&random, b);
+    assert_true(rms_of_directions(&m, &inflation, a, b) <= found.pair_rms);
+    assert_true(rms_of_directions(&m, &inflation, a, supine) <= found.farthest_rms);
+  }
+  unmake(&m);
+}
+
+/* One mode, Y(1,0): the displacement follows g_z, so that up and down differ most. */
+static void test_search_one_axis_finds_its_poles(void **state) {
+  (void)state;
+  fixture *f = fixture_create(203, 1, 1, 1, false, false, 5, 41);
+  memset(f->mode, 0, 4 * sizeof *f->mode);
+  f->mode[2] = 1;
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  made m = {.f = f, .bytes = bytes};
+  assert_int_equal(supine_basis_open_memory(bytes, size, &m.basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
+  const supine_inflation inflation = {SUPINE_INFLATION_SCALE, 1};
+  const double tilted[3] = {0, 3, 1}; /* any length; its pole is the far one, -z */
+  supine_extremes found;
+  assert_int_equal(supine_compare_search(m.compare, &inflation, tilted, 500, &found, NULL),
+                   SUPINE_OK);
+  assert_near(fabs(found.pair[0][2]), 1, 1e-10);
+  assert_near(found.pair[0][2], -found.pair[1][2], 1e-10);
+  assert_near(found.farthest[2], -1, 1e-10);
+  unmake(&m);
+}
+
+static void test_search_bad_arguments_are_refused(void **state) {
+  (void)state;
+  made m = make(203, 4, 2, 1, false, false);
+  supine_inflation inflation = {SUPINE_INFLATION_SCALE, 1};
+  supine_extremes found;
+  supine_error error;
+  const double supine[3] = {0, 1, 0};
+  const double none[3] = {0, 0, 0};
+  const double nan[3] = {0, NAN, 0};
+  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 1, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 16385, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_search(m.compare, &inflation, none, 100, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_search(m.compare, &inflation, nan, 100, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  inflation.kind = SUPINE_INFLATION_VOLUME;
+  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 100, &found, &error),
+                   SUPINE_ERROR_OPEN_SURFACE);
+  unmake(&m);
+}
+
+/* x + M x + shift for every vertex. */
+static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
+  float *xyz = malloc(3 * f->vertices * sizeof *xyz);
+  assert_non_null(xyz);
+  for (size_t i = 0; i < f->vertices; ++i) {
+    const float *p = f->vertex + 3 * i;
+    for (size_t row = 0; row < 3; ++row) {
+      xyz[3 * i + row] =
+          (float)((double)p[row] + matrix[row][0] * (double)p[0] + matrix[row][1] * (double)p[1] +
+                  matrix[row][2] * (double)p[2] + shift[row]);
+    }
+  }
+  return xyz;
+}
+
+enum { SLABS = 10 };
+
+static void test_slabs_at_rest_hold_the_volume_of_the_lung(void **state) {
+  (void)state;
+  made m = make(902, 4, 2, 2, false, true);
+  double *rest = malloc(3 * m.f->vertices * sizeof *rest);
+  assert_non_null(rest);
+  for (size_t i = 0; i < 3 * m.f->vertices; ++i) {
+    rest[i] = (double)m.f->vertex[i];
+  }
+  uint64_t random = 12;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    supine_slab slabs[2 * SLABS];
+    double g[3];
+    random_direction(&random, g);
+    assert_int_equal(supine_compare_slabs(m.basis, g, m.f->vertex, SLABS, slabs, NULL), SUPINE_OK);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      double volume = 0;
+      for (size_t s = 0; s < SLABS; ++s) {
+        assert_true(slabs[lung * SLABS + s].gain == 0);
+        assert_true(slabs[lung * SLABS + s].volume >= -1e-9);
+        volume += slabs[lung * SLABS + s].volume;
+      }
+      const double whole = fixture_volume(m.f, lung, rest);
+      assert_near(volume, whole, 1e-9 * whole);
+    }
+  }
+  free(rest);
+  unmake(&m);
+}
+
+/* A slab of the bipyramid seen along its axis z, of half height h: the part within z of a tip has
+ * (z/h)^3 of half the volume. The corners of the ring are moved to one height for this. */
+static void test_slabs_of_bipyramid_follow_the_cube(void **state) {
+  (void)state;
+  fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
+  for (size_t i = 0; i < 600; ++i) {
+    f->vertex[3 * i + 2] = 0;
+  }
+  f->vertex[3 * 600 + 2] = -100;
+  f->vertex[3 * 601 + 2] = 100;
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  const double g[3] = {0, 0, -2.5};
+  supine_slab slabs[SLABS];
+  assert_int_equal(supine_compare_slabs(basis, g, f->vertex, SLABS, slabs, NULL), SUPINE_OK);
+  double whole = 0;
+  for (size_t s = 0; s < SLABS; ++s) {
+    whole += slabs[s].volume;
+  }
+  for (size_t s = 0; s < SLABS / 2; ++s) {
+    const double part = (pow((double)(s + 1) / 5, 3) - pow((double)s / 5, 3)) / 2;
+    assert_near(slabs[s].volume / whole, part, 1e-6);
+    assert_near(slabs[SLABS - 1 - s].volume / whole, part, 1e-6);
+  }
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+/* Every displacement that is linear in position gains trace(M) of a slab's volume, to first order
+ * in M (here 1e-3); positions are floats. */
+static void check_linear(const double matrix[3][3], const double shift[3], double tolerance) {
+  made m = make(902, 4, 2, 2, false, true);
+  float *xyz = moved(m.f, matrix, shift);
+  const double trace = matrix[0][0] + matrix[1][1] + matrix[2][2];
+  uint64_t random = 121;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    supine_slab slabs[2 * SLABS];
+    double g[3];
+    random_direction(&random, g);
+    assert_int_equal(supine_compare_slabs(m.basis, g, xyz, SLABS, slabs, NULL), SUPINE_OK);
+    for (size_t s = 0; s < 2 * SLABS; ++s) {
+      assert_near(slabs[s].gain, trace * slabs[s].volume, tolerance);
+    }
+  }
+  free(xyz);
+  unmake(&m);
+}
+
+static void test_slabs_translation_gains_nothing(void **state) {
+  (void)state;
+  const double still[3][3] = {{0}};
+  const double shift[3] = {1.7, -2.9, 3.3};
+  check_linear(still, shift, 1e-3); /* mL, of slabs of about 100: float positions */
+}
+
+static void test_slabs_linear_displacement_gains_its_trace(void **state) {
+  (void)state;
+  const double none[3] = {0, 0, 0};
+  const double swelling[3][3] = {{1e-3, 0, 0}, {0, 1e-3, 0}, {0, 0, 1e-3}};
+  const double turning[3][3] = {{0, -7e-4, 3e-4}, {7e-4, 0, -9e-4}, {-3e-4, 9e-4, 0}};
+  const double any[3][3] = {{4e-4, 8e-4, -3e-4}, {2e-4, -6e-4, 5e-4}, {-9e-4, 1e-4, 7e-4}};
+  check_linear(swelling, none, 3e-3);
+  check_linear(turning, none, 3e-3);
+  check_linear(any, none, 3e-3);
+}
+
+static void test_slabs_of_any_state_sum_to_the_exact_volume(void **state) {
+  (void)state;
+  made m = make(1203, 7, 3, 2, false, true);
+  float *xyz = malloc(3 * m.f->vertices * sizeof *xyz);
+  assert_non_null(xyz);
+  uint64_t random = 17;
+  for (int repeat = 0; repeat < 10; ++repeat) {
+    supine_slab slabs[2 * SLABS];
+    double g[3];
+    double weights[SUPINE_MODES_MAX];
+    const double scales[2] = {0.7, 1.2};
+    random_direction(&random, g);
+    assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
+    supine_deform(m.basis, weights, scales, xyz);
+    assert_int_equal(supine_compare_slabs(m.basis, g, xyz, SLABS, slabs, NULL), SUPINE_OK);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      double gain = 0;
+      for (size_t s = 0; s < SLABS; ++s) {
+        gain += slabs[lung * SLABS + s].gain;
+      }
+      assert_near(gain, supine_basis_lung_volume(m.basis, lung, weights, scales[lung]),
+                  1e-3); /* mL: float positions */
+    }
+  }
+  free(xyz);
+  unmake(&m);
+}
+
+static void test_slabs_bad_arguments_are_refused(void **state) {
+  (void)state;
+  made open = make(203, 4, 2, 1, false, false);
+  made closed = make(203, 4, 2, 1, false, true);
+  const double g[3] = {0, 1, 0};
+  const double none[3] = {0, 0, 0};
+  const double infinite[3] = {INFINITY, 0, 0};
+  supine_slab slabs[SUPINE_SLABS_MAX];
+  supine_error error;
+  assert_int_equal(supine_compare_slabs(open.basis, g, open.f->vertex, 10, slabs, &error),
+                   SUPINE_ERROR_OPEN_SURFACE);
+  assert_int_equal(supine_compare_slabs(closed.basis, none, closed.f->vertex, 10, slabs, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_slabs(closed.basis, infinite, closed.f->vertex, 10, slabs, NULL),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_slabs(closed.basis, g, closed.f->vertex, 0, slabs, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(
+      supine_compare_slabs(closed.basis, g, closed.f->vertex, SUPINE_SLABS_MAX + 1, slabs, &error),
+      SUPINE_ERROR_ARGUMENT);
+  unmake(&open);
+  unmake(&closed);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_rms_scalar_basis_equals_every_vertex),
+      cmocka_unit_test(test_rms_vector_basis_equals_every_vertex),
+      cmocka_unit_test(test_rms_to_rest_equals_scale_zero),
+      cmocka_unit_test(test_statistics_random_pairs_equal_sorting),
+      cmocka_unit_test(test_energy_sums_to_mean_square_over_sphere),
+      cmocka_unit_test(test_scale_each_inflation_reaches_it),
+      cmocka_unit_test(test_scale_open_or_still_is_refused),
+      cmocka_unit_test(test_create_surface_without_area_is_refused),
+      cmocka_unit_test(test_search_finds_what_no_random_direction_beats),
+      cmocka_unit_test(test_search_one_axis_finds_its_poles),
+      cmocka_unit_test(test_search_bad_arguments_are_refused),
+      cmocka_unit_test(test_slabs_at_rest_hold_the_volume_of_the_lung),
+      cmocka_unit_test(test_slabs_of_bipyramid_follow_the_cube),
+      cmocka_unit_test(test_slabs_translation_gains_nothing),
+      cmocka_unit_test(test_slabs_linear_displacement_gains_its_trace),
+      cmocka_unit_test(test_slabs_of_any_state_sum_to_the_exact_volume),
+      cmocka_unit_test(test_slabs_bad_arguments_are_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

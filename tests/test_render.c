@@ -1,0 +1,345 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Pictures: views, colours, bars, and what the GPU draws. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/compare.h>
+
+#include "../runtime/render/render.h"
+#include "runtime_fixture.h"
+
+static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
+  (void)state;
+  for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
+    double a[3][3];
+    assert_non_null(supine_view_name(view));
+    supine_view_axes(view, a);
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      const int k = (i + 2) % 3;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int next = (axis + 1) % 3;
+        const int last = (axis + 2) % 3;
+        const double cross = a[i][next] * a[j][last] - a[i][last] * a[j][next];
+        assert_true(fabs(cross - a[k][axis]) < 1e-14);
+      }
+    }
+  }
+  assert_null(supine_view_name(SUPINE_VIEW_COUNT));
+}
+
+/* In front of the patient his left is on the right; the viewer from the left looks to the right. */
+static void test_view_axes_look_where_their_names_say(void **state) {
+  (void)state;
+  static const struct {
+    supine_view view;
+    double towards[3];
+  } cases[] = {{SUPINE_VIEW_ANTERIOR, {0, -1, 0}}, {SUPINE_VIEW_POSTERIOR, {0, 1, 0}},
+               {SUPINE_VIEW_LEFT, {1, 0, 0}},      {SUPINE_VIEW_RIGHT, {-1, 0, 0}},
+               {SUPINE_VIEW_HEAD, {0, 0, 1}},      {SUPINE_VIEW_FEET, {0, 0, -1}}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    double axes[3][3];
+    supine_view_axes(cases[i].view, axes);
+    assert_memory_equal(axes[2], cases[i].towards, sizeof axes[2]);
+  }
+}
+
+static double linear(double encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+/* L* of CIE 1976 from sRGB: another measure than the map was made with. */
+static double lightness(const double rgb[3]) {
+  const double y = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
+  return 116 * cbrt(y) - 16;
+}
+
+static void test_colours_grow_lighter_in_even_steps(void **state) {
+  (void)state;
+  enum { STEPS = 64 };
+  double before = 0;
+  for (int i = 0; i <= STEPS; ++i) {
+    double rgb[3];
+    supine_colour(i / (double)STEPS, rgb);
+    const double here = lightness(rgb);
+    for (int k = 0; k < 3; ++k) {
+      assert_true(rgb[k] >= 0 && rgb[k] <= 1);
+    }
+    if (i > 0) {
+      assert_true(here - before > 0.5 && here - before < 1.8); /* about 70 in 64 steps */
+    }
+    before = here;
+  }
+}
+
+static void test_colours_beyond_the_ends_are_the_ends(void **state) {
+  (void)state;
+  double a[3];
+  double b[3];
+  supine_colour(-3, a);
+  supine_colour(0, b);
+  assert_memory_equal(a, b, sizeof a);
+  supine_colour(7, a);
+  supine_colour(1, b);
+  assert_memory_equal(a, b, sizeof a);
+}
+
+static void test_bar_ends_at_a_round_tick(void **state) {
+  (void)state;
+  static const double cases[][3] = {{31.6, 5, 35}, {18.7, 2, 20}, {20, 5, 20}, {0.043, 0.01, 0.05},
+                                    {7.99, 1, 8},  {8, 2, 8},     {0, 0.2, 1}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    assert_true(fabs(supine_bar_step(cases[i][0]) - cases[i][1]) < 1e-12);
+    assert_true(fabs(supine_bar_end(cases[i][0]) - cases[i][2]) < 1e-12);
+  }
+}
+
+/* A made basis, opened, with a renderer where one can be had. */
+typedef struct made {
+  fixture *f;
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_renderer *renderer;
+  float *value;
+} made;
+
+enum { WIDTH = 120, HEIGHT = 100, PIXELS = WIDTH * HEIGHT };
+
+static void unmake(made *m) {
+  if (m->f == NULL) {
+    return;
+  }
+  supine_renderer_destroy(m->renderer);
+  supine_basis_close(m->basis);
+  free(m->bytes);
+  free(m->value);
+  fixture_destroy(m->f);
+}
+
+/* Skips the test where nothing can draw. */
+static made make(fixture *f) {
+  made m = {.f = f};
+  size_t size = 0;
+  supine_error error;
+  m.bytes = fixture_bytes(f, &size);
+  assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
+  m.value = malloc(f->vertices * sizeof *m.value);
+  assert_non_null(m.value);
+  for (size_t i = 0; i < f->vertices; ++i) {
+    m.value[i] = f->vertex[3 * i + 2] * 0.05F + 5;
+  }
+  const supine_status status = supine_renderer_create(m.basis, &m.renderer, &error);
+  if (status == SUPINE_ERROR_UNSUPPORTED) {
+    print_message("skipped: %s\n", error.message);
+    unmake(&m);
+    m = (made){0};
+    skip();
+  }
+  assert_int_equal(status, SUPINE_OK);
+  return m;
+}
+
+static void draw(const made *m, supine_view view, const double *weights, double scale,
+                 uint32_t *pixels) {
+  const double scales[2] = {scale, scale};
+  const supine_scene scene = {.weights = weights,
+                              .scales = scales,
+                              .value = m->value,
+                              .largest = 10,
+                              .view = view,
+                              .width = WIDTH,
+                              .height = HEIGHT};
+  supine_error error;
+  if (supine_renderer_draw(m->renderer, &scene, pixels, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+}
+
+static size_t covered(const uint32_t *pixels) {
+  size_t count = 0;
+  for (size_t i = 0; i < PIXELS; ++i) {
+    count += pixels[i] >> 24 > 127;
+  }
+  return count;
+}
+
+/* Mean difference of the channels, 0 to 255. */
+static double difference(const uint32_t *a, const uint32_t *b) {
+  double sum = 0;
+  for (size_t i = 0; i < PIXELS; ++i) {
+    for (int shift = 0; shift < 32; shift += 8) {
+      sum += fabs((double)(a[i] >> shift & 255U) - (double)(b[i] >> shift & 255U));
+    }
+  }
+  return sum / (4.0 * PIXELS);
+}
+
+static void test_draw_shows_lungs_on_clear_ground(void **state) {
+  (void)state;
+  static uint32_t pixels[PIXELS];
+  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  const double weights[5] = {0};
+  for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
+    draw(&m, view, weights, 1, pixels);
+    assert_in_range(covered(pixels), PIXELS / 8, PIXELS * 9 / 10);
+    assert_int_equal(pixels[0], 0);
+    assert_int_equal(pixels[PIXELS - 1], 0);
+    for (size_t i = 0; i < PIXELS; ++i) {
+      for (int shift = 0; shift < 24; shift += 8) {
+        assert_true((pixels[i] >> shift & 255U) <= pixels[i] >> 24); /* premultiplied */
+      }
+    }
+  }
+  unmake(&m);
+}
+
+/* The made lungs' values grow with z, so that seen from the front the top is lighter. */
+static void test_draw_puts_the_head_on_top(void **state) {
+  (void)state;
+  static uint32_t pixels[PIXELS];
+  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  const double weights[5] = {0};
+  double half[2] = {0, 0};
+  double count[2] = {0, 0};
+  draw(&m, SUPINE_VIEW_ANTERIOR, weights, 1, pixels);
+  for (size_t i = 0; i < PIXELS; ++i) {
+    if (pixels[i] >> 24 == 255) {
+      half[i / (PIXELS / 2)] += pixels[i] >> 8 & 255U;
+      count[i / (PIXELS / 2)] += 1;
+    }
+  }
+  assert_true(half[0] / count[0] > half[1] / count[1] + 20);
+  unmake(&m);
+}
+
+static void test_draw_same_state_twice_is_equal(void **state) {
+  (void)state;
+  static uint32_t first[PIXELS];
+  static uint32_t second[PIXELS];
+  made m = make(fixture_create(900, 5, 2, 2, false, true, 9, 62));
+  const double weights[5] = {0.7, -0.4, 0.2, 0.5, -0.6};
+  draw(&m, SUPINE_VIEW_LEFT, weights, 1, first);
+  draw(&m, SUPINE_VIEW_LEFT, weights, 2, second);
+  assert_true(difference(first, second) > 1);
+  draw(&m, SUPINE_VIEW_LEFT, weights, 1, second);
+  assert_true(difference(first, second) == 0);
+  unmake(&m);
+}
+
+/* The displacement that the GPU finds from 16 modes is the one that the run time finds where there
+ * are more, here with a 17th that does nothing. */
+static void test_draw_gpu_displacement_equals_run_time(void **state) {
+  (void)state;
+  static uint32_t few[PIXELS];
+  static uint32_t many[PIXELS];
+  fixture *f = fixture_create(900, 16, 3, 2, false, false, 4, 63);
+  fixture *g = fixture_create(900, 17, 3, 2, false, false, 4, 63);
+  memcpy(g->vertex, f->vertex, 3 * f->vertices * sizeof *f->vertex);
+  memcpy(g->direction, f->direction, 3 * f->vertices * sizeof *f->direction);
+  for (size_t i = 0; i < f->vertices; ++i) {
+    memcpy(g->coefficient + 17 * i, f->coefficient + 16 * i, 16 * sizeof *f->coefficient);
+    g->coefficient[17 * i + 16] = 0;
+  }
+  made a = make(f);
+  double weights[17];
+  for (int k = 0; k < 17; ++k) {
+    weights[k] = 0.3 * cos(1.7 * k);
+  }
+  made b = make(g);
+  draw(&b, SUPINE_VIEW_OBLIQUE, weights, 1.5, many);
+  draw(&a, SUPINE_VIEW_OBLIQUE, weights, 1.5, few);
+  assert_true(difference(few, many) < 0.02);
+  draw(&a, SUPINE_VIEW_OBLIQUE, weights, 1.0, few);
+  assert_true(difference(few, many) > 0.5);
+  unmake(&a);
+  unmake(&b);
+}
+
+static void test_draw_one_lung_leaves_the_other_out(void **state) {
+  (void)state;
+  static uint32_t pixels[PIXELS];
+  made m = make(fixture_create(900, 5, 2, 2, true, true, 1, 64));
+  const double weights[5] = {0};
+  const double scales[2] = {1, 1};
+  double both[4] = SUPINE_EXTENT_NONE;
+  double one[4] = SUPINE_EXTENT_NONE;
+  supine_scene scene = {.weights = weights,
+                        .scales = scales,
+                        .value = m.value,
+                        .largest = 10,
+                        .view = SUPINE_VIEW_ANTERIOR,
+                        .width = WIDTH,
+                        .height = HEIGHT};
+  supine_renderer_extent(m.renderer, &scene, both);
+  scene.one_lung = true;
+  scene.lung = 1;
+  supine_renderer_extent(m.renderer, &scene, one);
+  assert_true(one[1] - one[0] < 0.7 * (both[1] - both[0]));
+  assert_int_equal(supine_renderer_draw(m.renderer, &scene, pixels, NULL), SUPINE_OK);
+  assert_true(covered(pixels) > PIXELS / 8);
+  unmake(&m);
+}
+
+static void test_draw_impossible_size_is_refused(void **state) {
+  (void)state;
+  uint32_t pixel = 0;
+  made m = make(fixture_create(100, 3, 2, 1, false, false, 1, 65));
+  const double weights[3] = {0};
+  const double scales[1] = {1};
+  supine_scene scene = {
+      .weights = weights, .scales = scales, .value = m.value, .largest = 1, .height = 10};
+  supine_error error;
+  assert_int_equal(supine_renderer_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  scene.width = (size_t)1 << 30;
+  assert_int_equal(supine_renderer_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  unmake(&m);
+}
+
+static void test_png_is_a_png(void **state) {
+  (void)state;
+  static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  made m = make(fixture_create(300, 3, 2, 1, false, false, 1, 66));
+  const double weights[3] = {0};
+  const double scales[1] = {1};
+  const supine_scene scene = {.weights = weights,
+                              .scales = scales,
+                              .value = m.value,
+                              .largest = 1,
+                              .dark = true,
+                              .width = WIDTH,
+                              .height = HEIGHT};
+  unsigned char *png = NULL;
+  size_t size = 0;
+  assert_int_equal(supine_renderer_png(m.renderer, &scene, &png, &size, NULL), SUPINE_OK);
+  assert_true(size > 500);
+  assert_memory_equal(png, signature, sizeof signature);
+  assert_memory_equal(png + size - 8, "IEND\xAE\x42\x60\x82", 8);
+  free(png);
+  unmake(&m);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_view_axes_are_right_handed_and_orthonormal),
+      cmocka_unit_test(test_view_axes_look_where_their_names_say),
+      cmocka_unit_test(test_colours_grow_lighter_in_even_steps),
+      cmocka_unit_test(test_colours_beyond_the_ends_are_the_ends),
+      cmocka_unit_test(test_bar_ends_at_a_round_tick),
+      cmocka_unit_test(test_draw_shows_lungs_on_clear_ground),
+      cmocka_unit_test(test_draw_puts_the_head_on_top),
+      cmocka_unit_test(test_draw_same_state_twice_is_equal),
+      cmocka_unit_test(test_draw_gpu_displacement_equals_run_time),
+      cmocka_unit_test(test_draw_one_lung_leaves_the_other_out),
+      cmocka_unit_test(test_draw_impossible_size_is_refused),
+      cmocka_unit_test(test_png_is_a_png),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

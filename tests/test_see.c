@@ -1,0 +1,507 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine compare and supine render, as their users meet them. */
+#include <dirent.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <jansson.h>
+
+#ifdef SUPINE_TEST_CAIRO
+#include <cairo.h>
+#endif
+
+#include <supine/status.h>
+
+static char folder[] = "/tmp/supine-see-XXXXXX";
+static char printed[65536]; /* by the last run, stdout and stderr together */
+
+/* Runs "ENVIRONMENT supine ARGUMENTS" in the folder; its exit code, or -1 where a signal or the
+ * clock ended it. */
+SUPINE_PRINTF(2, 3)
+static int run_with(const char *environment, const char *format, ...) {
+  char arguments[1024];
+  char command[2048];
+  va_list list;
+  va_start(list, format);
+  (void)vsnprintf(arguments, sizeof arguments, format, list);
+  va_end(list);
+  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 %s %s 2>&1", folder, environment,
+                 SUPINE_PROGRAM, arguments);
+  FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
+  assert_non_null(pipe);
+  printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
+  const int status = pclose(pipe);
+  return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
+}
+
+#define run(...) run_with("", __VA_ARGS__)
+
+static void expect(int code, const char *words, int got) {
+  if (got != code || strstr(printed, words) == NULL) {
+    fail_msg("exit code %d, not %d, or no \"%s\" in: %s", got, code, words, printed);
+  }
+}
+
+#define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
+
+/* No driver is found through this. */
+static const char no_gl[] = "__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent";
+
+static char *read_file(const char *name, size_t *size) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  char *text = malloc(*size + 1);
+  assert_non_null(text);
+  assert_int_equal(fread(text, 1, *size, file), *size);
+  text[*size] = '\0';
+  (void)fclose(file);
+  return text;
+}
+
+static size_t count_words(const char *text, const char *word) {
+  size_t count = 0;
+  for (const char *at = strstr(text, word); at != NULL; at = strstr(at + 1, word)) {
+    ++count;
+  }
+  return count;
+}
+
+static int count_files(const char *suffix) {
+  int count = 0;
+  DIR *entries = opendir(folder);
+  assert_non_null(entries);
+  for (struct dirent *e = readdir(entries); e != NULL; e = readdir(entries)) {
+    count += strstr(e->d_name, suffix) != NULL;
+  }
+  (void)closedir(entries);
+  return count;
+}
+
+/* An open surface: a bowl of triangles. */
+static void write_open_mesh(void) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/open.obj", folder);
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  enum { SIDE = 12 };
+  for (int i = 0; i <= SIDE; ++i) {
+    for (int j = 0; j <= SIDE; ++j) {
+      const double x = 14.3 * i;
+      const double y = 13.1 * j;
+      (void)fprintf(file, "v %.3f %.3f %.3f\n", 20 + x, y,
+                    0.009 * ((x - 80) * (x - 80) + (y - 70) * (y - 70)));
+    }
+  }
+  for (int i = 0; i < SIDE; ++i) {
+    for (int j = 0; j < SIDE; ++j) {
+      const int at = i * (SIDE + 1) + j + 1;
+      (void)fprintf(file, "f %d %d %d\nf %d %d %d\n", at, at + SIDE + 1, at + 1, at + 1,
+                    at + SIDE + 1, at + SIDE + 2);
+    }
+  }
+  assert_int_equal(fclose(file), 0);
+}
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  write_open_mesh();
+  return run("phantom --vertices 4000 -o lungs.ply") == 0 &&
+                 run("precompute lungs.ply -o lungs.safetensors") == 0 &&
+                 run("precompute open.obj -o open.safetensors") == 0
+             ? 0
+             : -1;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  char command[256];
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c): removes what the tests made */
+}
+
+static double number(const json_t *root, const char *key, const char *inner) {
+  const json_t *value = json_object_get(json_object_get(root, key), inner);
+  assert_true(json_is_number(value));
+  return json_number_value(value);
+}
+
+static void check_statistics(const json_t *owner, const char *key) {
+  const double mean = number(owner, key, "mean");
+  const double rms = number(owner, key, "rms");
+  const double p95 = number(owner, key, "p95");
+  const double max = number(owner, key, "max");
+  assert_true(mean > 0 && mean <= rms && rms <= max && mean <= p95 && p95 <= max);
+}
+
+static double length_of(const json_t *direction) {
+  assert_int_equal(json_array_size(direction), 3);
+  double square = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    const double x = json_number_value(json_array_get(direction, i));
+    square += x * x;
+  }
+  return sqrt(square);
+}
+
+static void check_posture(const json_t *posture) {
+  double gain = 0;
+  double share = 0;
+  double volume = 0;
+  const json_t *slabs = json_object_get(posture, "slabs");
+  check_statistics(posture, "displacement_mm");
+  assert_true(fabs(length_of(json_object_get(posture, "gravity")) - 1) < 1e-8);
+  assert_true(fabs(number(posture, "gain_ml", "left") + number(posture, "gain_ml", "right") - 400) <
+              1e-6);
+  assert_int_equal(json_array_size(slabs), 10);
+  for (size_t s = 0; s < 10; ++s) {
+    const json_t *slab = json_array_get(slabs, s);
+    gain += json_number_value(json_object_get(slab, "gain_ml"));
+    share += json_number_value(json_object_get(slab, "share"));
+    volume += json_number_value(json_object_get(slab, "volume_ml"));
+  }
+  assert_true(fabs(gain - 400) < 0.05); /* positions at run time are floats */
+  assert_true(fabs(share - 1) < 1e-4);
+  assert_true(fabs(volume - 2500) < 0.01); /* the phantom's resting volume */
+  const json_t *top = json_array_get(slabs, 1);
+  const json_t *low = json_array_get(slabs, 8);
+  assert_true(json_number_value(json_object_get(low, "expansion")) >
+              2 * json_number_value(json_object_get(top, "expansion")));
+}
+
+static void test_compare_json_holds_what_it_says(void **state) {
+  (void)state;
+  EXPECT(0, "{",
+         "compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8 "
+         "--volume 400 --json");
+  json_error_t problem;
+  json_t *root = json_loads(printed, 0, &problem);
+  assert_non_null(root);
+  const json_t *postures = json_object_get(root, "postures");
+  const json_t *pairs = json_object_get(root, "pairs");
+  const json_t *sphere = json_object_get(root, "sphere");
+  assert_int_equal(json_array_size(postures), 4);
+  assert_int_equal(json_array_size(pairs), 6);
+  for (size_t i = 0; i < 4; ++i) {
+    check_posture(json_array_get(postures, i));
+  }
+  const double farthest = number(sphere, "farthest_from_supine", "rms_mm");
+  const double most = number(sphere, "differ_most", "rms_mm");
+  for (size_t i = 0; i < 6; ++i) {
+    const json_t *pair = json_array_get(pairs, i);
+    const double rms = number(pair, "distance_mm", "rms");
+    check_statistics(pair, "distance_mm");
+    assert_true(rms <= most * (1 + 1e-6));
+    assert_true(strcmp(json_string_value(json_object_get(pair, "a")), "supine") != 0 ||
+                rms <= farthest * (1 + 1e-6));
+  }
+  assert_true(fabs(number(root, "energy", "constant") + number(root, "energy", "odd") +
+                   number(root, "energy", "even") - 1) < 1e-8);
+  assert_true(number(root, "energy", "even") < 1e-6); /* the default law has h(-g) = 1 - h(g) */
+  const json_t *tilted = json_object_get(json_array_get(postures, 2), "gravity");
+  assert_true(fabs(json_number_value(json_array_get(tilted, 2)) - 0.258819045) < 1e-8);
+  json_decref(root);
+}
+
+static void test_compare_table_names_every_posture(void **state) {
+  (void)state;
+  EXPECT(0, "Between postures", "compare lungs.safetensors");
+  static const char *const words[] = {"supine",    "prone",     "left",        "right",    "500 mL",
+                                      "lowermost", "uppermost", "differ most", "farthest", "odd"};
+  for (size_t i = 0; i < sizeof words / sizeof *words; ++i) {
+    assert_non_null(strstr(printed, words[i]));
+  }
+}
+
+static void test_compare_csv_has_six_fields_a_row(void **state) {
+  (void)state;
+  EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left --csv rows.csv");
+  size_t size = 0;
+  char *text = read_file("rows.csv", &size);
+  size_t rows = 0;
+  for (char *line = strtok(text, "\n"); line != NULL; line = strtok(NULL, "\n")) {
+    assert_int_equal(count_words(line, ","), 5);
+    ++rows;
+  }
+  /* A heading; for each posture 4 statistics, 2 lungs, 10 slabs twice; 3 pairs; 3 energies. */
+  assert_int_equal(rows, 1 + 3 * (4 + 2 + 20) + 3 * 4 + 3);
+  free(text);
+}
+
+/* Every element closes, in order; attributes are quoted; no stray '<' or '&'. */
+static void check_markup(const char *text) {
+  char open[64][16];
+  size_t depth = 0;
+  for (const char *at = text; *at != '\0'; ++at) {
+    if (*at == '&') {
+      assert_true(strcspn(at, ";") < 8);
+    }
+    if (*at != '<') {
+      continue;
+    }
+    const char *name = at + 1 + (at[1] == '/');
+    const size_t length = strcspn(name, " />\n");
+    const char *end = name + length;
+    for (bool quoted = false; *end != '\0' && (*end != '>' || quoted); ++end) {
+      quoted ^= *end == '"';
+      assert_true(*end != '<');
+    }
+    assert_true(*end == '>' && length > 0 && length < sizeof open[0]);
+    if (at[1] == '/') {
+      assert_true(depth > 0 && strlen(open[depth - 1]) == length &&
+                  strncmp(open[depth - 1], name, length) == 0);
+      --depth;
+    } else if (at[1] != '!' && end[-1] != '/') {
+      assert_true(depth < sizeof open / sizeof *open);
+      (void)snprintf(open[depth++], sizeof open[0], "%.*s", (int)length, name);
+    }
+    at = end;
+  }
+  assert_int_equal(depth, 0);
+}
+
+static void check_report(const char *name) {
+  size_t size = 0;
+  char *text = read_file(name, &size);
+  assert_int_equal(strlen(text), size);
+  check_markup(text);
+  assert_null(strstr(text, "http:"));
+  assert_null(strstr(text, "https:"));
+  assert_null(strstr(text, "<script"));
+  assert_null(strstr(text, "<link"));
+  assert_null(strstr(text, "url("));
+  for (const char *at = strstr(text, "src="); at != NULL; at = strstr(at + 1, "src=")) {
+    assert_true(strncmp(at, "src=\"data:", 10) == 0);
+  }
+  assert_non_null(strstr(text, "prefers-color-scheme:dark"));
+  assert_non_null(strstr(text, "@media print"));
+  assert_int_equal(count_words(text, "<polyline"), 2 * 3);
+  free(text);
+}
+
+static void test_report_is_well_formed_and_needs_nothing_else(void **state) {
+  (void)state;
+  EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left -o report.html");
+  check_report("report.html");
+}
+
+static void test_report_without_gl_says_so_and_carries_on(void **state) {
+  (void)state;
+  expect(0, "",
+         run_with(no_gl, "compare lungs.safetensors --postures supine,prone,left "
+                         "-o plain.html"));
+  check_report("plain.html");
+  size_t size = 0;
+  char *text = read_file("plain.html", &size);
+  assert_null(strstr(text, "<img"));
+  assert_int_equal(count_words(text, "No pictures: "), 1);
+  free(text);
+}
+
+static void test_compare_open_surface_wants_rms(void **state) {
+  (void)state;
+  EXPECT(2, "--rms MM", "compare open.safetensors");
+  EXPECT(0, "{", "compare open.safetensors --rms 5 --json --postures supine,prone,left");
+  json_t *root = json_loads(printed, 0, NULL);
+  assert_non_null(root);
+  for (size_t i = 0; i < 3; ++i) {
+    const json_t *posture = json_array_get(json_object_get(root, "postures"), i);
+    assert_true(fabs(number(posture, "displacement_mm", "rms") - 5) < 1e-5);
+    assert_null(json_object_get(posture, "slabs"));
+  }
+  json_decref(root);
+  EXPECT(0, "", "compare open.safetensors --rms 5 --csv open.csv -o open.html");
+}
+
+static void test_compare_misuse_is_a_usage_error(void **state) {
+  (void)state;
+  EXPECT(1, "did you mean 'prone'", "compare lungs.safetensors --postures supine,pron");
+  EXPECT(1, "no direction", "compare lungs.safetensors --postures 0:0:0");
+  EXPECT(1, "three finite numbers", "compare lungs.safetensors --postures 1:2");
+  EXPECT(1, "three finite numbers", "compare lungs.safetensors --postures 1:nan:2");
+  EXPECT(1, "empty name", "compare lungs.safetensors --postures supine,,prone");
+  EXPECT(1, "millilitres", "compare lungs.safetensors --volume much");
+  EXPECT(1, "once", "compare lungs.safetensors --volume 5 --rms 5");
+  EXPECT(1, ".html", "compare lungs.safetensors -o report.pdf");
+  EXPECT(1, "one basis file", "compare");
+  EXPECT(1, "did you mean '--postures'", "compare lungs.safetensors --posturse supine");
+  EXPECT(2, "nothere", "compare nothere.safetensors");
+  EXPECT(4, "nowhere", "compare lungs.safetensors -o nowhere/report.html");
+  EXPECT(4, "nowhere", "compare lungs.safetensors --csv nowhere/rows.csv");
+  EXPECT(5, "volume", "compare lungs.safetensors --volume -1e9");
+  EXPECT(0, "Usage", "compare --help");
+}
+
+static void test_render_without_gl_is_code_3_and_one_line(void **state) {
+  (void)state;
+  expect(3, "supine render: ",
+         run_with(no_gl, "render lungs.safetensors --posture prone -o none.png"));
+  assert_int_equal(count_words(printed, "\n"), 1);
+  assert_int_equal(count_files("none.png"), 0);
+}
+
+static void test_render_misuse_is_a_usage_error(void **state) {
+  (void)state;
+  EXPECT(1, ".png", "render lungs.safetensors --posture prone");
+  EXPECT(1, ".png", "render lungs.safetensors --posture prone -o lung.gif");
+  EXPECT(1, "which posture", "render lungs.safetensors -o lung.png");
+  EXPECT(1, "did you mean 'posterior'", "render lungs.safetensors --view posteror -o a.png");
+  EXPECT(1, "WIDTHxHEIGHT", "render lungs.safetensors --size 100 -o a.png");
+  EXPECT(1, "WIDTHxHEIGHT", "render lungs.safetensors --size 0x100 -o a.png");
+  EXPECT(1, "WIDTHxHEIGHT", "render lungs.safetensors --size 100x100000 -o a.png");
+  EXPECT(1, "light or dark", "render lungs.safetensors --theme blue -o a.png");
+  EXPECT(1, "difference:POSTURE", "render lungs.safetensors --colour red -o a.png");
+  EXPECT(1, "one posture",
+         "render lungs.safetensors --posture left --colour difference:supine,prone -o a.png");
+  EXPECT(
+      1, "at most 8",
+      "render lungs.safetensors --posture left,left,left,left,left,left,left,left,left -o a.png");
+  EXPECT(1, "not both", "render lungs.safetensors --posture left --volume 5 --scale 5 -o a.png");
+  EXPECT(2, "nothere", "render nothere.safetensors --posture left -o a.png");
+  EXPECT(0, "Usage", "render --help");
+  assert_int_equal(count_files("a.png"), 0);
+}
+
+/* Runs a render; false, after a line, where nothing can draw. */
+SUPINE_PRINTF(1, 2)
+static bool render(const char *format, ...) {
+  char arguments[512];
+  va_list list;
+  va_start(list, format);
+  (void)vsnprintf(arguments, sizeof arguments, format, list);
+  va_end(list);
+  const int code = run("render %s", arguments);
+  if (code == 3) {
+    print_message("skipped: %s", printed);
+    return false;
+  }
+  expect(0, ".png", code);
+  return true;
+}
+
+#ifdef SUPINE_TEST_CAIRO
+/* Mean difference of red, green and blue, 0 to 255, of two pictures of one size. */
+static double png_difference(const char *a, const char *b) {
+  cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
+                               cairo_image_surface_create_from_png(b)};
+  for (int i = 0; i < 2; ++i) {
+    assert_int_equal(cairo_surface_status(image[i]), CAIRO_STATUS_SUCCESS);
+  }
+  const int width = cairo_image_surface_get_width(image[0]);
+  const int height = cairo_image_surface_get_height(image[0]);
+  assert_int_equal(width, cairo_image_surface_get_width(image[1]));
+  assert_int_equal(height, cairo_image_surface_get_height(image[1]));
+  double sum = 0;
+  for (int y = 0; y < height; ++y) {
+    const unsigned char *row[2];
+    for (int i = 0; i < 2; ++i) {
+      row[i] = cairo_image_surface_get_data(image[i]) +
+               (ptrdiff_t)y * cairo_image_surface_get_stride(image[i]);
+    }
+    for (int x = 0; x < 4 * width; ++x) {
+      sum += x % 4 == 3 ? 0 : abs((int)row[0][x] - (int)row[1][x]);
+    }
+  }
+  cairo_surface_destroy(image[0]);
+  cairo_surface_destroy(image[1]);
+  return sum / (3.0 * width * height);
+}
+
+/* Other fonts and drivers change a picture by less than another posture does. */
+static void test_render_agrees_with_golden_picture(void **state) {
+  (void)state;
+  static const double tolerance = 1.5;
+  char path[256];
+  if (!render("lungs.safetensors --posture supine --largest 40 --size 240x180 -o golden.png")) {
+    skip();
+  }
+  (void)snprintf(path, sizeof path, "%s/golden.png", folder);
+  const double same = png_difference(path, SUPINE_GOLDEN "/render_supine.png");
+  assert_true(render("lungs.safetensors --posture prone --largest 40 --size 240x180 -o other.png"));
+  (void)snprintf(path, sizeof path, "%s/other.png", folder);
+  const double other = png_difference(path, SUPINE_GOLDEN "/render_supine.png");
+  print_message("golden picture: %.3f apart, prone %.3f, of 255\n", same, other);
+  assert_true(same < tolerance);
+  assert_true(other > 2 * tolerance);
+}
+#endif
+
+static void test_render_options_change_the_picture(void **state) {
+  (void)state;
+  static const char *const variants[] = {
+      "",
+      "--view lateral",
+      "--theme dark",
+      "--volume 200",
+      "--volume left=100,right=300",
+      "--scale 10",
+      "--colour difference:prone",
+      "--title Lungs",
+      "--view anterior,posterior",
+      "--view head,feet,oblique",
+  };
+  enum { VARIANTS = sizeof variants / sizeof *variants };
+  char *png[VARIANTS];
+  size_t size[VARIANTS];
+  for (size_t i = 0; i < VARIANTS; ++i) {
+    if (!render("lungs.safetensors --posture supine --size 260x380 %s -o v.png", variants[i])) {
+      skip();
+    }
+    png[i] = read_file("v.png", &size[i]);
+    for (size_t j = 0; j < i; ++j) {
+      assert_true(size[i] != size[j] || memcmp(png[i], png[j], size[i]) != 0);
+    }
+  }
+  for (size_t i = 0; i < VARIANTS; ++i) {
+    free(png[i]);
+  }
+}
+
+static void test_render_many_postures_and_open_surfaces_work(void **state) {
+  (void)state;
+  if (!render("lungs.safetensors --posture supine,prone,left,right,upright,inverted,0.6:0:-0.8 "
+              "--size 1400x260 -o row.png")) {
+    skip();
+  }
+  assert_true(render("open.safetensors --posture supine,prone --scale 8 -o open.png"));
+  assert_int_equal(run("render open.safetensors --posture supine -o open2.png"), 2);
+  assert_int_equal(run("render lungs.safetensors --posture supine --size 20x20 -o tiny.png"), 1);
+  assert_int_equal(run("render lungs.safetensors --posture supine -o nowhere/a.png"), 4);
+  assert_int_equal(count_files("open2.png") + count_files("tiny.png"), 0);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_compare_json_holds_what_it_says),
+      cmocka_unit_test(test_compare_table_names_every_posture),
+      cmocka_unit_test(test_compare_csv_has_six_fields_a_row),
+      cmocka_unit_test(test_report_is_well_formed_and_needs_nothing_else),
+      cmocka_unit_test(test_report_without_gl_says_so_and_carries_on),
+      cmocka_unit_test(test_compare_open_surface_wants_rms),
+      cmocka_unit_test(test_compare_misuse_is_a_usage_error),
+      cmocka_unit_test(test_render_without_gl_is_code_3_and_one_line),
+      cmocka_unit_test(test_render_misuse_is_a_usage_error),
+#ifdef SUPINE_TEST_CAIRO
+      cmocka_unit_test(test_render_agrees_with_golden_picture),
+#endif
+      cmocka_unit_test(test_render_options_change_the_picture),
+      cmocka_unit_test(test_render_many_postures_and_open_surfaces_work),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

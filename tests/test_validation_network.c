@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* [Santhanam2008] Figs. 7 to 9: sheet, ring and convergence, against a mass-spring-damper system
+ * that is integrated to rest. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "validation.h"
+
+/* Fig. 8 */
+static void test_plane_equals_mass_spring_damper_at_rest(void **state) {
+  (void)state;
+  frame f = frame_plane(21, 10.0);
+  const size_t n = f.mesh.vertex_count;
+  double *force = plane_force(&f);
+  double *stiffness = ones(n);
+  double *ours = malloc(n * sizeof *ours);
+  double *theirs = malloc(n * sizeof *theirs);
+  assert_int_equal(frame_solve(&f, NULL, force, 0.0, ours, NULL), SUPINE_OK);
+  mass_spring_damper system = damper_create(&f, stiffness, force);
+  assert_true(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL));
+  const double difference = relative_rms(n, ours, theirs);
+  printf("sheet of %zu masses: %.2e %% RMS difference to a mass-spring-damper system at rest\n", n,
+         100.0 * difference);
+  assert_true(difference < 1e-3);
+  assert_true(difference < 1e-6); /* nothing but the integration's error is left */
+  double middle = 0.0;
+  double corner = ours[0];
+  for (size_t i = 0; i < n; ++i) {
+    middle = fmax(middle, ours[i]);
+  }
+  assert_true(middle > 5.0 * corner); /* no trivial field */
+  damper_free(&system);
+  frame_free(&f);
+  free(force);
+  free(stiffness);
+  free(ours);
+  free(theirs);
+}
+
+/* The same with stiffness that varies fourfold, over links of all lengths. */
+static void test_plane_irregular_equals_mass_spring_damper_at_rest(void **state) {
+  (void)state;
+  frame f = frame_plane(15, 7.0);
+  const size_t n = f.mesh.vertex_count;
+  double *stiffness = malloc(n * sizeof *stiffness);
+  for (size_t i = 0; i < n; ++i) {
+    f.mesh.vertices[3 * i] += 2.5 * sin(7.0 * (double)i);
+    f.mesh.vertices[3 * i + 2] = 3.0 * cos(5.0 * (double)i);
+    stiffness[i] = exp(0.7 * sin(3.0 * (double)i));
+  }
+  normalise_stiffness(n, stiffness);
+  double *force = plane_force(&f);
+  double *ours = malloc(n * sizeof *ours);
+  double *theirs = malloc(n * sizeof *theirs);
+  assert_int_equal(frame_solve(&f, stiffness, force, 0.0, ours, NULL), SUPINE_OK);
+  mass_spring_damper system = damper_create(&f, stiffness, force);
+  assert_true(damper_integrate(&system, stiffness, 60.0, 1, theirs, NULL, NULL));
+  const double difference = relative_rms(n, ours, theirs);
+  printf("irregular sheet: %.2e %% RMS difference\n", 100.0 * difference);
+  assert_true(difference < 1e-6);
+  damper_free(&system);
+  frame_free(&f);
+  free(force);
+  free(stiffness);
+  free(ours);
+  free(theirs);
+}
+
+/* Fig. 9 */
+static void test_ring_uniform_stays_a_circle(void **state) {
+  (void)state;
+  enum { COUNT = 60 };
+  frame f = frame_ring(COUNT, 50.0);
+  double *force = ones(COUNT);
+  double catch_[COUNT];
+  assert_int_equal(frame_solve(&f, NULL, force, 0.0, catch_, NULL), SUPINE_OK);
+  double low = INFINITY;
+  double high = 0.0;
+  for (size_t i = 0; i < COUNT; ++i) { /* radii of the expanded ring */
+    const double *p = f.mesh.vertices + 3 * i;
+    const double scale = 10.0;
+    const double radius = hypot(p[0], p[1]);
+    const double x = p[0] + scale * catch_[i] * p[0] / radius;
+    const double y = p[1] + scale * catch_[i] * p[1] / radius;
+    low = fmin(low, hypot(x, y));
+    high = fmax(high, hypot(x, y));
+  }
+  assert_true(low > 51.0); /* it expands */
+  assert_true(high - low <= 1e-10);
+  free(force);
+  frame_free(&f);
+}
+
+static void test_ring_mixed_moves_less_where_it_is_stiff(void **state) {
+  (void)state;
+  enum { COUNT = 60 };
+  static const double factors[] = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0};
+  frame f = frame_ring(COUNT, 50.0);
+  double *force = ones(COUNT);
+  double last = INFINITY;
+  for (size_t k = 0; k < 6; ++k) {
+    double *stiffness = ring_stiffness(COUNT, factors[k]);
+    double catch_[COUNT];
+    assert_int_equal(frame_solve(&f, stiffness, force, 0.0, catch_, NULL), SUPINE_OK);
+    const double middle = catch_[COUNT / 2];
+    const double opposite = catch_[0];
+    printf("ring, one third %g times as stiff: it moves %.4f, the opposite side %.4f\n", factors[k],
+           middle, opposite);
+    for (size_t i = 0; i < COUNT; ++i) {
+      assert_true(catch_[i] > 0.0); /* like a balloon: nothing moves inwards */
+    }
+    assert_true(middle / opposite < last);
+    assert_true(factors[k] == 1.0 ? fabs(middle / opposite - 1.0) < 1e-10
+                                  : (middle < opposite) == (factors[k] > 1.0));
+    last = middle / opposite;
+    free(stiffness);
+  }
+  free(force);
+  frame_free(&f);
+}
+
+static void count_steps(void *context, size_t steps, double held) {
+  (void)held;
+  *(size_t *)context = steps;
+}
+
+/* Fig. 7: to 1e-6 of the converged solution, in visits of a link from one side. */
+static void test_convergence_conjugate_gradients_need_least_work(void **state) {
+  (void)state;
+  frame f = frame_plane(15, 10.0);
+  const size_t n = f.mesh.vertex_count;
+  double *force = plane_force(&f);
+  double *stiffness = ones(n);
+  double *exact = malloc(n * sizeof *exact);
+  double *found = malloc(n * sizeof *found);
+  supine_solve_report report;
+  size_t distributions = 0;
+  assert_int_equal(frame_solve(&f, NULL, force, 0.0, exact, NULL), SUPINE_OK);
+  assert_int_equal(frame_solve(&f, NULL, force, 1e-7, found, &report), SUPINE_OK);
+  assert_true(relative_rms(n, found, exact) < 1e-6);
+  assert_int_equal(supine_pitcher_catcher(&f.mesh, &f.topology, NULL, force, 1e-7, found, NULL,
+                                          count_steps, &distributions, NULL),
+                   SUPINE_OK);
+  assert_true(relative_rms(n, found, exact) < 1e-6);
+  mass_spring_damper system = damper_create(&f, stiffness, force);
+  assert_true(damper_integrate(&system, stiffness, 25.0, 1, found, NULL, NULL));
+  assert_true(relative_rms(n, found, exact) < 1e-6);
+  const size_t links = 2 * f.topology.edge_count;
+  const size_t work[3] = {report.iterations * links,
+                          distributions * 4 * f.topology.edge_count / (n + f.topology.edge_count),
+                          system.evaluations * links};
+  printf("to 1e-6: conjugate gradients %zu link visits, Pitcher/Catcher %zu, mass-spring-damper "
+         "%zu\n",
+         work[0], work[1], work[2]);
+  assert_true(work[0] < work[1]);
+  assert_true(work[1] < work[2]);
+  damper_free(&system);
+  frame_free(&f);
+  free(force);
+  free(stiffness);
+  free(exact);
+  free(found);
+}
+
+int main(void) {
+  (void)gsl_set_error_handler_off();
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_plane_equals_mass_spring_damper_at_rest),
+      cmocka_unit_test(test_plane_irregular_equals_mass_spring_damper_at_rest),
+      cmocka_unit_test(test_ring_uniform_stays_a_circle),
+      cmocka_unit_test(test_ring_mixed_moves_less_where_it_is_stiff),
+      cmocka_unit_test(test_convergence_conjugate_gradients_need_least_work),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
