@@ -183,19 +183,21 @@ static void measure(supine_basis *basis, const source *was, const source *is) {
   }
   const size_t modes = basis->tiles.modes;
   for (size_t k = 0; k < modes; ++k) {
+    float apart[TILE] = {0};
+    float size[TILE] = {0};
+    for (size_t axis = 0; axis < basis->tiles.axes; ++axis) {
+      const float *c = was->coefficients + (axis * modes + k) * TILE;
+      const float *packed = is->coefficients + (axis * modes + k) * TILE;
+      for (size_t v = 0; v < TILE; ++v) {
+        apart[v] += (c[v] - packed[v]) * (c[v] - packed[v]);
+        size[v] += c[v] * c[v];
+      }
+    }
     float top_error = 0;
     float top_size = 0;
     for (size_t v = 0; v < TILE; ++v) {
-      float apart = 0;
-      float size = 0;
-      for (size_t axis = 0; axis < basis->tiles.axes; ++axis) {
-        const size_t at = (axis * modes + k) * TILE + v;
-        const float c = was->coefficients[at] - is->coefficients[at];
-        apart += c * c;
-        size += was->coefficients[at] * was->coefficients[at];
-      }
-      const float error = sqrtf(apart) * length[v] + sqrtf(size) * slip[v];
-      const float moved = sqrtf(size) * length[v];
+      const float error = sqrtf(apart[v]) * length[v] + sqrtf(size[v]) * slip[v];
+      const float moved = sqrtf(size[v]) * length[v];
       top_error = error > top_error ? error : top_error;
       top_size = moved > top_size ? moved : top_size;
     }
