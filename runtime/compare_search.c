@@ -176,9 +176,10 @@ static void find(const search *s, size_t directions, supine_extremes *extremes) 
     }
   }
   double moving[2][3];
-  memcpy(extremes->pair[0], s->direction[pair[0]], sizeof extremes->pair[0]);
-  memcpy(extremes->pair[1], s->direction[pair[1]], sizeof extremes->pair[1]);
-  extremes->pair_rms = refine(s, extremes->pair, 2, spacing);
+  memcpy(moving[0], s->direction[pair[0]], sizeof moving[0]);
+  memcpy(moving[1], s->direction[pair[1]], sizeof moving[1]);
+  extremes->pair_rms = refine(s, moving, 2, spacing);
+  memcpy(extremes->pair, moving, sizeof moving);
   memcpy(moving[0], s->direction[farthest], sizeof moving[0]);
   memcpy(moving[1], s->direction[from], sizeof moving[1]);
   extremes->farthest_rms = refine(s, moving, 1, spacing);

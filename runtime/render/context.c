@@ -76,8 +76,6 @@ void supine_gl_close(supine_gl_context *context) {
   if (context->context != EGL_NO_CONTEXT) {
     (void)eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     (void)eglDestroyContext(context->display, context->context);
-    (void)eglTerminate(context->display);
-    (void)eglReleaseThread();
-    context->context = EGL_NO_CONTEXT;
+    context->context = EGL_NO_CONTEXT; /* the display is the process's: others may use it */
   }
 }
