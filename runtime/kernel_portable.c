@@ -11,11 +11,11 @@ static void dot(const supine_tiles *tiles, const unsigned char *at, const float 
   }
   switch (tiles->storage) {
   case SUPINE_STORAGE_INT16:
-    for (size_t k = 0; k < modes; k += 2, at += 64) {
-      uint32_t word[TILE];
-      memcpy(word, at, sizeof word);
+    for (size_t k = 0; k < modes; ++k, at += 32) {
+      int16_t c[TILE];
+      memcpy(c, at, sizeof c);
       for (size_t v = 0; v < TILE; ++v) {
-        sum[v] += w[k] * (float)(int32_t)word[v] + w[k + 1] * (float)(int32_t)(word[v] << 16);
+        sum[v] += w[k] * (float)c[v];
       }
     }
     break;
@@ -94,16 +94,14 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   }
 }
 
-/* 16 coefficients of each mode as floats, in the integers' scale. */
+/* 16 coefficients of each mode as floats, in the units they are packed in. */
 static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
   for (size_t k = 0; k < tiles->modes; ++k, c += TILE) {
     if (tiles->storage == SUPINE_STORAGE_INT16) {
-      uint32_t word[TILE];
-      memcpy(word, at + k / 2 * sizeof word, sizeof word);
+      int16_t packed[TILE];
+      memcpy(packed, at + k * sizeof packed, sizeof packed);
       for (size_t v = 0; v < TILE; ++v) {
-        const int32_t low = (int32_t)(word[v] << 16) / 65536;
-        const int32_t high = ((int32_t)word[v] - low) / 65536;
-        c[v] = (float)(k % 2 == 0 ? high : low);
+        c[v] = packed[v];
       }
     } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
       uint16_t half[TILE];

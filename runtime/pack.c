@@ -108,15 +108,13 @@ static void pack_coefficients(const supine_tiles *tiles, const units *u, float *
   for (size_t k = 0; k < tiles->modes; ++k) {
     float *row = rows + k * TILE;
     if (tiles->storage == SUPINE_STORAGE_INT16) {
-      uint32_t word[TILE];
-      unsigned char *pair = at + k / 2 * sizeof word;
-      memcpy(word, pair, sizeof word); /* zeros before the first of a pair */
+      int16_t packed[TILE];
       for (size_t v = 0; v < TILE; ++v) {
         const float q = to_int16(row[v], u->inverse[k]);
-        word[v] += (uint32_t)(int32_t)q << (k % 2 == 0 ? 16 : 0);
+        packed[v] = (int16_t)q;
         row[v] = q * u->mode[k];
       }
-      memcpy(pair, word, sizeof word);
+      memcpy(at + k * sizeof packed, packed, sizeof packed);
     } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
       uint16_t half[TILE];
       for (size_t v = 0; v < TILE; ++v) {

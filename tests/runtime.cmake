@@ -31,3 +31,12 @@ foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open cl
   target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})
 endforeach()
 supine_test(runtime_threads runtime_fixture Threads::Threads)
+
+# The GPU form, where EGL is there to run it off screen.
+pkg_check_modules(EGL IMPORTED_TARGET egl glesv2)
+if(EGL_FOUND)
+  supine_test(glsl runtime_fixture PkgConfig::EGL)
+  target_compile_definitions(test_glsl PRIVATE SUPINE_GLSL="${PROJECT_SOURCE_DIR}/runtime/supine.glsl")
+  # The driver's own leaks are none of ours.
+  set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
+endif()

@@ -14,6 +14,14 @@
 
 #include "runtime_fixture.h"
 
+void *fixture_allocate(size_t count, size_t size) {
+  void *memory = calloc(count + 1, size);
+  if (memory == NULL) {
+    abort();
+  }
+  return memory;
+}
+
 double fixture_random(uint64_t *state) {
   /* splitmix64 */
   uint64_t z = (*state += UINT64_C(0x9E3779B97F4A7C15));

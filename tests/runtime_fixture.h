@@ -21,6 +21,9 @@ typedef struct fixture {
   double *linear, *quadratic, *cubic;
 } fixture;
 
+/* Zeroed memory, never NULL: ends the program where there is none. */
+__attribute__((returns_nonnull)) void *fixture_allocate(size_t count, size_t size);
+
 /* Random number in [-1, 1) of a generator whose state the caller keeps. */
 double fixture_random(uint64_t *state);
 

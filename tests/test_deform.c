@@ -49,12 +49,6 @@ static supine_basis *open_as(const opened *o, supine_storage storage, supine_sim
   return basis;
 }
 
-static void *allocate(size_t count, size_t size) {
-  void *memory = calloc(count + 1, size);
-  assert_non_null(memory);
-  return memory;
-}
-
 static void random_frame(const supine_basis *basis, uint64_t *random, double *weights,
                          double *scales) {
   const double gravity[3] = {fixture_random(random), fixture_random(random),
@@ -84,8 +78,8 @@ static double farthest(const float *xyz, const double *exact, size_t begin, size
 static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
                             uint64_t seed) {
   opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
-  double *exact = allocate(3 * vertices, sizeof *exact);
-  float *xyz = allocate(3 * vertices, sizeof *xyz);
+  double *exact = fixture_allocate(3 * vertices, sizeof *exact);
+  float *xyz = fixture_allocate(3 * vertices, sizeof *xyz);
   uint64_t random = seed;
   for (int storage = 0; storage < SUPINE_STORAGE_COUNT; ++storage) {
     for (int simd = 0; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -139,8 +133,8 @@ static void test_deform_every_mode_count_within_stated_error(void **state) {
 static void test_basis_error_bound_near_what_happens(void **state) {
   (void)state;
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
-  double *exact = allocate(3 * 3000, sizeof *exact);
-  float *xyz = allocate(3 * 3000, sizeof *xyz);
+  double *exact = fixture_allocate(3 * 3000, sizeof *exact);
+  float *xyz = fixture_allocate(3 * 3000, sizeof *xyz);
   for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
     supine_basis *basis = open_as(&o, (supine_storage)storage, SUPINE_SIMD_AUTO);
     uint64_t random = 31;
@@ -232,9 +226,9 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
     return;
   }
   const float mark = -12345.5F;
-  float *whole = allocate(3 * vertices, sizeof *whole);
-  float *part = allocate(3 * vertices + 64, sizeof *part);
-  float *split = allocate(3 * (vertices + 64), sizeof *split);
+  float *whole = fixture_allocate(3 * vertices, sizeof *whole);
+  float *part = fixture_allocate(3 * vertices + 64, sizeof *part);
+  float *split = fixture_allocate(3 * (vertices + 64), sizeof *split);
   uint64_t random = 17;
   double weights[SUPINE_MODES_MAX];
   double scales[SUPINE_LUNGS_MAX];
@@ -353,10 +347,10 @@ static void test_step_many_steps_reach_the_volume(void **state) {
 static void check_batch(size_t vertices, size_t modes, bool vector, size_t count, size_t begin,
                         size_t end) {
   opened o = made(fixture_create(vertices, modes, 2, 2, vector, false, 11, 8));
-  double *weights = allocate(count * modes, sizeof *weights);
-  double *scales = allocate(count * 2 + SUPINE_LUNGS_MAX, sizeof *scales);
-  double *exact = allocate(3 * vertices, sizeof *exact);
-  float *xyz = allocate(3 * count * (end - begin), sizeof *xyz);
+  double *weights = fixture_allocate(count * modes, sizeof *weights);
+  double *scales = fixture_allocate(count * 2 + SUPINE_LUNGS_MAX, sizeof *scales);
+  double *exact = fixture_allocate(3 * vertices, sizeof *exact);
+  float *xyz = fixture_allocate(3 * count * (end - begin), sizeof *xyz);
   for (int storage = 1; storage < SUPINE_STORAGE_COUNT; ++storage) {
     for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
       supine_basis *basis = open_as(&o, (supine_storage)storage, (supine_simd)simd);

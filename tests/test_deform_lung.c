@@ -65,11 +65,8 @@ static void even_direction(size_t q, double g[3]) {
 /* Height along gravity, 0 to 1, projected to band 3 (DESIGN 5, 7), and d of (15)-(17). */
 static void make_field(fixture *f) {
   const size_t n = f->vertices;
-  double *sums = calloc(n * MODES, sizeof *sums);
-  double *height = calloc(n, sizeof *height);
-  if (sums == NULL || height == NULL) {
-    abort();
-  }
+  double *sums = fixture_allocate(n * MODES, sizeof *sums);
+  double *height = fixture_allocate(n, sizeof *height);
   for (size_t q = 0; q < DIRECTIONS; ++q) {
     double g[3];
     double y[MODES];
@@ -158,9 +155,8 @@ static void test_deform_real_lung_every_path_within_stated_error(void **state) {
       assert_true(status == SUPINE_OK || status == SUPINE_ERROR_UNSUPPORTED);
     }
   }
-  double *exact = calloc(3 * f->vertices, sizeof *exact);
-  float *xyz = calloc(3 * f->vertices, sizeof *xyz);
-  assert_true(exact != NULL && xyz != NULL);
+  double *exact = fixture_allocate(3 * f->vertices, sizeof *exact);
+  float *xyz = fixture_allocate(3 * f->vertices, sizeof *xyz);
   uint64_t random = 1000;
   double scale = 0;
   for (int trial = 0; trial < 1000; ++trial) {

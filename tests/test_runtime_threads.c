@@ -55,10 +55,9 @@ static void test_basis_many_threads_same_bits(void **state) {
   unsigned char *bytes = fixture_bytes(f, &size);
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
-  float *shared = calloc(3 * VERTICES, sizeof *shared);
-  float *alone = calloc(3 * VERTICES, sizeof *alone);
-  job *jobs = calloc(THREADS, sizeof *jobs);
-  assert_true(shared != NULL && alone != NULL && jobs != NULL);
+  float *shared = fixture_allocate((size_t)3 * VERTICES, sizeof *shared);
+  float *alone = fixture_allocate((size_t)3 * VERTICES, sizeof *alone);
+  job *jobs = fixture_allocate(THREADS, sizeof *jobs);
   pthread_t threads[THREADS];
   for (size_t i = 0; i < THREADS; ++i) {
     jobs[i].basis = basis;

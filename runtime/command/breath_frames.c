@@ -131,16 +131,15 @@ supine_status breath_frames_create(const supine_basis *basis, const breath_cours
   }
   made->basis = basis;
   made->course = course;
-  made->scale = malloc(count * sizeof *made->scale);
-  made->volumes = malloc(count * course->lungs * sizeof *made->volumes);
-  made->run = malloc(count * sizeof *made->run);
+  made->scale = calloc(count, sizeof *made->scale);
+  made->volumes = calloc(count * course->lungs, sizeof *made->volumes);
+  made->run = calloc(count, sizeof *made->run);
   made->step = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *made->step);
-  supine_status status = SUPINE_OK;
   if (made->scale == NULL || made->volumes == NULL || made->run == NULL || made->step == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
-  } else {
-    status = find_scales(made, error);
+    breath_frames_destroy(made);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
   }
+  const supine_status status = find_scales(made, error);
   if (status != SUPINE_OK) {
     breath_frames_destroy(made);
     return status;

@@ -320,7 +320,7 @@ int supine_command_breathe(int argc, char **argv) {
   if (wanted.path == NULL) {
     return supine_command_usage(name, "-o OUT is missing");
   }
-  size_t count = 0;
+  size_t count = 1;
   int result = complete(&wanted, &count);
   if (result != SUPINE_EXIT_OK) {
     return result;

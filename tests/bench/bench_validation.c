@@ -273,7 +273,7 @@ static void regional_ventilation(const supine_lungs *lungs) {
   end_figure(csv, "ventilation",
              "set xlabel 'ventilation index, mean 1'\n"
              "set ylabel 'place along gravity: 0 uppermost, 1 lowermost'\nset yrange [1:0]\n"
-             "plot for [i=2:5] csv using i:1 with linespoints");
+             "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
 }
 
 /* Drift of the displacements and of the spread of a unit force, with reaches from 0. */

@@ -29,14 +29,15 @@ typedef struct supine_bench_row {
   double additions;
 } supine_bench_row;
 
-/** What takes part in a run: `run(context)` does the work of `vertices` once. */
+/** What takes part in a run: `run(context)` does the work of `vertices`, `rounds` times. */
 typedef struct supine_bench_entry {
   supine_bench_row row;
+  size_t rounds; /**< 0: once */
   void (*run)(void *context);
   void *context;
 } supine_bench_entry;
 
-/** Runs every entry in turn, `repeats` times over, subnormals flushed, and fills in the rows'
+/** Runs every entry in turn, `repeats` times over, each time beginning with another, subnormals flushed, and fills in the rows'
  * times, rates and shares from the fastest run of each. */
 void supine_bench_measure(supine_bench_entry *entries, size_t count, size_t repeats);
 

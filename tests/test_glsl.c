@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine.glsl off screen, in GLSL ES 3.00 and GLSL 3.30 core: positions by transform feedback equal
+ * the C evaluator's within rounding. Skips where EGL gives no such context. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <GLES3/gl3.h>
+
+#include <cmocka.h>
+
+#include <supine/runtime.h>
+
+#include "runtime_fixture.h"
+
+enum { VERTICES = 1003 };
+
+/* Functions common to both APIs, from the context's own library. */
+#define GL_FUNCTIONS(F)                                                                            \
+  F(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
+  F(PFNGLBEGINTRANSFORMFEEDBACKPROC, BeginTransformFeedback)                                       \
+  F(PFNGLBINDATTRIBLOCATIONPROC, BindAttribLocation)                                               \
+  F(PFNGLBINDBUFFERPROC, BindBuffer)                                                               \
+  F(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                                                       \
+  F(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                                                     \
+  F(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                                                   \
+  F(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                                                     \
+  F(PFNGLBUFFERDATAPROC, BufferData)                                                               \
+  F(PFNGLCOMPILESHADERPROC, CompileShader)                                                         \
+  F(PFNGLCREATEPROGRAMPROC, CreateProgram)                                                         \
+  F(PFNGLCREATESHADERPROC, CreateShader)                                                           \
+  F(PFNGLDRAWARRAYSPROC, DrawArrays)                                                               \
+  F(PFNGLENABLEPROC, Enable)                                                                       \
+  F(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)                                     \
+  F(PFNGLENDTRANSFORMFEEDBACKPROC, EndTransformFeedback)                                           \
+  F(PFNGLFINISHPROC, Finish)                                                                       \
+  F(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)                                     \
+  F(PFNGLGENBUFFERSPROC, GenBuffers)                                                               \
+  F(PFNGLGENFRAMEBUFFERSPROC, GenFramebuffers)                                                     \
+  F(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                                                   \
+  F(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                                                     \
+  F(PFNGLGETERRORPROC, GetError)                                                                   \
+  F(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                                                 \
+  F(PFNGLGETPROGRAMIVPROC, GetProgramiv)                                                           \
+  F(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                                                   \
+  F(PFNGLGETSHADERIVPROC, GetShaderiv)                                                             \
+  F(PFNGLGETSTRINGPROC, GetString)                                                                 \
+  F(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                                               \
+  F(PFNGLLINKPROGRAMPROC, LinkProgram)                                                             \
+  F(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)                                                       \
+  F(PFNGLRENDERBUFFERSTORAGEPROC, RenderbufferStorage)                                             \
+  F(PFNGLSHADERSOURCEPROC, ShaderSource)                                                           \
+  F(PFNGLTRANSFORMFEEDBACKVARYINGSPROC, TransformFeedbackVaryings)                                 \
+  F(PFNGLUNIFORM4FVPROC, Uniform4fv)                                                               \
+  F(PFNGLUSEPROGRAMPROC, UseProgram)                                                               \
+  F(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)
+
+typedef struct gl_api {
+#define MEMBER(type, name) type name;
+  GL_FUNCTIONS(MEMBER)
+#undef MEMBER
+} gl_api;
+
+/* A current context of that API without a surface; false where there is none. */
+static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
+  const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
+  const EGLint wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, renderable, EGL_NONE};
+  const EGLint core[] = {EGL_CONTEXT_MAJOR_VERSION,
+                         3,
+                         EGL_CONTEXT_MINOR_VERSION,
+                         3,
+                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                         EGL_NONE};
+  const EGLint es[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_NONE};
+  EGLConfig config = NULL;
+  EGLint count = 0;
+  *context = EGL_NO_CONTEXT;
+  *display = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
+  if (*display == EGL_NO_DISPLAY || !eglInitialize(*display, NULL, NULL)) {
+    return false;
+  }
+  if (!eglBindAPI(api) || !eglChooseConfig(*display, wanted, &config, 1, &count) || count < 1) {
+    return false;
+  }
+  *context = eglCreateContext(*display, config, EGL_NO_CONTEXT, api == EGL_OPENGL_API ? core : es);
+  if (*context == EGL_NO_CONTEXT ||
+      !eglMakeCurrent(*display, EGL_NO_SURFACE, EGL_NO_SURFACE, *context)) {
+    return false;
+  }
+#define LOAD(type, name)                                                                           \
+  gl->name = (type)eglGetProcAddress("gl" #name);                                                  \
+  if (gl->name == NULL) {                                                                          \
+    return false;                                                                                  \
+  }
+  GL_FUNCTIONS(LOAD)
+#undef LOAD
+  return true;
+}
+
+static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, const char *library,
+                          const char *text) {
+  const char *const parts[] = {version, library, text};
+  const GLuint shader = gl->CreateShader(kind);
+  gl->ShaderSource(shader, 3, parts, NULL);
+  gl->CompileShader(shader);
+  GLint good = 0;
+  gl->GetShaderiv(shader, GL_COMPILE_STATUS, &good);
+  if (!good) {
+    char log[2048] = "";
+    gl->GetShaderInfoLog(shader, sizeof log, NULL, log);
+    fail_msg("%s", log);
+  }
+  return shader;
+}
+
+static GLuint make_program(const gl_api *gl, const char *version, const char *library) {
+  static const char vertex[] =
+      "in vec3 rest; in vec3 direction; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3;\n"
+      "out vec3 position;\n"
+      "void main() {\n"
+      "  position = supine_displace(rest, direction, c0, c1, c2, c3);\n"
+      "  gl_Position = vec4(position, 1.0);\n"
+      "}\n";
+  static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
+  static const char *const names[] = {"rest", "direction", "c0", "c1", "c2", "c3"};
+  static const char *const varyings[] = {"position"};
+  const GLuint program = gl->CreateProgram();
+  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, library, vertex));
+  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", fragment));
+  for (GLuint i = 0; i < 6; ++i) {
+    gl->BindAttribLocation(program, i, names[i]);
+  }
+  gl->TransformFeedbackVaryings(program, 1, varyings, GL_INTERLEAVED_ATTRIBS);
+  gl->LinkProgram(program);
+  GLint good = 0;
+  gl->GetProgramiv(program, GL_LINK_STATUS, &good);
+  if (!good) {
+    char log[2048] = "";
+    gl->GetProgramInfoLog(program, sizeof log, NULL, log);
+    fail_msg("%s", log);
+  }
+  return program;
+}
+
+/* Somewhere to draw to, though nothing is drawn: without a surface there is no default. */
+static void make_framebuffer(const gl_api *gl) {
+  GLuint framebuffer = 0;
+  GLuint renderbuffer = 0;
+  gl->GenFramebuffers(1, &framebuffer);
+  gl->BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  gl->GenRenderbuffers(1, &renderbuffer);
+  gl->BindRenderbuffer(GL_RENDERBUFFER, renderbuffer);
+  gl->RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, 1, 1);
+  gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
+}
+
+/* Positions of every vertex by the shader. */
+static void run_shader(const gl_api *gl, GLuint program, const float *attributes,
+                       const float *uniforms, float *xyz) {
+  static const GLint sizes[] = {3, 3, 4, 4, 4, 4};
+  const GLsizei stride = SUPINE_GL_FLOATS * sizeof(float);
+  const GLsizeiptr output = (GLsizeiptr)(3 * VERTICES * sizeof(float));
+  GLuint array = 0;
+  GLuint buffers[2] = {0, 0};
+  gl->GenVertexArrays(1, &array);
+  gl->BindVertexArray(array);
+  gl->GenBuffers(2, buffers);
+  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, attributes, GL_STATIC_DRAW);
+  uintptr_t offset = 0;
+  for (GLuint i = 0; i < 6; ++i) {
+    gl->EnableVertexAttribArray(i);
+    gl->VertexAttribPointer(i, sizes[i], GL_FLOAT, GL_FALSE, stride, (const char *)NULL + offset);
+    offset += (size_t)sizes[i] * sizeof(float);
+  }
+  gl->BindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, buffers[1]);
+  gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
+  gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffers[1]);
+  gl->UseProgram(program);
+  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), 4, uniforms);
+  gl->Enable(GL_RASTERIZER_DISCARD);
+  gl->BeginTransformFeedback(GL_POINTS);
+  gl->DrawArrays(GL_POINTS, 0, VERTICES);
+  gl->EndTransformFeedback();
+  gl->Finish();
+  assert_int_equal(gl->GetError(), GL_NO_ERROR);
+  const void *mapped = gl->MapBufferRange(GL_TRANSFORM_FEEDBACK_BUFFER, 0, output, GL_MAP_READ_BIT);
+  assert_non_null(mapped);
+  memcpy(xyz, mapped, (size_t)output);
+}
+
+static void check_glsl(EGLenum api, const char *version) {
+  EGLDisplay display = EGL_NO_DISPLAY;
+  EGLContext context = EGL_NO_CONTEXT;
+  gl_api gl = {0};
+  if (!make_context(api, &display, &context, &gl)) {
+    print_message("no surfaceless EGL context: skipped\n");
+    skip();
+    return;
+  }
+  print_message("%s\n", (const char *)gl.GetString(GL_VERSION));
+  make_framebuffer(&gl);
+  size_t length = 0;
+  unsigned char *library = fixture_read(SUPINE_GLSL, &length);
+  library[length] = '\0';
+  const GLuint program = make_program(&gl, version, (const char *)library);
+  static const size_t modes[] = {1, 5, 16};
+  for (size_t m = 0; m < 3; ++m) {
+    fixture *f = fixture_create(VERTICES, modes[m], 3, 1, false, false, 9, 21);
+    size_t size = 0;
+    unsigned char *bytes = fixture_bytes(f, &size);
+    const supine_basis_options exact = {SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO};
+    supine_basis *basis = NULL;
+    assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
+    float *attributes = fixture_allocate(VERTICES * SUPINE_GL_FLOATS, sizeof *attributes);
+    float *gpu = fixture_allocate(3 * VERTICES, sizeof *gpu);
+    float *cpu = fixture_allocate(3 * VERTICES, sizeof *cpu);
+    assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_OK);
+    const double gravity[3] = {0.6, -0.3, 0.2};
+    const double scale = 1.7;
+    double weights[16];
+    float uniforms[SUPINE_GL_MODES];
+    assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+    assert_int_equal(supine_gl_weights(basis, weights, scale, uniforms), SUPINE_OK);
+    run_shader(&gl, program, attributes, uniforms, gpu);
+    supine_deform(basis, weights, &scale, cpu);
+    double moved = 0;
+    /* Both round as supine_basis_error says, so they differ by at most twice that. */
+    const double bound = 2 * supine_basis_error(basis, weights, &scale);
+    assert_true(bound < 1e-3);
+    for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+      assert_true(fabs((double)gpu[i] - (double)cpu[i]) <= bound);
+      moved = fmax(moved, fabs((double)gpu[i] - (double)f->vertex[i]));
+    }
+    assert_true(moved > 1);
+    free(attributes);
+    free(gpu);
+    free(cpu);
+    supine_basis_close(basis);
+    free(bytes);
+    fixture_destroy(f);
+  }
+  free(library);
+  (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  (void)eglDestroyContext(display, context);
+  (void)eglTerminate(display);
+}
+
+static void test_glsl_es300_positions_equal_evaluator(void **state) {
+  (void)state;
+  check_glsl(EGL_OPENGL_ES_API, "#version 300 es\nprecision highp float;\n");
+}
+
+static void test_glsl_330_core_positions_equal_evaluator(void **state) {
+  (void)state;
+  check_glsl(EGL_OPENGL_API, "#version 330 core\n");
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_glsl_es300_positions_equal_evaluator),
+      cmocka_unit_test(test_glsl_330_core_positions_equal_evaluator),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
