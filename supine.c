@@ -21,6 +21,7 @@ static const struct {
     {"render", supine_command_render, "draw the lungs: postures side by side, as PNG"},
     {"breathe", supine_command_breathe, "let a basis breathe, in one posture or turning"},
     {"export", supine_command_export, "write a basis as a page or as glTF morph targets"},
+    {"bench", supine_command_bench, "measure what an evaluation costs on this machine"},
     {"solve", supine_command_solve, "full physics for one posture: the reference"},
     {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
 };

@@ -33,8 +33,14 @@ demo)
   exec sh cmake/demo.sh build/release/supine demo
   ;;
 test)
+  # What exported files are opened with: another node or browser that is there serves as well.
+  command -v npm >/dev/null || tests="$tests nodejs npm"
+  command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086
   install_missing $build $tests
+  [ -d tests/export/node_modules ] ||
+    npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
+    echo "npm's packages are missing: the tests of exported files that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   exec ctest --preset release

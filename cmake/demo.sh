@@ -11,11 +11,23 @@ for posture in supine prone left right; do
   "$supine" deform "$folder/lungs.safetensors" --posture $posture --volume 500 \
     -o "$folder/$posture.vtp"
 done
-echo
-echo "Made in $folder/:"
-echo "  lungs.ply            a pair of lungs at rest"
-echo "  lungs.safetensors    their basis: every direction of gravity, every volume"
-echo "  supine.vtp prone.vtp left.vtp right.vtp"
-echo "                       the lungs 500 mL fuller, lying on back, belly and either side"
-echo "To look at them: open the four .vtp files in ParaView and colour by displacement_magnitude."
-echo "To go on: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume 800 -o mine.ply"
+"$supine" export "$folder/lungs.safetensors" -o "$folder/lungs.html"
+picture=""
+if "$supine" render "$folder/lungs.safetensors" --posture supine,prone,left,right \
+  -o "$folder/postures.png"; then
+  picture="  postures.png         the four, side by side"
+fi
+cat <<END
+
+Made in $folder/:
+  lungs.ply            a pair of lungs at rest
+  lungs.safetensors    their basis: every direction of gravity, every volume
+  supine.vtp prone.vtp left.vtp right.vtp
+                       the lungs 500 mL fuller, lying on back, belly and either side
+  lungs.html           the same lungs to turn and breathe in a browser
+$picture
+
+To look at them: open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
+coloured by displacement_magnitude.
+To go on: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume 800 -o mine.ply
+END

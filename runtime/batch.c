@@ -61,7 +61,7 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
     for (size_t j = 0; j < count; j += group) {
       const size_t here = count - j < group ? count - j : group;
       for (size_t i = 0; i < here; ++i) {
-        supine_fold(basis, weights + (j + i) * modes, scales[(j + i) * lungs + lung], true,
+        supine_fold(basis, weights + (j + i) * modes, scales[(j + i) * lungs + lung],
                     scratch.folded + i * modes);
       }
       batch_tiles(basis, here, scratch.folded, &wide, from / TILE, (to - from) / TILE,

@@ -36,8 +36,8 @@ static inline uint16_t half_narrow(float value) {
   return (uint16_t)(sign | ((bits + 0xFFFU + ((bits >> 13) & 1U)) >> 13));
 }
 
-/** A float of 24 bits, from the low 24 of a word: sign, 5 exponent bits counted from `bias`
- * (shifted by 23), 18 bits of fraction. */
+/** A float of 24 bits, from the low 24 of a word (the others are ignored): sign, 5 exponent bits
+ * counted from `bias` (shifted by 23), 18 bits of fraction. */
 static inline float float24_widen(uint32_t word, uint32_t bias) {
   const uint32_t sign = (word & 0x800000U) << 8;
   return bits_float(sign | (((word & 0x7FFFFFU) << 5) + bias));

@@ -65,7 +65,7 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = target_after(target, first - begin);
-      supine_fold(basis, weights, scales[lung], false, folded);
+      supine_fold(basis, weights, scales[lung], folded);
       deform_lung(basis, folded, first, last, &here);
     }
   }

@@ -43,10 +43,8 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 /** supine_basis_info.storage_error of the tiles as they are. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** What the kernels multiply by: weights times scale times the units of the packed numbers.
- * @param widened  for tiles of the EXACT layout that supine_kernels.widen made
- * @param folded   [K rounded up to even] */
-void supine_fold(const supine_basis *basis, const double *weights, double scale, bool widened,
-                 float *folded);
+/** What the kernels multiply by: weights times scale times the units of the packed coefficients.
+ * @param folded  [K] */
+void supine_fold(const supine_basis *basis, const double *weights, double scale, float *folded);
 
 #endif

@@ -7,41 +7,28 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* Coefficient k of vertices 8 half to 8 half + 7; float and half storage. */
+/* Coefficient k of vertices 8 half to 8 half + 7. */
 INLINE __m256 coefficient(const unsigned char *at, size_t k, size_t half, supine_storage storage) {
-  return storage == SUPINE_STORAGE_FLOAT16
-             ? _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)))
-             : _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+  const __m128i *const shorts = (const __m128i *)(at + 32 * k + 16 * half);
+  switch (storage) {
+  case SUPINE_STORAGE_INT16:
+    return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_load_si128(shorts)));
+  case SUPINE_STORAGE_FLOAT16:
+    return _mm256_cvtph_ps(_mm_load_si128(shorts));
+  default:
+    return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+  }
 }
 
 typedef struct halves {
   __m256 v[2];
 } halves;
 
-/* Adds pair k of vertices 8 half to 8 half + 7, times the weights of the pair. */
-INLINE __m256 add_pair(const unsigned char *at, const float *w, size_t k, size_t half, __m256 sum) {
-  const __m256i word = _mm256_load_si256((const __m256i *)(at + 32 * k + 32 * half));
-  const __m256 low = _mm256_cvtepi32_ps(_mm256_slli_epi32(word, 16));
-  sum = k == 0 ? _mm256_mul_ps(_mm256_broadcast_ss(w), _mm256_cvtepi32_ps(word))
-               : _mm256_fmadd_ps(_mm256_broadcast_ss(w + k), _mm256_cvtepi32_ps(word), sum);
-  return _mm256_fmadd_ps(_mm256_broadcast_ss(w + k + 1), low, sum);
-}
-
-/* sum over k of w_k c_k: K multiplications, K - 1 additions (int16: K rounded up to even). */
+/* sum over k of w_k c_k: K multiplications, K - 1 additions. */
 INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
-  halves sum;
-  if (storage == SUPINE_STORAGE_INT16) {
-    const __m256 zero = _mm256_setzero_ps();
-    sum = (halves){{add_pair(at, w, 0, 0, zero), add_pair(at, w, 0, 1, zero)}};
-    for (size_t k = 2; k < modes; k += 2) {
-      sum.v[0] = add_pair(at, w, k, 0, sum.v[0]);
-      sum.v[1] = add_pair(at, w, k, 1, sum.v[1]);
-    }
-    return sum;
-  }
   const __m256 first = _mm256_broadcast_ss(w);
-  sum = (halves){{_mm256_mul_ps(first, coefficient(at, 0, 0, storage)),
-                  _mm256_mul_ps(first, coefficient(at, 0, 1, storage))}};
+  halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, 0, storage)),
+                 _mm256_mul_ps(first, coefficient(at, 0, 1, storage))}};
   for (size_t k = 1; k < modes; ++k) {
     const __m256 weight = _mm256_broadcast_ss(w + k);
     sum.v[0] = _mm256_fmadd_ps(weight, coefficient(at, k, 0, storage), sum.v[0]);
@@ -207,21 +194,11 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   }
 }
 
-static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
-  for (size_t k = 0; k < tiles->modes; ++k) {
-    for (size_t h = 0; h < 2; ++h) {
-      float *to = c + 16 * k + 8 * h;
-      if (tiles->storage == SUPINE_STORAGE_INT16) {
-        const __m256i word = _mm256_load_si256((const __m256i *)(at + 64 * (k / 2) + 32 * h));
-        const __m256i low = _mm256_srai_epi32(_mm256_slli_epi32(word, 16), 16);
-        const __m256i high = _mm256_srai_epi32(_mm256_sub_epi32(word, low), 16);
-        _mm256_store_ps(to, _mm256_cvtepi32_ps(k % 2 == 0 ? high : low));
-      } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
-        _mm256_store_ps(to, coefficient(at, k, h, SUPINE_STORAGE_FLOAT16));
-      } else {
-        _mm256_store_ps(to, coefficient(at, k, h, SUPINE_STORAGE_FLOAT32));
-      }
-    }
+INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
+                               float *c) {
+  for (size_t k = 0; k < modes; ++k) {
+    _mm256_store_ps(c + 16 * k, coefficient(at, k, 0, storage));
+    _mm256_store_ps(c + 16 * k + 8, coefficient(at, k, 1, storage));
   }
 }
 
@@ -235,8 +212,19 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
     float *d = (float *)(void *)(wide + to->direction_begin);
     float *p = (float *)(void *)(wide + to->rest_begin);
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
-                         (float *)(void *)(wide + axis * to->axis_bytes));
+      const unsigned char *from = tile + axis * tiles->axis_bytes;
+      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
+      switch (tiles->storage) {
+      case SUPINE_STORAGE_INT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_FLOAT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
+        break;
+      default:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
+        break;
+      }
     }
     for (size_t j = 0; j < 6; ++j) {
       if (tiles->axes == 1) {

@@ -25,30 +25,22 @@ INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
   return common ? w->v[k] : _mm512_set1_ps(w->at[k]);
 }
 
-/* Coefficient k of 16 vertices; float and half storage. */
+/* Coefficient k of 16 vertices. */
 INLINE __m512 coefficient(const unsigned char *at, size_t k, supine_storage storage) {
-  return storage == SUPINE_STORAGE_FLOAT16
-             ? _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(at + 32 * k)))
-             : _mm512_loadu_ps(at + 64 * k);
+  const __m256i *const shorts = (const __m256i *)(at + 32 * k);
+  switch (storage) {
+  case SUPINE_STORAGE_INT16:
+    return _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_load_si256(shorts)));
+  case SUPINE_STORAGE_FLOAT16:
+    return _mm512_cvtph_ps(_mm256_load_si256(shorts));
+  default:
+    return _mm512_loadu_ps(at + 64 * k);
+  }
 }
 
-/* sum over k of w_k c_k: K multiplications, K - 1 additions (INT16: K rounded up to even), in two
- * chains. */
+/* sum over k of w_k c_k, in two chains: K multiplications, K - 1 additions. */
 INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, bool common,
                   supine_storage storage) {
-  if (storage == SUPINE_STORAGE_INT16) {
-    __m512i word = _mm512_loadu_si512(at);
-    __m512 high = _mm512_mul_ps(weight(w, 0, common), _mm512_cvtepi32_ps(word));
-    __m512 low =
-        _mm512_mul_ps(weight(w, 1, common), _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)));
-    UNROLL for (size_t k = 2; k < modes; k += 2) {
-      word = _mm512_loadu_si512(at + 32 * k);
-      high = _mm512_fmadd_ps(weight(w, k, common), _mm512_cvtepi32_ps(word), high);
-      low = _mm512_fmadd_ps(weight(w, k + 1, common),
-                            _mm512_cvtepi32_ps(_mm512_slli_epi32(word, 16)), low);
-    }
-    return _mm512_add_ps(high, low);
-  }
   __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, storage));
   if (modes == 1) {
     return even;
@@ -276,23 +268,10 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   }
 }
 
-static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
-  if (tiles->storage == SUPINE_STORAGE_INT16) {
-    for (size_t k = 0; k < tiles->modes; k += 2) {
-      const __m512i word = _mm512_loadu_si512(at + 32 * k);
-      const __m512i low = _mm512_srai_epi32(_mm512_slli_epi32(word, 16), 16);
-      const __m512i high = _mm512_srai_epi32(_mm512_sub_epi32(word, low), 16);
-      _mm512_storeu_ps(c + 16 * k, _mm512_cvtepi32_ps(high));
-      if (k + 1 < tiles->modes) {
-        _mm512_storeu_ps(c + 16 * (k + 1), _mm512_cvtepi32_ps(low));
-      }
-    }
-  } else {
-    for (size_t k = 0; k < tiles->modes; ++k) {
-      _mm512_storeu_ps(c + 16 * k, tiles->storage == SUPINE_STORAGE_FLOAT16
-                                       ? coefficient(at, k, SUPINE_STORAGE_FLOAT16)
-                                       : coefficient(at, k, SUPINE_STORAGE_FLOAT32));
-    }
+INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
+                               float *c) {
+  for (size_t k = 0; k < modes; ++k) {
+    _mm512_storeu_ps(c + 16 * k, coefficient(at, k, storage));
   }
 }
 
@@ -306,8 +285,19 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
     const unsigned char *rest = tile + tiles->rest_begin;
     unsigned char *wide = to->bytes + t * to->stride;
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
-                         (float *)(void *)(wide + axis * to->axis_bytes));
+      const unsigned char *from = tile + axis * tiles->axis_bytes;
+      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
+      switch (tiles->storage) {
+      case SUPINE_STORAGE_INT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_FLOAT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
+        break;
+      default:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
+        break;
+      }
     }
     for (size_t j = 0; j < 3; ++j) {
       if (tiles->axes == 1) {

@@ -3,41 +3,38 @@
 #include "compact.h"
 #include "tiles.h"
 
+/* Adds w c_v of one mode to the sums of 16 vertices. */
+static inline void add_mode(supine_storage storage, const unsigned char *at, float w,
+                            float *restrict sum) {
+  if (storage == SUPINE_STORAGE_INT16) {
+    int16_t c[TILE];
+    memcpy(c, at, sizeof c);
+    for (size_t v = 0; v < TILE; ++v) {
+      sum[v] += w * (float)c[v];
+    }
+  } else if (storage == SUPINE_STORAGE_FLOAT16) {
+    uint16_t c[TILE];
+    memcpy(c, at, sizeof c);
+    for (size_t v = 0; v < TILE; ++v) {
+      sum[v] += w * half_widen(c[v]);
+    }
+  } else {
+    float c[TILE];
+    memcpy(c, at, sizeof c);
+    for (size_t v = 0; v < TILE; ++v) {
+      sum[v] += w * c[v];
+    }
+  }
+}
+
 /* sum over k of w_k c_vk of 16 vertices. */
 static void dot(const supine_tiles *tiles, const unsigned char *at, const float *w, float *sum) {
-  const size_t modes = tiles->modes;
-  for (size_t v = 0; v < TILE; ++v) {
-    sum[v] = 0;
+  const size_t step = tiles->axis_bytes / tiles->modes;
+  float total[TILE] = {0};
+  for (size_t k = 0; k < tiles->modes; ++k) {
+    add_mode(tiles->storage, at + k * step, w[k], total);
   }
-  switch (tiles->storage) {
-  case SUPINE_STORAGE_INT16:
-    for (size_t k = 0; k < modes; k += 2, at += 64) {
-      uint32_t word[TILE];
-      memcpy(word, at, sizeof word);
-      for (size_t v = 0; v < TILE; ++v) {
-        sum[v] += w[k] * (float)(int32_t)word[v] + w[k + 1] * (float)(int32_t)(word[v] << 16);
-      }
-    }
-    break;
-  case SUPINE_STORAGE_FLOAT16:
-    for (size_t k = 0; k < modes; ++k, at += 32) {
-      uint16_t half[TILE];
-      memcpy(half, at, sizeof half);
-      for (size_t v = 0; v < TILE; ++v) {
-        sum[v] += w[k] * half_widen(half[v]);
-      }
-    }
-    break;
-  default:
-    for (size_t k = 0; k < modes; ++k, at += 64) {
-      float c[TILE];
-      memcpy(c, at, sizeof c);
-      for (size_t v = 0; v < TILE; ++v) {
-        sum[v] += w[k] * c[v];
-      }
-    }
-    break;
-  }
+  memcpy(sum, total, sizeof total);
 }
 
 /* 48 numbers. */
@@ -46,8 +43,9 @@ static void widen_numbers(const unsigned char *at, bool compact, uint32_t bias, 
     memcpy(numbers, at, TILE_NUMBERS * sizeof *numbers);
     return;
   }
-  for (size_t j = 0; j < TILE_NUMBERS; ++j, at += 3) {
-    const uint32_t word = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+  for (size_t j = 0; j < TILE_NUMBERS; ++j) {
+    uint32_t word = 0; /* and a byte of the next, or of the padding behind the last */
+    memcpy(&word, at + 3 * j, sizeof word);
     numbers[j] = float24_widen(word, bias);
   }
 }
@@ -64,14 +62,18 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
     widen_numbers(tile + tiles->rest_begin, compact, tiles->rest_bias, p);
   }
   if (tiles->axes == 3) {
-    for (size_t j = 0; j < TILE_NUMBERS; ++j) {
-      xyz[j] = p[j] + amount[j % 3][j / 3];
+    for (size_t v = 0; v < TILE; ++v) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * v + axis] = p[3 * v + axis] + amount[axis][v];
+      }
     }
   } else {
     float d[TILE_NUMBERS];
     widen_numbers(tile + tiles->direction_begin, compact, tiles->direction_bias, d);
-    for (size_t j = 0; j < TILE_NUMBERS; ++j) {
-      xyz[j] = p[j] + amount[0][j / 3] * d[j];
+    for (size_t v = 0; v < TILE; ++v) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * v + axis] = p[3 * v + axis] + amount[0][v] * d[3 * v + axis];
+      }
     }
   }
 }
@@ -94,16 +96,14 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   }
 }
 
-/* 16 coefficients of each mode as floats, in the integers' scale. */
+/* 16 coefficients of each mode as floats, in the units they are packed in. */
 static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
   for (size_t k = 0; k < tiles->modes; ++k, c += TILE) {
     if (tiles->storage == SUPINE_STORAGE_INT16) {
-      uint32_t word[TILE];
-      memcpy(word, at + k / 2 * sizeof word, sizeof word);
+      int16_t packed[TILE];
+      memcpy(packed, at + k * sizeof packed, sizeof packed);
       for (size_t v = 0; v < TILE; ++v) {
-        const int32_t low = (int32_t)(word[v] << 16) / 65536;
-        const int32_t high = ((int32_t)word[v] - low) / 65536;
-        c[v] = (float)(k % 2 == 0 ? high : low);
+        c[v] = packed[v];
       }
     } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
       uint16_t half[TILE];

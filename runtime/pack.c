@@ -108,15 +108,13 @@ static void pack_coefficients(const supine_tiles *tiles, const units *u, float *
   for (size_t k = 0; k < tiles->modes; ++k) {
     float *row = rows + k * TILE;
     if (tiles->storage == SUPINE_STORAGE_INT16) {
-      uint32_t word[TILE];
-      unsigned char *pair = at + k / 2 * sizeof word;
-      memcpy(word, pair, sizeof word); /* zeros before the first of a pair */
+      int16_t packed[TILE];
       for (size_t v = 0; v < TILE; ++v) {
         const float q = to_int16(row[v], u->inverse[k]);
-        word[v] += (uint32_t)(int32_t)q << (k % 2 == 0 ? 16 : 0);
+        packed[v] = (int16_t)q;
         row[v] = q * u->mode[k];
       }
-      memcpy(pair, word, sizeof word);
+      memcpy(at + k * sizeof packed, packed, sizeof packed);
     } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
       uint16_t half[TILE];
       for (size_t v = 0; v < TILE; ++v) {
@@ -185,19 +183,21 @@ static void measure(supine_basis *basis, const source *was, const source *is) {
   }
   const size_t modes = basis->tiles.modes;
   for (size_t k = 0; k < modes; ++k) {
+    float apart[TILE] = {0};
+    float size[TILE] = {0};
+    for (size_t axis = 0; axis < basis->tiles.axes; ++axis) {
+      const float *c = was->coefficients + (axis * modes + k) * TILE;
+      const float *packed = is->coefficients + (axis * modes + k) * TILE;
+      for (size_t v = 0; v < TILE; ++v) {
+        apart[v] += (c[v] - packed[v]) * (c[v] - packed[v]);
+        size[v] += c[v] * c[v];
+      }
+    }
     float top_error = 0;
     float top_size = 0;
     for (size_t v = 0; v < TILE; ++v) {
-      float apart = 0;
-      float size = 0;
-      for (size_t axis = 0; axis < basis->tiles.axes; ++axis) {
-        const size_t at = (axis * modes + k) * TILE + v;
-        const float c = was->coefficients[at] - is->coefficients[at];
-        apart += c * c;
-        size += was->coefficients[at] * was->coefficients[at];
-      }
-      const float error = sqrtf(apart) * length[v] + sqrtf(size) * slip[v];
-      const float moved = sqrtf(size) * length[v];
+      const float error = sqrtf(apart[v]) * length[v] + sqrtf(size[v]) * slip[v];
+      const float moved = sqrtf(size[v]) * length[v];
       top_error = error > top_error ? error : top_error;
       top_size = moved > top_size ? moved : top_size;
     }

@@ -5,7 +5,7 @@
  *     coefficients   K modes of 16 vertices, for each axis (1, or 3 where the kind is vector)
  *                      FLOAT32, EXACT   16 floats a mode
  *                      FLOAT16          16 halves a mode
- *                      INT16            16 words a pair of modes: 65536 first + second
+ *                      INT16            16 integers of 16 bits a mode
  *     direction      48 numbers x y z x y z ...; none where the kind is vector
  *     rest           48 numbers x y z x y z ...
  *
@@ -16,10 +16,6 @@
  * sign, 5 bits of exponent, 18 of fraction, the exponent counted from a bias that suits the
  * largest. Within half a metre of the origin they err by at most 0.0005 mm. They widen to float32
  * by shifts alone.
- *
- * A pair of INT16 modes needs no unpacking: with word = 65536 h + l,
- *
- *     w_h h + w_l l = W_h word + W_l (65536 l)      W_h = w_h / 65536, W_l = (w_l - W_h) / 65536
  */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
@@ -56,13 +52,12 @@ static inline bool supine_tiles_compact(supine_storage storage) {
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
-  const bool pairs = storage == SUPINE_STORAGE_INT16;
-  const size_t word = pairs || storage == SUPINE_STORAGE_FLOAT16 ? 2 : 4;
+  const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16;
   const size_t numbers = (size_t)TILE_NUMBERS * (compact ? 3 : 4);
   tiles->storage = storage;
   tiles->modes = modes;
   tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = (pairs ? modes + modes % 2 : modes) * TILE * word;
+  tiles->axis_bytes = modes * TILE * (short_words ? 2 : 4);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
   tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
   tiles->stride = (tiles->rest_begin + numbers + 31) / 32 * 32;
@@ -94,8 +89,8 @@ static inline void supine_stream_fence(bool stream) {
 #endif
 }
 
-/** Widens tiles first <= t < first + count into the EXACT layout `to`, keeping the integers' scale,
- * so that weights folded with supine_fold_widened serve. */
+/** Widens tiles first <= t < first + count into the EXACT layout `to`, keeping the units of the
+ * packed coefficients, so that the same folded weights serve. */
 typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
                                 supine_tiles *to);
 

@@ -40,3 +40,8 @@ if(EGL_FOUND)
   # The driver's own leaks are none of ours.
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
 endif()
+
+# The README's program is the one that is built against the installed package.
+add_test(NAME readme_example COMMAND sh -c
+  "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - tests/example/example.c"
+  WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})

@@ -295,6 +295,18 @@ static void check_report(const char *name) {
   free(text);
 }
 
+static void test_compare_without_breath_finds_nothing_moved(void **state) {
+  (void)state;
+  EXPECT(0, "0.000", "compare lungs.safetensors --volume 0 -o still.html");
+  assert_null(strstr(printed, "nan"));
+  size_t size = 0;
+  char *text = read_file("still.html", &size);
+  check_markup(text);
+  assert_null(strstr(text, "nan,"));
+  assert_null(strstr(text, "\"nan"));
+  free(text);
+}
+
 static void test_report_is_well_formed_and_needs_nothing_else(void **state) {
   (void)state;
   EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left -o report.html");
@@ -491,6 +503,7 @@ int main(void) {
       cmocka_unit_test(test_compare_json_holds_what_it_says),
       cmocka_unit_test(test_compare_table_names_every_posture),
       cmocka_unit_test(test_compare_csv_has_six_fields_a_row),
+      cmocka_unit_test(test_compare_without_breath_finds_nothing_moved),
       cmocka_unit_test(test_report_is_well_formed_and_needs_nothing_else),
       cmocka_unit_test(test_report_without_gl_says_so_and_carries_on),
       cmocka_unit_test(test_compare_open_surface_wants_rms),

@@ -31,6 +31,7 @@ supine_command_function supine_command_compare;
 supine_command_function supine_command_render;
 supine_command_function supine_command_breathe;
 supine_command_function supine_command_export;
+supine_command_function supine_command_bench;
 supine_command_function supine_command_solve;
 supine_command_function supine_command_pv;
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../export/base64.h"
 #include "../render/render.h"
 #include "basis_input.h"
 #include "comparison_html.h"
@@ -17,19 +18,6 @@ typedef struct look {
   char title[64];
   double extent[4];
 } look;
-
-static void base64(const unsigned char *bytes, size_t size, FILE *file) {
-  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  for (size_t i = 0; i < size; i += 3) {
-    const unsigned second = i + 1 < size ? bytes[i + 1] : 0U;
-    const unsigned third = i + 2 < size ? bytes[i + 2] : 0U;
-    const unsigned word = (unsigned)bytes[i] << 16U | second << 8U | third;
-    (void)fputc(digits[word >> 18U], file);
-    (void)fputc(digits[word >> 12U & 63U], file);
-    (void)fputc(i + 1 < size ? digits[word >> 6U & 63U] : '=', file);
-    (void)fputc(i + 2 < size ? digits[word & 63U] : '=', file);
-  }
-}
 
 static size_t choose_looks(const supine_comparison *c, look *looks) {
   const size_t lungs = supine_basis_get_info(c->basis)->lung_count;
@@ -74,7 +62,7 @@ static supine_status picture(const supine_comparison *c, supine_renderer *render
     (void)fputs(", ", file);
     supine_html_text(from->title, file);
     (void)fputs("\" src=\"data:image/png;base64,", file);
-    base64(png, size, file);
+    export_base64_write(png, size, file);
     (void)fputs("\"/>\n", file);
   }
   free(png);

@@ -65,9 +65,10 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
     (void)fprintf(file, "%3zu-%-3zu %% ", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const supine_slab *slab = &c->posture[i].slab[s];
+      const double total = supine_comparison_gain(c, i);
       (void)fprintf(file, "  %7.2f %6.2f",
                     slab->volume > 0.0 ? 100.0 * slab->gain / slab->volume : 0.0,
-                    100.0 * slab->gain / supine_comparison_gain(c, i));
+                    total != 0.0 ? 100.0 * slab->gain / total : 0.0);
     }
     (void)fputs(s == 0                             ? "  uppermost\n"
                 : s + 1 == SUPINE_COMPARISON_SLABS ? "  lowermost\n"

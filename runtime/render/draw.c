@@ -146,11 +146,11 @@ static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {
   size_t end;
   shown_lungs(r, scene, &begin, &end);
   for (size_t lung = begin; lung < end; ++lung) {
-    float weights[16] = {1};
-    for (size_t k = 0; r->packed && k < r->basis->info.mode_count; ++k) {
-      weights[k] = (float)(scene->scales[lung] * scene->weights[k]);
+    float weights[SUPINE_GL_MODES] = {1};
+    if (r->packed) {
+      (void)supine_gl_weights(r->basis, scene->weights, scene->scales[lung], weights);
     }
-    glUniform4fv(glGetUniformLocation(r->program, "weights"), 4, weights);
+    glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), 4, weights);
     glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[lung + 1] - r->index_begin[lung])),
                    GL_UNSIGNED_INT,
                    (const char *)NULL + 3 * r->index_begin[lung] * sizeof(uint32_t));

@@ -39,7 +39,7 @@ struct supine_renderer {
   supine_gl_context gl;
   GLuint program;
   GLuint array;
-  GLuint buffer[4]; /* rest; what the weights multiply; normals and values; triangles by lung */
+  GLuint buffer[4]; /* vertices; displacements, where not packed; normals, values; triangles */
   GLuint colours;
   bool packed; /* the basis has at most 16 modes and one direction a vertex: the GPU displaces */
   size_t index_begin[SUPINE_LUNGS_MAX + 1]; /* triangles of each lung */

@@ -6,16 +6,7 @@
 #include "../internal.h"
 #include "gl.h"
 
-enum { MODES = 16, COLOURS = 256, STRIDE = 3 + MODES };
-
-/* Direction and 16 coefficients of each vertex, [N, 19]; zeros beyond K. */
-static void pack(const supine_basis *basis, float *packed) {
-  const size_t modes = basis->info.mode_count;
-  for (size_t i = 0; i < basis->info.vertex_count; ++i, packed += STRIDE) {
-    memcpy(packed, basis->direction + 3 * i, 3 * sizeof *packed);
-    memcpy(packed + 3, basis->coefficients + i * modes, modes * sizeof *packed);
-  }
-}
+enum { COLOURS = 256 };
 
 static void attribute(GLuint location, GLint count, size_t stride, size_t offset) {
   glEnableVertexAttribArray(location);
@@ -58,33 +49,44 @@ static void group_triangles(supine_renderer *r, uint32_t *grouped) {
   r->index_begin[info->lung_count] = count;
 }
 
+/* Rest positions and, where the GPU displaces, directions and coefficients of every vertex. */
+static supine_status load_vertices(supine_renderer *r, supine_error *error) {
+  const size_t n = r->basis->info.vertex_count;
+  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
+  if (!r->packed) {
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->basis->vertices,
+                 GL_STATIC_DRAW);
+    attribute(ATTRIBUTE_REST, 3, 3, 0);
+    return SUPINE_OK;
+  }
+  float *packed = calloc(n, SUPINE_GL_FLOATS * sizeof *packed);
+  if (packed == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  const supine_status status = supine_gl_pack(r->basis, 0, n, packed);
+  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(SUPINE_GL_FLOATS * n * sizeof *packed), packed,
+               GL_STATIC_DRAW);
+  attribute(ATTRIBUTE_REST, 3, SUPINE_GL_FLOATS, 0);
+  attribute(ATTRIBUTE_DIRECTION, 3, SUPINE_GL_FLOATS, 3);
+  for (GLuint k = 0; k < 4; ++k) {
+    attribute(ATTRIBUTE_COEFFICIENTS + k, 4, SUPINE_GL_FLOATS, 6 + 4 * (size_t)k);
+  }
+  free(packed);
+  return status;
+}
+
 static supine_status load_surface(supine_renderer *r, supine_error *error) {
   const supine_basis_info *info = &r->basis->info;
   const size_t n = info->vertex_count;
   uint32_t *grouped = malloc(3 * info->triangle_count * sizeof *grouped + 1);
-  float *packed = calloc(n, STRIDE * sizeof *packed);
-  supine_status status = SUPINE_OK;
-  if (grouped == NULL || packed == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
-  }
-  if (r->packed) {
-    pack(r->basis, packed);
+  if (grouped == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   group_triangles(r, grouped);
   glGenVertexArrays(1, &r->array);
   glGenBuffers(4, r->buffer);
   glBindVertexArray(r->array);
-  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
-  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->basis->vertices,
-               GL_STATIC_DRAW);
-  attribute(ATTRIBUTE_REST, 3, 3, 0);
-  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[1]);
-  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(STRIDE * n * sizeof(float)), packed, GL_STATIC_DRAW);
-  attribute(ATTRIBUTE_DIRECTION, 3, STRIDE, 0);
-  for (GLuint k = 0; k < 4; ++k) {
-    attribute(ATTRIBUTE_COEFFICIENTS + k, 4, STRIDE, 3 + 4 * (size_t)k);
-  }
+  supine_status status = load_vertices(r, error);
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[2]);
   glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(4 * n * sizeof(float)), NULL, GL_DYNAMIC_DRAW);
   attribute(ATTRIBUTE_NORMAL, 3, 3, 0);
@@ -92,13 +94,11 @@ static supine_status load_surface(supine_renderer *r, supine_error *error) {
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, r->buffer[3]);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(3 * info->triangle_count * sizeof *grouped),
                grouped, GL_STATIC_DRAW);
-  if (glGetError() != GL_NO_ERROR) {
+  if (status == SUPINE_OK && glGetError() != GL_NO_ERROR) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY,
                               "the OpenGL driver cannot hold %zu vertices", n);
   }
-cleanup:
   free(grouped);
-  free(packed);
   return status;
 }
 
@@ -110,7 +110,7 @@ supine_status supine_renderer_create(const supine_basis *basis, supine_renderer 
     return supine_error_set(error, status, "out of memory");
   }
   r->basis = basis;
-  r->packed = !basis->info.vector && basis->info.mode_count <= MODES;
+  r->packed = !basis->info.vector && basis->info.mode_count <= SUPINE_GL_MODES;
   r->scratch = calloc(basis->info.vertex_count, 7 * sizeof *r->scratch);
   if (r->scratch == NULL) {
     (void)supine_error_set(error, status, "out of memory");

@@ -1,18 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The GPU's part: displacement, projection, light and colour. */
 #include "gl.h"
+#include "supine_glsl.h" /* supine.glsl as a string, made by the build */
 
 static const char version[] = "#version 300 es\n"
                               "precision highp float;\n";
-
-/* u = (w . c) d, the weights already times the breath scale. */
-static const char displace[] =
-    "vec3 supine_displace(vec3 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3,\n"
-    "                     vec4 weights[4]) {\n"
-    "  float amount = dot(c0, weights[0]) + dot(c1, weights[1]) + dot(c2, weights[2]) +\n"
-    "                 dot(c3, weights[3]);\n"
-    "  return rest + amount * direction;\n"
-    "}\n";
 
 static const char vertex_main[] =
     "layout(location = 0) in vec3 rest;\n"
@@ -23,7 +15,6 @@ static const char vertex_main[] =
     "layout(location = 5) in vec4 c3;\n"
     "layout(location = 6) in vec3 normal;\n"
     "layout(location = 7) in float value;\n"
-    "uniform vec4 weights[4];\n"
     "uniform mat3 view;\n"   /* body axes to right, up, towards the viewer */
     "uniform vec3 centre;\n" /* of the lungs, mm */
     "uniform vec4 frame;\n"  /* x, y: middle of the projected lungs, mm; z, w: mm to the edges */
@@ -32,7 +23,7 @@ static const char vertex_main[] =
     "out vec3 v_eye;\n"
     "out float v_value;\n"
     "void main() {\n"
-    "  vec3 p = view * (supine_displace(rest, direction, c0, c1, c2, c3, weights) - centre);\n"
+    "  vec3 p = view * (supine_displace(rest, direction, c0, c1, c2, c3) - centre);\n"
     "  float w = depth.x - p.z;\n"
     "  float near = depth.x - depth.y;\n"
     "  float far = depth.x + depth.y;\n"
@@ -96,7 +87,7 @@ static GLuint compile(GLenum kind, const char *first, const char *second, supine
 GLuint supine_gl_program(supine_error *error) {
   GLint good = GL_FALSE;
   GLuint program = 0;
-  const GLuint vertex = compile(GL_VERTEX_SHADER, displace, vertex_main, error);
+  const GLuint vertex = compile(GL_VERTEX_SHADER, supine_glsl, vertex_main, error);
   const GLuint fragment = vertex != 0 ? compile(GL_FRAGMENT_SHADER, "", fragment_main, error) : 0;
   if (fragment != 0) {
     program = glCreateProgram();

@@ -2,7 +2,7 @@
 // The page in headless Chromium: it loads from disk without a request or a complaint, computes the
 // C evaluator's positions on the graphics side, and answers to its controls.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import {
@@ -99,7 +99,6 @@ async function checkControls(page) {
 /** The value under the pointer is the displacement there. */
 async function checkPointer(page) {
   const box = await page.locator('#picture').boundingBox();
-  await page.evaluate(() => window.supine.state.camera);
   for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {
     await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
     await picture(page);
@@ -120,8 +119,8 @@ async function checkPointer(page) {
 }
 
 const mesh = join(folder, 'lungs.ply');
-const open_mesh = join(folder, 'open.obj');
-const bases = ['modes', 'harmonics', 'open'].map((name) => join(folder, `${name}.safetensors`));
+const torn = join(folder, 'torn.obj');
+const bases = ['modes', 'harmonics', 'torn'].map((name) => join(folder, `${name}.safetensors`));
 supine('phantom', '-o', mesh, '--vertices', '2000');
 supine('precompute', mesh, '-o', bases[0]);
 supine('precompute', mesh, '-o', bases[1], '--band', '3', '--modes', 'harmonics');
@@ -142,4 +141,19 @@ assert.equal(await dark.page.evaluate(() => document.documentElement.dataset.the
 await checkPositions(dark.page, bases[1], 700);
 assert.ok(await dark.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'too wide for a phone');
 assert.deepEqual(dark.complaints, []);
+await dark.page.close();
+
+// A surface with a hole has no volume: the breath is in millimetres.
+supine('deform', bases[0], '--posture', 'supine', '--volume', '0', '-o', torn);
+writeFileSync(torn, readFileSync(torn, 'utf8').replace(/^f .*\n/m, ''));
+supine('precompute', torn, '-o', bases[2]);
+supine('export', bases[2], '-o', html, '--scale', '8');
+const { page: opened, complaints: last } = await open(html);
+const [scale, found] = await opened.evaluate(() => [
+  window.supine.moment([0, 1, 0], 8).scale, Array.from(window.supine.positions([0, 1, 0], 8))]);
+const [moved, rest] = evaluate(bases[2], [[[0, 1, 0], scale], [[0, 1, 0], 0]]);
+assert.ok(largestDistance(found, moved.xyz) < TOLERANCE_MM);
+assert.ok(Math.abs(largestDistance(found, rest.xyz) - 8) < TOLERANCE_MM);
+assert.match(await opened.locator('#depth-value').textContent(), /mm/);
+assert.deepEqual(last, []);
 await browser.close();

@@ -35,7 +35,8 @@ function start() {
   let unseen = true;    // the picture is not what the state says
   let pointer = null;   // where on the canvas, CSS pixels
   let before = null;    // time of the last frame, when frames follow each other
-  let frameTime = NaN;
+  let streak = 0;       // frames that have followed each other
+  let frameTime = NaN;  // ms, smoothed
   let view = null;
 
   const modelTurn = () => slerp(IDENTITY, state.q, state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend));
@@ -59,9 +60,9 @@ function start() {
     const q = compose(cameraTurn(), modelTurn());
     const away = rotate(q, centre);
     const gravity = state.gravity;
-    const tail = rotate(q, gravity).map((x) => x * (lowest(gravity) + 0.08 * radius));
+    const tail = rotate(q, gravity).map((x) => x * (lowest(gravity) + 0.06 * radius));
     const arrow = rigid(compose(q, arrowTurn(gravity)), [tail[0], tail[1], tail[2] - distance]);
-    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.28;
+    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.24;
     return {
       toEye: rigid(q, [-away[0], -away[1], -away[2] - distance]),
       projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - 2.5 * radius, distance * 0.02), distance + 2.5 * radius),
@@ -130,10 +131,12 @@ function start() {
     const moving = state.advance(seconds);
     if (moving) stale = unseen = true;
     if (!unseen) {
-      before = moving ? now : null;
+      before = null;
+      streak = 0;
       return;
     }
-    if (before !== null) frameTime = Number.isNaN(frameTime) ? now - before : 0.9 * frameTime + 0.1 * (now - before);
+    streak += 1;
+    if (streak > 3) frameTime = streak === 4 ? now - before : 0.9 * frameTime + 0.1 * (now - before);
     before = now;
     if (stale) {
       const good = state.compute();

@@ -28,7 +28,7 @@ function postureName(gravity) {
   return `${close.p.name} + ${Math.round(close.angle)}°`;
 }
 
-const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1.08 };
+const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1 };
 
 class State {
   constructor(basis) {

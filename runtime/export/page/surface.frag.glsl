@@ -25,7 +25,7 @@ void main() {
   }
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
-  float diffuse = 0.5 + 0.42 * max(dot(n, key), 0.0) + 0.14 * max(dot(n, fill), 0.0) + 0.06 * n.y;
+  float diffuse = 0.56 + 0.4 * max(dot(n, key), 0.0) + 0.14 * max(dot(n, fill), 0.0) + 0.06 * n.y;
   float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);
   float shine = pow(max(dot(n, normalize(key + view)), 0.0), 42.0);
   vec3 lit = base * diffuse + 0.13 * shine;
