@@ -325,7 +325,7 @@ static supine_bench_row *add(list *l, bench *work, const char *what, const supin
                              double bytes) {
   task *t = &l->tasks[l->count];
   supine_bench_entry *e = &l->entries[l->count++];
-  const size_t rounds = 1 + ENOUGH / work->image.vertices;
+  const size_t rounds = 1 + ENOUGH / count;
   *t = (task){work, basis, threads, range, count, rounds};
   *e = (supine_bench_entry){.rounds = rounds, .run = task_run, .context = t};
   e->row = (supine_bench_row){.what = what,
