@@ -53,8 +53,8 @@ static double cubic_turn(const double c[3], double side) {
   return nearest * side;
 }
 
-/* Newton's steps, or bisection where they leave [low, high], between which the volume's difference changes
- * sign and the cubic is monotone. */
+/* Newton's steps, or bisection where they leave [low, high], between which the volume's difference
+ * changes sign and the cubic is monotone. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = supine_volume_at(c, high) > supine_volume_at(c, low);
   double s = volume / c[0];
@@ -116,4 +116,3 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   *scale = side > 0 ? cubic_solve(c, volume, 0, far) : cubic_solve(c, volume, far, 0);
   return SUPINE_OK;
 }
-

@@ -78,7 +78,6 @@ static inline void full_operator_free(full_operator *op) {
   free(op->own);
 }
 
-
 /* A sparse direct factorisation of I - A. */
 typedef struct direct_solver {
   int *ap, *ai;
@@ -92,11 +91,10 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   int *ti = malloc((size_t)entries * sizeof *ti);
   int *tj = malloc((size_t)entries * sizeof *tj);
   double *tx = malloc((size_t)entries * sizeof *tx);
-  direct_solver d = {malloc(((size_t)nodes + 1) * sizeof(int)),
-                     malloc((size_t)entries * sizeof(int)),
-                     malloc((size_t)entries * sizeof(double)),
-                     malloc((size_t)nodes * sizeof(double)),
-                     malloc((size_t)nodes * sizeof(double)), NULL};
+  direct_solver d = {
+      malloc(((size_t)nodes + 1) * sizeof(int)), malloc((size_t)entries * sizeof(int)),
+      malloc((size_t)entries * sizeof(double)),  malloc((size_t)nodes * sizeof(double)),
+      malloc((size_t)nodes * sizeof(double)),    NULL};
   for (size_t i = 0; i < op->entry_count; ++i) {
     ti[i] = (int)op->row[i];
     tj[i] = (int)op->column[i];

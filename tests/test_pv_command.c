@@ -17,7 +17,6 @@
 
 #include "../runtime/command/command.h"
 
-
 static char folder[] = "/tmp/supine-pv-XXXXXX";
 static char good[64], bad[64], out[64], printed[64];
 static char text[65536];

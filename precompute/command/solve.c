@@ -51,8 +51,7 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   supine_output output = {0};
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (column == NULL ||
-      supine_lungs_network(lungs, &network) != SUPINE_OK ||
+  if (column == NULL || supine_lungs_network(lungs, &network) != SUPINE_OK ||
       supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Precomputing both lungs, from files to basis file, beside what assimp alone takes to load the same
- * files with their identical vertices joined, one after the other. Interleaved; the least of each is
- * printed, then the growth from 5 thousand to 509 thousand vertices.
+/* Precomputing both lungs, from files to basis file, beside what assimp alone takes to load the
+ * same files with their identical vertices joined, one after the other. Interleaved; the least of
+ * each is printed, then the growth from 5 thousand to 509 thousand vertices.
  *
  *     bench_precompute [REPEATS] */
 #include <stdio.h>

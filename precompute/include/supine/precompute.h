@@ -81,8 +81,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
-/** The same from another simulator's fields: fits, compresses, cross-validates, writes. Breath scale 1
- * gives the fields as they were; closed surfaces can be asked for volumes.
+/** The same from another simulator's fields: fits, compresses, cross-validates, writes. Breath
+ * scale 1 gives the fields as they were; closed surfaces can be asked for volumes.
  * @param made_by  how, for the file's metadata; optional */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *made_by,

@@ -37,8 +37,8 @@ typedef struct supine_bench_entry {
   void *context;
 } supine_bench_entry;
 
-/** Runs every entry in turn, `repeats` times over, each time beginning with another, subnormals flushed, and fills in the rows'
- * times, rates and shares from the fastest run of each. */
+/** Runs every entry in turn, `repeats` times over, each time beginning with another, subnormals
+ * flushed, and fills in the rows' times, rates and shares from the fastest run of each. */
 void supine_bench_measure(supine_bench_entry *entries, size_t count, size_t repeats);
 
 /** A made basis of any size as a file in memory, for want of a file: the fields of `like` over and
