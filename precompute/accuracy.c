@@ -94,7 +94,7 @@ static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
   const supine_truth *truth = work->truth;
   const size_t modes = work->compression->mode_count;
   double is[BLOCK];
-  double should[BLOCK];
+  double should[BLOCK] = {0.0}; /* to its end, though the last block is shorter */
   double miss[BLOCK];
   for (size_t d = 0; d < truth->direction_count; ++d) {
     compressed_block(block, modes, work->weights + d * modes, is);

@@ -54,7 +54,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   double *a = malloc(count * terms * sizeof *a);
   double *u = malloc(count * terms * sizeof *u);
   double *vt = malloc(terms * terms * sizeof *vt);
-  double *s = malloc(terms * sizeof *s);
+  double *s = calloc(terms, sizeof *s);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (f->y == NULL || f->inverse == NULL || f->analysis == NULL || f->leverage == NULL ||
       a == NULL || u == NULL || vt == NULL || s == NULL) {
@@ -331,10 +331,11 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
   supine_projection *made = &w->projection;
   *made =
       (supine_projection){.vertex_count = w->rows, .band = band, .rank = terms, .solve_count = m};
-  made->columns = malloc(w->rows * terms * sizeof *made->columns);
+  made->columns = calloc(w->rows * terms + 1, sizeof *made->columns);
   if (made->columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu coefficients",
-                            w->rows * terms);
+    (void)supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu coefficients",
+                           w->rows * terms);
+    return SUPINE_ERROR_MEMORY;
   }
   if (w->grid == NULL) {
     cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, (int)w->rows, (int)terms, (int)m, 1.0,
@@ -347,7 +348,6 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
   supine_status status = ring == NULL
                              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a ring")
                              : supine_sh_transform_create(band, w->grid, &plan, error);
-  memset(made->columns, 0, w->rows * terms * sizeof *made->columns);
   const supine_sh_batch batch = {.fields = w->rows};
   for (size_t j = 0; j < w->grid->latitudes && status == SUPINE_OK; ++j) {
     for (size_t d = 0; d < m; ++d) {

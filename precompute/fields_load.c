@@ -139,6 +139,9 @@ static supine_status load_surfaces(const char *list, char **paths, const size_t 
                                    const supine_mesh_load_options *options, supine_fields *fields,
                                    supine_error *error) {
   const size_t count = fields->direction_count;
+  if (count == 0) {
+    return SUPINE_OK;
+  }
   supine_error *errors = calloc(count, sizeof *errors);
   if (errors == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", list);
@@ -166,7 +169,8 @@ static supine_status take_row(const pv_csv *csv, supine_fields *fields, char ***
   size_t *more_lines = realloc(*lines, (at + 1) * sizeof *more_lines);
   *lines = more_lines != NULL ? more_lines : *lines;
   supine_status status = grow(fields, 1, error);
-  if (status != SUPINE_OK || more_paths == NULL || more_lines == NULL) {
+  if (status != SUPINE_OK || more_paths == NULL || more_lines == NULL ||
+      fields->directions == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory for %zu fields", csv->path,
                             at + 1);
   }
@@ -250,10 +254,12 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   const bool ras = options != NULL && options->axes == SUPINE_AXES_RAS;
   const double unit =
       options != NULL && options->millimetres_per_unit > 0.0 ? options->millimetres_per_unit : 1.0;
-  size_t *rows = malloc(count * sizeof *rows);
   supine_status status = grow(fields, count, error);
-  if (rows == NULL && status == SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", path);
+  size_t *rows = malloc(count * sizeof *rows);
+  if (rows == NULL || fields->directions == NULL || fields->displacement == NULL) {
+    free(rows);
+    (void)supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory for %zu fields", path, count);
+    return SUPINE_ERROR_MEMORY;
   }
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
     rows[d] = d;

@@ -78,8 +78,8 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   it->own = malloc(nodes * sizeof *it->own);
   it->held = calloc(nodes, sizeof *it->held);
   it->caught = calloc(nodes, sizeof *it->caught);
-  it->heap = malloc(nodes * sizeof *it->heap);
-  it->place = malloc(nodes * sizeof *it->place);
+  it->heap = calloc(nodes, sizeof *it->heap);
+  it->place = calloc(nodes, sizeof *it->place);
   if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->own == NULL ||
       it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
     return false;
@@ -144,6 +144,9 @@ supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topol
                                      void (*progress)(void *context, size_t steps, double held),
                                      void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
+  if (n == 0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices");
+  }
   iteration it = {0};
   supine_status status = SUPINE_OK;
   double *scaled = malloc(n * sizeof *scaled);

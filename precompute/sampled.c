@@ -132,6 +132,9 @@ static void sample_range(void *context, size_t begin, size_t end, size_t thread)
 supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const double *directions,
                                    double *fields, supine_solve_report *worst,
                                    supine_error *error) {
+  if (sampler == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there is no sampler");
+  }
   const size_t threads = sampler->threads;
   supine_status status = SUPINE_ERROR_MEMORY;
   double *range = malloc(2 * count * sizeof *range);

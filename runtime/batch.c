@@ -6,29 +6,35 @@
 #include "internal.h"
 
 enum {
-  BLOCK_TILES = 16,
-  BLOCK_BYTES = 32768,  /* of widened tiles, less than a first-level cache */
-  WEIGHT_NUMBERS = 4096 /* folded weights of a group of orientations */
+  BLOCK_TILES = 23,
+  BLOCK_BYTES = 32768,   /* of widened tiles, less than a first-level cache */
+  WEIGHT_NUMBERS = 4096, /* folded weights of a group of orientations */
+  GROUP = 256            /* most orientations of a group */
 };
 
 typedef struct block {
   _Alignas(64) unsigned char bytes[BLOCK_BYTES];
   float folded[WEIGHT_NUMBERS];
+  float held[GROUP][16]; /* see supine_target */
 } block;
 
 /* Whole tiles of one lung; `positions` is orientation 0's first, `apart` numbers to the next. */
-static void batch_tiles(const supine_basis *basis, size_t count, const float *folded,
-                        supine_tiles *wide, size_t first, size_t tiles, float *positions,
-                        size_t apart, bool stream) {
+static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
+                        size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;
   const size_t step = fit < BLOCK_TILES ? fit : BLOCK_TILES;
   for (size_t t = 0; t < tiles; t += step) {
     const size_t here = tiles - t < step ? tiles - t : step;
     basis->kernels->widen(&basis->tiles, first + t, here, wide);
     for (size_t j = 0; j < count; ++j) {
-      const supine_target target = {
-          positions + j * apart + t * TILE_NUMBERS, NULL, NULL, true, stream, true};
-      basis->kernels->deform(wide, folded + j * basis->info.mode_count, 0, here, &target);
+      const supine_target target = {.x = positions + j * apart + t * TILE_NUMBERS,
+                                    .rest = true,
+                                    .stream = stream,
+                                    .near = true,
+                                    .held = scratch->held[j],
+                                    .continues = t > 0,
+                                    .continued = t + here < tiles};
+      basis->kernels->deform(wide, scratch->folded + j * basis->info.mode_count, 0, here, &target);
     }
   }
 }
@@ -40,9 +46,9 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
   const size_t modes = basis->info.mode_count;
   const size_t lungs = basis->info.lung_count;
   const size_t apart = 3 * (end - begin);
-  const size_t group = WEIGHT_NUMBERS / modes;
+  const size_t group = WEIGHT_NUMBERS / modes < GROUP ? WEIGHT_NUMBERS / modes : GROUP;
   const double bytes = (double)count * (double)apart * sizeof *xyz;
-  const bool stream = basis->stream || bytes > STREAM_BYTES;
+  const bool stream = bytes > STREAM_BATCH_BYTES;
   supine_tiles_layout(&wide, SUPINE_STORAGE_EXACT, modes, basis->info.vector, BLOCK_TILES);
   wide.bytes = scratch.bytes;
   for (size_t lung = 0; lung < lungs; ++lung) {
@@ -64,7 +70,7 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
         supine_fold(basis, weights + (j + i) * modes, scales[(j + i) * lungs + lung],
                     scratch.folded + i * modes);
       }
-      batch_tiles(basis, here, scratch.folded, &wide, from / TILE, (to - from) / TILE,
+      batch_tiles(basis, here, &scratch, &wide, from / TILE, (to - from) / TILE,
                   xyz + j * apart + 3 * (from - begin), apart, stream);
     }
     for (size_t j = 0; j < count; ++j) {

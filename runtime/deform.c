@@ -20,12 +20,11 @@ static void deform_part(const supine_basis *basis, const float *folded, size_t b
                         const supine_target *target) {
   float aside[TILE_NUMBERS];
   const bool joined = target->y == NULL;
-  const supine_target whole = {aside,
-                               joined ? NULL : aside + TILE,
-                               joined ? NULL : aside + (size_t)2 * TILE,
-                               target->rest,
-                               false,
-                               true};
+  const supine_target whole = {.x = aside,
+                               .y = joined ? NULL : aside + TILE,
+                               .z = joined ? NULL : aside + (size_t)2 * TILE,
+                               .rest = target->rest,
+                               .near = true};
   basis->kernels->deform(&basis->tiles, folded, begin / TILE, 1, &whole);
   const size_t first = begin % TILE;
   const size_t count = end - begin;
@@ -74,7 +73,7 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
 
 void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
                          size_t begin, size_t end, float *xyz) {
-  const supine_target target = {xyz, NULL, NULL, true, basis->stream, false};
+  const supine_target target = {.x = xyz, .rest = true, .stream = basis->stream};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
@@ -85,12 +84,12 @@ void supine_deform(const supine_basis *basis, const double *weights, const doubl
 
 void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *x, float *y, float *z) {
-  const supine_target target = {x, y, z, true, basis->stream, false};
+  const supine_target target = {.x = x, .y = y, .z = z, .rest = true, .stream = basis->stream};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
 void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
                            size_t begin, size_t end, float *xyz) {
-  const supine_target target = {xyz, NULL, NULL, false, basis->stream, false};
+  const supine_target target = {.x = xyz, .stream = basis->stream};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }

@@ -9,8 +9,9 @@
 
 #include "tiles.h"
 
-/** Tiles and positions larger than this pass through the caches rather than stay there. */
-enum { STREAM_BYTES = 1 << 22 };
+/** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
+ * through the caches rather than stay there. */
+enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24 };
 
 struct supine_basis {
   supine_basis_info info;

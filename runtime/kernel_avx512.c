@@ -124,29 +124,40 @@ typedef struct writer {
   float *to;
   size_t offset; /* numbers by which `to` is past an aligned line */
   bool stream;
+  bool shared; /* the next store's line begins with numbers that are not ours */
 } writer;
 
-INLINE writer writer_open(float *to, bool stream) {
+INLINE writer writer_open(float *to, const supine_target *target) {
   const size_t offset = (uintptr_t)to / sizeof *to % 16;
   const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  return (writer){_mm512_setzero_ps(), _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
-                  to, offset, stream};
+  const bool resume = target->held != NULL && target->continues;
+  return (writer){resume ? _mm512_loadu_ps(target->held) : _mm512_setzero_ps(),
+                  _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
+                  to,
+                  offset,
+                  target->stream,
+                  !resume && offset != 0};
 }
 
-INLINE void writer_put(writer *w, __m512 next, bool first) {
-  if (w->stream && !first) {
-    _mm512_stream_ps(w->to - w->offset, _mm512_permutex2var_ps(w->last, w->join, next));
-  } else {
+INLINE void writer_put(writer *w, __m512 next) {
+  if (!w->stream) {
     _mm512_storeu_ps(w->to, next);
+  } else if (w->shared) { /* the line begins with numbers that are not ours */
+    _mm512_mask_storeu_ps(w->to, (__mmask16)(0xFFFFU >> w->offset), next);
+    w->shared = false;
+  } else {
+    _mm512_stream_ps(w->to - w->offset, _mm512_permutex2var_ps(w->last, w->join, next));
   }
   w->last = next;
   w->to += 16;
 }
 
-/* What of the last register no full line has taken. */
-INLINE void writer_close(const writer *w) {
-  if (w->stream) {
-    _mm512_storeu_ps(w->to - 16, w->last);
+/* The end of the last register, which no full line has taken. */
+INLINE void writer_close(const writer *w, const supine_target *target) {
+  if (target->held != NULL && target->continued) {
+    _mm512_storeu_ps(target->held, w->last);
+  } else if (w->stream && w->offset != 0) {
+    _mm512_mask_storeu_ps(w->to - 16, (__mmask16)(0xFFFFU << (16 - w->offset)), w->last);
   }
 }
 
@@ -193,8 +204,8 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
   }
   const supine_tiles *tiles = &same;
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
-  writer out[3] = {writer_open(target->x, target->stream), writer_open(target->y, target->stream),
-                   writer_open(target->z, target->stream)}; /* joined: the first alone */
+  writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
+                   writer_open(target->z, target)}; /* joined: the first alone */
   weights16 w = {.at = weights};
   if (f.common) {
     UNROLL for (size_t k = 0; k < COMMON_MODES; ++k) {
@@ -213,18 +224,18 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
     }
     triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
     if (f.joined) {
-      writer_put(&out[0], xyz.v[0], t == 0);
-      writer_put(&out[0], xyz.v[1], t == 0);
-      writer_put(&out[0], xyz.v[2], t == 0);
+      writer_put(&out[0], xyz.v[0]);
+      writer_put(&out[0], xyz.v[1]);
+      writer_put(&out[0], xyz.v[2]);
     } else {
       xyz = separate(xyz);
       for (size_t axis = 0; axis < 3; ++axis) {
-        writer_put(&out[axis], xyz.v[axis], t == 0);
+        writer_put(&out[axis], xyz.v[axis]);
       }
     }
   }
   for (size_t axis = 0; axis < (f.joined ? 1 : 3) && count > 0; ++axis) {
-    writer_close(&out[axis]);
+    writer_close(&out[axis], target);
   }
 }
 

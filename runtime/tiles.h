@@ -70,6 +70,11 @@ typedef struct supine_target {
   bool rest;   /**< positions; otherwise displacements alone */
   bool stream; /**< store past the cache */
   bool near;   /**< the tiles are in the cache: do not ask for them ahead */
+  /** [16] or NULL. Where one array is written in several runs, what one run leaves to the next, so
+   * that a line that both share is stored once. */
+  float *held;
+  bool continues; /**< a run before this one left numbers in `held` */
+  bool continued; /**< leave such numbers for a run after this one */
 } supine_target;
 
 /** Evaluates whole tiles first <= t < first + count, of one lung, from folded weights (see

@@ -80,8 +80,8 @@ static supine_fields band_limited_fields(size_t band, size_t count, const double
   const size_t n = lungs.mesh.vertex_count;
   const size_t terms = supine_sh_count(band);
   supine_fields fields = {.direction_count = count, .vertex_count = n};
-  double *c = malloc(3 * n * terms * sizeof *c);
-  double *y = malloc(terms * sizeof *y);
+  double *c = calloc(3 * n * terms, sizeof *c);
+  double *y = calloc(terms, sizeof *y);
   uint64_t seed = 5;
   for (size_t i = 0; i < 3 * n * terms; ++i) {
     c[i] = random_signed(&seed);

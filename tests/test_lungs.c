@@ -218,7 +218,9 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   double mixed_cubic[3];
   supine_volume_forms_contract(&forms, weights, cubic);
   supine_volume_forms_contract(&mixed, weights, mixed_cubic);
-  for (double s = -3.0; s <= 5.0; s += 1.7) {
+  static const double scales[] = {-3.0, -1.3, 0.4, 2.1, 3.8};
+  for (size_t k = 0; k < sizeof scales / sizeof *scales; ++k) {
+    const double s = scales[k];
     double direct = 0.0;
     double mixed_direct = 0.0;
     for (size_t lung = 0; lung < 2; ++lung) {

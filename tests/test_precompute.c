@@ -232,7 +232,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   assert_true(report.accuracy.relative_p95 > report.accuracy.relative_rms);
   assert_true(report.accuracy.relative_max > report.accuracy.relative_p95);
   assert_true(report.accuracy.max_mm > report.accuracy.p95_mm);
-  assert_close(atof(supine_basis_metadata(basis, "error_rms_percent")), 100.0 * relative,
+  assert_close(strtod(supine_basis_metadata(basis, "error_rms_percent"), NULL), 100.0 * relative,
                1e-3 * 100.0 * relative);
   supine_basis_close(basis);
 }

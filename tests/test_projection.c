@@ -104,7 +104,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
   }
   gsl_linalg_SV_decomp_jacobi(u, v, s);
   supine_compression modes;
-  double singular[SUPINE_MODES_MADE_MAX];
+  double singular[SUPINE_MODES_MADE_MAX] = {0.0};
   double total;
   assert_int_equal(supine_compress_modes(projection, weight, most, &modes, singular, &total, NULL),
                    SUPINE_OK);

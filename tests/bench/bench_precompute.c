@@ -102,7 +102,7 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
 }
 
 int main(int argc, char **argv) {
-  const int repeats = argc > 1 ? atoi(argv[1]) : 7;
+  const int repeats = argc > 1 ? (int)strtol(argv[1], NULL, 10) : 7;
   char out[] = "/tmp/supine-bench-XXXXXX";
   const int descriptor = mkstemp(out);
   if (descriptor < 0) {
@@ -126,7 +126,7 @@ int main(int argc, char **argv) {
       }
     }
     for (int repeat = 0; repeat < repeats; ++repeat) {
-      double times[STAGES];
+      double times[STAGES] = {0.0};
       const double theirs = run_assimp(&files);
       const double mine = run_ours(&files, out, times, &vertices);
       if (theirs < 0.0 || mine < 0.0) {

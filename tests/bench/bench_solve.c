@@ -115,7 +115,7 @@ static void sample(const supine_lungs *lungs) {
 int main(int argc, char **argv) {
   static const size_t sizes[] = {5000, 10000, 20000, 40000, 80000};
   enum { SIZES = sizeof sizes / sizeof *sizes };
-  const int repeats = argc > 1 ? atoi(argv[1]) : 7;
+  const int repeats = argc > 1 ? (int)strtol(argv[1], NULL, 10) : 7;
   supine_lungs lungs[SIZES] = {0};
   for (size_t s = 0; s < SIZES; ++s) {
     supine_mesh mesh = {0};
