@@ -47,7 +47,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
                                 const double *weight, fit *f) {
   const size_t terms = supine_sh_count(band);
   *f = (fit){.count = count, .terms = terms};
-  f->y = malloc(count * terms * sizeof *f->y);
+  f->y = calloc(count * terms, sizeof *f->y);
   f->inverse = malloc(terms * terms * sizeof *f->inverse);
   f->analysis = malloc(terms * count * sizeof *f->analysis);
   f->leverage = malloc(count * sizeof *f->leverage);
@@ -345,9 +345,10 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
   }
   supine_sh_transform *plan = NULL;
   double *ring = malloc(w->grid->longitudes * w->rows * sizeof *ring);
-  supine_status status = ring == NULL
-                             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a ring")
-                             : supine_sh_transform_create(band, w->grid, &plan, error);
+  if (ring == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a ring");
+  }
+  supine_status status = supine_sh_transform_create(band, w->grid, &plan, error);
   const supine_sh_batch batch = {.fields = w->rows};
   for (size_t j = 0; j < w->grid->latitudes && status == SUPINE_OK; ++j) {
     for (size_t d = 0; d < m; ++d) {

@@ -385,7 +385,7 @@ static void test_deform_batch_each_orientation_within_stated_error(void **state)
   check_batch(700, 16, false, 1, 3, 691);
   check_batch(24000, 16, false, 64, 0, 24000); /* past the cache, lines whole */
   check_batch(23999, 16, false, 64, 1, 23998); /* and shared */
-  check_batch(90, 16, false, 300, 0, 90); /* more than one group of weights */
+  check_batch(90, 16, false, 300, 0, 90);      /* more than one group of weights */
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
   check_batch(90, 5, true, 5, 0, 90);

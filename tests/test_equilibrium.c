@@ -73,7 +73,7 @@ static double *solve_of(const fixture *f, const double *stiffness, size_t count)
 
 /* Scales stiffness to geometric mean 1, as the operator defines it. */
 static double *normalised(size_t count, const double *stiffness) {
-  double *out = calloc(count + 1, sizeof *out);
+  double *out = malloc(count * sizeof *out);
   double sum = 0.0;
   for (size_t i = 0; i < count; ++i) {
     sum += log(stiffness[i]);

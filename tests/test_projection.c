@@ -38,7 +38,7 @@ static int teardown(void **state) {
 /* Coefficients [N, P] of a projection, from its factors. */
 static double *coefficients_of(const supine_projection *projection) {
   const size_t terms = supine_sh_count(projection->band);
-  double *c = calloc(projection->vertex_count * terms, sizeof *c);
+  double *c = calloc(projection->vertex_count * terms + 1, sizeof *c);
   for (size_t i = 0; i < projection->vertex_count; ++i) {
     for (size_t r = 0; r < projection->rank; ++r) {
       for (size_t t = 0; t < terms; ++t) {
@@ -148,7 +148,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
 static void test_modes_equal_dense_decomposition(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  double *weight = malloc(n * sizeof *weight);
+  double *weight = calloc(n, sizeof *weight);
   for (size_t i = 0; i < n; ++i) {
     weight[i] = 1.0 + fabs(lungs->mesh.vertices[3 * i]);
   }
