@@ -249,7 +249,7 @@ static supine_status prepare(fitting *w, double *directions, supine_error *error
   const size_t n = fields->vertex_count;
   w->rows = w->options->scalar ? n : 3 * n;
   w->values = fields->displacement;
-  w->weight = malloc(m * sizeof *w->weight);
+  w->weight = calloc(m, sizeof *w->weight);
   w->place = malloc(m * sizeof *w->place);
   w->gram = malloc(m * m * sizeof *w->gram);
   w->owned = w->options->scalar ? malloc(m * n * sizeof *w->owned) : NULL;
@@ -470,7 +470,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)terms, (int)terms, (int)w->rows, 1.0,
               w->projection.columns, (int)terms, w->projection.columns, (int)terms, 0.0, gram,
               (int)terms);
-  for (size_t d = 0; d < m && status == SUPINE_OK; ++d) {
+  for (size_t d = 0; d < m && w->chosen.leverage != NULL && status == SUPINE_OK; ++d) {
     status = leave_out(w, gram, d, modes, &out);
     if (status == SUPINE_OK) {
       tally_misses(w, &out, d, tally);

@@ -43,7 +43,7 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
     vertices += meshes[m].vertex_count;
     triangles += meshes[m].triangle_count;
   }
-  if (count == 0 || triangles == 0) {
+  if (count == 0 || triangles == 0 || vertices == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH, "the model has no triangles");
   }
   if (vertices > UINT32_MAX) {

@@ -84,7 +84,11 @@ async function checkControls(page) {
   assert.equal(await page.locator('#posture-name').textContent(), 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
   await changes('pinning', () => page.getByRole('button', { name: 'Pin this posture' }).click());
-  await changes('room', () => page.locator('[name=frame][value=room]').check({ force: true }));
+  await changes('another key', () => page.keyboard.press('3')); /* upright, the room turns nothing */
+  await changes('room', async () => {
+    await page.locator('[name=frame][value=room]').check({ force: true });
+    await page.waitForFunction(() => window.supine.state.roomBlend > 0.99);
+  });
   await changes('the breath', async () => {
     await page.locator('#play').click();
     await page.waitForFunction(() => window.supine.state.depth < 300);
