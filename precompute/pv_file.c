@@ -7,6 +7,23 @@
 
 #include "pv_internal.h"
 
+/* Which limb the column names; inhale where the file has no such column. */
+static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_limb *limb,
+                               supine_error *error) {
+  const char *text = supine_csv_text(csv, column);
+  *limb = SUPINE_PV_INHALE;
+  if (text == NULL || strcmp(text, supine_pv_limb_name(SUPINE_PV_INHALE)) == 0) {
+    return SUPINE_OK;
+  }
+  *limb = SUPINE_PV_EXHALE;
+  if (strcmp(text, supine_pv_limb_name(SUPINE_PV_EXHALE)) == 0) {
+    return SUPINE_OK;
+  }
+  return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                          "%s:%zu: limb \"%s\" is neither inhale nor exhale", csv->path, csv->line,
+                          text);
+}
+
 static supine_status grow(void **array, size_t count, size_t size) {
   void *larger = reallocarray(*array, count, size);
   if (larger == NULL) {
@@ -32,17 +49,17 @@ static supine_status samples_reserve(supine_pv_samples *samples, supine_pv_limb 
   return SUPINE_OK;
 }
 
-static supine_status samples_add(const pv_csv *csv, const char *const *names,
+static supine_status samples_add(const supine_csv *csv, const char *const *names,
                                  supine_pv_samples *samples, supine_error *error) {
   supine_pv_limb limb = SUPINE_PV_INHALE;
   double pressure = 0.0;
   double volume = 0.0;
-  supine_status status = supine_pv_csv_limb(csv, 2, &limb, error);
+  supine_status status = read_limb(csv, 2, &limb, error);
   if (status == SUPINE_OK) {
-    status = supine_pv_csv_number(csv, 0, names[0], &pressure, error);
+    status = supine_csv_number(csv, 0, names[0], &pressure, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_pv_csv_number(csv, 1, names[1], &volume, error);
+    status = supine_csv_number(csv, 1, names[1], &volume, error);
   }
   if (status == SUPINE_OK) {
     status = samples_reserve(samples, limb, error);
@@ -60,8 +77,8 @@ supine_status supine_pv_samples_load(const char *path, supine_pv_samples *sample
                                      supine_error *error) {
   static const char *const names[] = {"pressure_cmH2O", "volume_mL", "limb"};
   *samples = (supine_pv_samples){0};
-  pv_csv csv = {0};
-  supine_status status = supine_pv_csv_open(path, names, 3, 2, &csv, error);
+  supine_csv csv = {0};
+  supine_status status = supine_csv_open(path, names, 3, 2, &csv, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -71,7 +88,7 @@ supine_status supine_pv_samples_load(const char *path, supine_pv_samples *sample
     goto cleanup;
   }
   for (bool more = true; more;) {
-    status = supine_pv_csv_next(&csv, &more, error);
+    status = supine_csv_next(&csv, &more, error);
     if (status == SUPINE_OK && more) {
       status = samples_add(&csv, names, samples, error);
     }
@@ -80,7 +97,7 @@ supine_status supine_pv_samples_load(const char *path, supine_pv_samples *sample
     }
   }
 cleanup:
-  supine_pv_csv_close(&csv);
+  supine_csv_close(&csv);
   if (status != SUPINE_OK) {
     supine_pv_samples_clear(samples);
   }
@@ -171,13 +188,13 @@ supine_status supine_pv_save(const char *path, const supine_pv *pv, supine_error
 }
 
 /* One row; `seen` remembers which limbs were read. */
-static supine_status parameters_add(const pv_csv *csv, supine_pv *pv, bool *seen,
+static supine_status parameters_add(const supine_csv *csv, supine_pv *pv, bool *seen,
                                     supine_error *error) {
   supine_pv_limb limb = SUPINE_PV_INHALE;
-  supine_status status = supine_pv_csv_limb(csv, 0, &limb, error);
+  supine_status status = read_limb(csv, 0, &limb, error);
   double number[PARAMETER_COUNT] = {0};
   for (size_t c = 1; c < PARAMETER_COUNT && status == SUPINE_OK; ++c) {
-    status = supine_pv_csv_number(csv, c, parameter_names[c], &number[c], error);
+    status = supine_csv_number(csv, c, parameter_names[c], &number[c], error);
   }
   if (status != SUPINE_OK) {
     return status;
@@ -202,16 +219,16 @@ static supine_status parameters_add(const pv_csv *csv, supine_pv *pv, bool *seen
 supine_status supine_pv_load(const char *path, supine_pv *pv, supine_error *error) {
   supine_pv found = {0};
   bool seen[SUPINE_PV_LIMB_COUNT] = {false};
-  pv_csv csv = {0};
+  supine_csv csv = {0};
   supine_status status =
-      supine_pv_csv_open(path, parameter_names, PARAMETER_COUNT, PARAMETER_COUNT, &csv, error);
+      supine_csv_open(path, parameter_names, PARAMETER_COUNT, PARAMETER_COUNT, &csv, error);
   for (bool more = true; more && status == SUPINE_OK;) {
-    status = supine_pv_csv_next(&csv, &more, error);
+    status = supine_csv_next(&csv, &more, error);
     if (status == SUPINE_OK && more) {
       status = parameters_add(&csv, &found, seen, error);
     }
   }
-  supine_pv_csv_close(&csv);
+  supine_csv_close(&csv);
   if (status != SUPINE_OK) {
     return status;
   }

@@ -11,6 +11,8 @@
 
 #include <supine/pv.h>
 
+#include "csv.h"
+
 /* State of the equation at one x, from y(-1) = 0, y'(-1) = 1, and of its responses to each control
  * parameter: y, y', then (dy/dc_i, dy'/dc_i) for i = 1 ... 5. */
 enum { PV_STATE = 2, PV_STATE_WITH_RESPONSES = 2 + 2 * SUPINE_PV_CONTROLS };
@@ -49,41 +51,5 @@ supine_status supine_pv_check_falls(const pv_origin *origin, const double *v, do
 supine_status supine_pv_report_fill(const gsl_matrix *jacobian, const gsl_vector *residual,
                                     double span, double confidence, supine_pv_report *report,
                                     double *sigma);
-
-enum { PV_CSV_FIELDS_MAX = 16 };
-
-/* A strict reader of small CSV files: comments, blank lines, one header; no quotes. Zeroed at
- * first. */
-typedef struct pv_csv {
-  const char *path;
-  FILE *file;
-  char *text;
-  size_t capacity;
-  size_t line;
-  size_t field_count;
-  char *field[PV_CSV_FIELDS_MAX]; /* of the row read last */
-  size_t column_count;
-  size_t column[PV_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
-} pv_csv;
-
-/* Opens and reads the header; each of the first `required` of `names` must be there. */
-supine_status supine_pv_csv_open(const char *path, const char *const *names, size_t count,
-                                 size_t required, pv_csv *csv, supine_error *error);
-
-/* Reads a row; *more is false at the end. */
-supine_status supine_pv_csv_next(pv_csv *csv, bool *more, supine_error *error);
-
-/* Text of a column of the row, or NULL where the file has no such column. */
-const char *supine_pv_csv_text(const pv_csv *csv, size_t column);
-
-/* A finite number. */
-supine_status supine_pv_csv_number(const pv_csv *csv, size_t column, const char *name,
-                                   double *number, supine_error *error);
-
-/* Which limb the column names; inhale where the file has no such column. */
-supine_status supine_pv_csv_limb(const pv_csv *csv, size_t column, supine_pv_limb *limb,
-                                 supine_error *error);
-
-void supine_pv_csv_close(pv_csv *csv);
 
 #endif

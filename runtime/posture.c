@@ -6,6 +6,8 @@
 
 #include <supine/posture.h>
 
+#include "words.h"
+
 static const struct {
   const char *name;
   double gravity[3];
@@ -18,15 +20,10 @@ static const struct {
     {"FFDR", {-1, 0, 0}},
 };
 
-enum { POSTURES = sizeof postures / sizeof *postures, NAME_MAX_LENGTH = 15 };
-
-/* ASCII alone, whatever the locale. */
-static int lower(char c) {
-  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
-}
+enum { POSTURES = sizeof postures / sizeof *postures };
 
 static bool same(const char *a, const char *b) {
-  while (*a != '\0' && lower(*a) == lower(*b)) {
+  while (*a != '\0' && supine_words_lower(*a) == supine_words_lower(*b)) {
     ++a;
     ++b;
   }
@@ -51,30 +48,11 @@ const char *supine_posture_name(size_t index) {
   return index < POSTURES ? postures[index].name : NULL;
 }
 
-/* Edit distance, row by row over `text`, which may be long. */
-static size_t distance(const char *text, const char *name) {
-  const size_t length = strlen(name);
-  size_t row[NAME_MAX_LENGTH + 1];
-  for (size_t j = 0; j <= length; ++j) {
-    row[j] = j;
-  }
-  for (const char *c = text; *c != '\0'; ++c) {
-    size_t diagonal = row[0]++;
-    for (size_t j = 1; j <= length; ++j) {
-      const size_t replaced = diagonal + (lower(*c) != lower(name[j - 1]));
-      const size_t shifted = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
-      diagonal = row[j];
-      row[j] = replaced < shifted ? replaced : shifted;
-    }
-  }
-  return row[length];
-}
-
 const char *supine_posture_nearest(const char *name) {
   size_t best = 0;
-  size_t fewest = distance(name, postures[0].name);
+  size_t fewest = supine_words_distance(name, postures[0].name);
   for (size_t i = 1; i < POSTURES; ++i) {
-    const size_t edits = distance(name, postures[i].name);
+    const size_t edits = supine_words_distance(name, postures[i].name);
     if (edits < fewest) {
       fewest = edits;
       best = i;

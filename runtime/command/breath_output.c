@@ -12,6 +12,7 @@
 #include <supine/safetensors.h>
 
 #include "breath_output.h"
+#include "comparison_html.h"
 
 struct breath_output {
   const supine_mesh *rest;
@@ -202,25 +203,6 @@ supine_status breath_output_add(breath_output *output, const float *xyz, supine_
   return status;
 }
 
-/* Writes text into an XML attribute. */
-static void write_attribute(FILE *file, const char *text) {
-  for (; *text != '\0'; ++text) {
-    switch (*text) {
-    case '&':
-      (void)fputs("&amp;", file);
-      break;
-    case '<':
-      (void)fputs("&lt;", file);
-      break;
-    case '"':
-      (void)fputs("&quot;", file);
-      break;
-    default:
-      (void)fputc(*text, file);
-    }
-  }
-}
-
 /* The list of the frames; `folder` before each name, "" where they lie beside it. */
 static supine_status write_index(const breath_output *output, const char *path, const char *folder,
                                  supine_error *error) {
@@ -238,7 +220,7 @@ static supine_status write_index(const breath_output *output, const char *path, 
     frame_name(t, name);
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
                   output->course->time[t]);
-    write_attribute(file.file, folder);
+    supine_html_text(folder, file.file);
     (void)fprintf(file.file, "%s%s\"/>\n", folder[0] == '\0' ? "" : "/", name);
   }
   (void)fputs("</Collection>\n</VTKFile>\n", file.file);

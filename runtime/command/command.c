@@ -3,11 +3,11 @@
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "../words.h"
 #include "command.h"
 
 int supine_exit_code(supine_status status) {
@@ -105,38 +105,11 @@ bool supine_parse_count(const char *text, size_t *value) {
   return true;
 }
 
-/* Edits (insert, delete, replace) that turn one short text into another (Levenshtein 1966). */
-static size_t edit_distance(const char *a, const char *b) {
-  enum { LENGTH_MAX = 63 };
-  const size_t n = strlen(a);
-  const size_t m = strlen(b);
-  if (n > LENGTH_MAX || m > LENGTH_MAX) {
-    return SIZE_MAX;
-  }
-  size_t row[LENGTH_MAX + 1];
-  for (size_t j = 0; j <= m; ++j) {
-    row[j] = j;
-  }
-  for (size_t i = 1; i <= n; ++i) {
-    size_t diagonal = row[0];
-    row[0] = i;
-    for (size_t j = 1; j <= m; ++j) {
-      const size_t replace = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      const size_t insert = row[j - 1] + 1;
-      const size_t drop = row[j] + 1;
-      diagonal = row[j];
-      row[j] = replace < insert ? replace : insert;
-      row[j] = row[j] < drop ? row[j] : drop;
-    }
-  }
-  return row[m];
-}
-
 const char *supine_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
   size_t fewest = 1 + strlen(text) / 2; /* farther than this is another word */
   for (size_t i = 0; i < count; ++i) {
-    const size_t edits = edit_distance(text, candidates[i]);
+    const size_t edits = supine_words_distance(text, candidates[i]);
     if (edits < fewest || (edits == fewest && best == NULL)) {
       fewest = edits;
       best = candidates[i];

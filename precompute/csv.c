@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pv_internal.h"
+#include "csv.h"
 
 static char *trim(char *text) {
   while (isspace((unsigned char)*text)) {
@@ -21,7 +21,7 @@ static char *trim(char *text) {
 }
 
 /* The next line that holds something, trimmed; NULL at the end or on failure. */
-static char *csv_line(pv_csv *csv, supine_status *status, supine_error *error) {
+static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
     errno = 0;
@@ -51,12 +51,12 @@ static char *csv_line(pv_csv *csv, supine_status *status, supine_error *error) {
   }
 }
 
-static supine_status csv_split(pv_csv *csv, char *text, supine_error *error) {
+static supine_status csv_split(supine_csv *csv, char *text, supine_error *error) {
   csv->field_count = 0;
   for (char *rest = text; rest != NULL;) {
-    if (csv->field_count == PV_CSV_FIELDS_MAX) {
+    if (csv->field_count == SUPINE_CSV_FIELDS_MAX) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: more than %d fields", csv->path,
-                              csv->line, (int)PV_CSV_FIELDS_MAX);
+                              csv->line, (int)SUPINE_CSV_FIELDS_MAX);
     }
     char *comma = strchr(rest, ',');
     if (comma != NULL) {
@@ -69,9 +69,9 @@ static supine_status csv_split(pv_csv *csv, char *text, supine_error *error) {
 }
 
 /* Which field holds which expected column. */
-static supine_status csv_header(pv_csv *csv, const char *const *names, size_t count,
+static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
-  for (size_t c = 0; c < PV_CSV_FIELDS_MAX; ++c) {
+  for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
     csv->column[c] = SIZE_MAX;
   }
   for (size_t f = 0; f < csv->field_count; ++f) {
@@ -97,9 +97,9 @@ static supine_status csv_header(pv_csv *csv, const char *const *names, size_t co
   return SUPINE_OK;
 }
 
-supine_status supine_pv_csv_open(const char *path, const char *const *names, size_t count,
-                                 size_t required, pv_csv *csv, supine_error *error) {
-  *csv = (pv_csv){.path = path};
+supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
+                              size_t required, supine_csv *csv, supine_error *error) {
+  *csv = (supine_csv){.path = path};
   csv->file = fopen(path, "rb");
   if (csv->file == NULL) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
@@ -118,12 +118,12 @@ supine_status supine_pv_csv_open(const char *path, const char *const *names, siz
     status = csv_header(csv, names, count, required, error);
   }
   if (status != SUPINE_OK) {
-    supine_pv_csv_close(csv);
+    supine_csv_close(csv);
   }
   return status;
 }
 
-supine_status supine_pv_csv_next(pv_csv *csv, bool *more, supine_error *error) {
+supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) {
   supine_status status = SUPINE_OK;
   char *text = csv_line(csv, &status, error);
   *more = text != NULL;
@@ -139,13 +139,13 @@ supine_status supine_pv_csv_next(pv_csv *csv, bool *more, supine_error *error) {
   return status;
 }
 
-const char *supine_pv_csv_text(const pv_csv *csv, size_t column) {
+const char *supine_csv_text(const supine_csv *csv, size_t column) {
   return csv->column[column] == SIZE_MAX ? NULL : csv->field[csv->column[column]];
 }
 
-supine_status supine_pv_csv_number(const pv_csv *csv, size_t column, const char *name,
-                                   double *number, supine_error *error) {
-  const char *text = supine_pv_csv_text(csv, column);
+supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
+                                double *number, supine_error *error) {
+  const char *text = supine_csv_text(csv, column);
   char *end = NULL;
   *number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(*number)) {
@@ -155,26 +155,10 @@ supine_status supine_pv_csv_number(const pv_csv *csv, size_t column, const char 
   return SUPINE_OK;
 }
 
-supine_status supine_pv_csv_limb(const pv_csv *csv, size_t column, supine_pv_limb *limb,
-                                 supine_error *error) {
-  const char *text = supine_pv_csv_text(csv, column);
-  *limb = SUPINE_PV_INHALE;
-  if (text == NULL || strcmp(text, supine_pv_limb_name(SUPINE_PV_INHALE)) == 0) {
-    return SUPINE_OK;
-  }
-  *limb = SUPINE_PV_EXHALE;
-  if (strcmp(text, supine_pv_limb_name(SUPINE_PV_EXHALE)) == 0) {
-    return SUPINE_OK;
-  }
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s:%zu: limb \"%s\" is neither inhale nor exhale", csv->path, csv->line,
-                          text);
-}
-
-void supine_pv_csv_close(pv_csv *csv) {
+void supine_csv_close(supine_csv *csv) {
   if (csv->file != NULL) {
     (void)fclose(csv->file);
   }
   free(csv->text);
-  *csv = (pv_csv){0};
+  *csv = (supine_csv){0};
 }

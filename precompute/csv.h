@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Small CSV files: lists of fields, samples, parameters. */
+#ifndef SUPINE_CSV_H
+#define SUPINE_CSV_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include <supine/status.h>
+
+enum { SUPINE_CSV_FIELDS_MAX = 16 };
+
+/* A strict reader of small CSV files: comments, blank lines, one header; no quotes. Zeroed at
+ * first. */
+typedef struct supine_csv {
+  const char *path;
+  FILE *file;
+  char *text;
+  size_t capacity;
+  size_t line;
+  size_t field_count;
+  char *field[SUPINE_CSV_FIELDS_MAX]; /* of the row read last */
+  size_t column_count;
+  size_t column[SUPINE_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
+} supine_csv;
+
+/* Opens and reads the header; each of the first `required` of `names` must be there. */
+supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
+                              size_t required, supine_csv *csv, supine_error *error);
+
+/* Reads a row; *more is false at the end. */
+supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
+
+/* Text of a column of the row, or NULL where the file has no such column. */
+const char *supine_csv_text(const supine_csv *csv, size_t column);
+
+/* A finite number. */
+supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
+                                double *number, supine_error *error);
+
+void supine_csv_close(supine_csv *csv);
+
+#endif
