@@ -251,7 +251,7 @@ static supine_status prepare(fitting *w, double *directions, supine_error *error
   w->values = fields->displacement;
   w->weight = calloc(m, sizeof *w->weight);
   w->place = malloc(m * sizeof *w->place);
-  w->gram = malloc(m * m * sizeof *w->gram);
+  w->gram = calloc(m * m, sizeof *w->gram);
   w->owned = w->options->scalar ? malloc(m * n * sizeof *w->owned) : NULL;
   if (w->weight == NULL || w->place == NULL || w->gram == NULL ||
       (w->options->scalar && w->owned == NULL)) {

@@ -154,7 +154,7 @@ static supine_status group(supine_lungs *lungs, const component *parts, supine_e
   const size_t n = mesh->vertex_count;
   const uint32_t *part_of = lungs->topology.component;
   supine_mesh sorted = {.vertex_count = n, .triangle_count = mesh->triangle_count};
-  uint32_t *position = malloc(n * sizeof *position);
+  uint32_t *position = calloc(n + 1, sizeof *position);
   sorted.vertices = malloc(3 * n * sizeof *sorted.vertices);
   sorted.triangles = malloc(3 * mesh->triangle_count * sizeof *sorted.triangles);
   if (position == NULL || sorted.vertices == NULL || sorted.triangles == NULL) {
