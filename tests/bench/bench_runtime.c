@@ -12,7 +12,9 @@
 
 #include <supine/bench.h>
 
-enum { ROWS_MAX = 256, BATCH = 64, BATCH_VERTICES = 50000 };
+#include "full_solve.h"
+
+enum { ROWS_MAX = 256, BATCH = 64, BATCH_VERTICES = 50000, SOLVE_VERTICES_MAX = 2000000 };
 
 /* OpenBLAS's own, which cblas.h does not declare everywhere. */
 char *openblas_get_corename(void);
@@ -24,6 +26,7 @@ typedef struct peers {
   float weights[BATCH * 256];
   float *amount;
   float *product;
+  full_solve *solve;
   size_t rows;
   supine_bench_row row[ROWS_MAX];
 } peers;
@@ -86,11 +89,13 @@ static size_t add_peers(void *context, const supine_bench_image *image, float *x
   const size_t product = (size_t)BATCH * BATCH_VERTICES;
   free(p->amount);
   free(p->product);
+  full_solve_destroy(p->solve);
+  p->solve = NULL;
   p->image = image;
   p->xyz = xyz;
   p->amount = calloc(image->vertices, sizeof *p->amount);
   p->product = calloc(product, sizeof *p->product);
-  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 4) {
+  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 5) {
     return 0;
   }
   for (size_t i = 0; i < sizeof p->weights / sizeof *p->weights; ++i) {
@@ -123,7 +128,21 @@ static size_t add_peers(void *context, const supine_bench_image *image, float *x
   entries[3].row.vertices = (size_t)1024 * 1024;
   entries[3].row.multiplications = 1024;
   entries[3].row.additions = 1024;
-  return 4;
+  if (image->vertices <= SOLVE_VERTICES_MAX) {
+    p->solve = full_solve_create(image->vertices);
+  }
+  if (p->solve == NULL) {
+    return 4;
+  }
+  entries[4] = (supine_bench_entry){{.what = "sparse_solve",
+                                     .storage = "float64",
+                                     .code = "",
+                                     .vertices = full_solve_vertex_count(p->solve),
+                                     .threads = 1},
+                                    1,
+                                    full_solve_run,
+                                    p->solve};
+  return 5;
 }
 
 static void report(void *context, const supine_bench_row *row) {
@@ -165,6 +184,11 @@ static void print(const peers *p, size_t from) {
            storages[i], sgemv / own, plain / own, native / own,
            own / find(p, from, "supine", storages[i], 2),
            find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2));
+  }
+  const double solve = find(p, from, "sparse_solve", "", 1);
+  if (solve > 0) {
+    printf("int16     sparse solve of (2), one direction, to 1e-6: %.0f\n",
+           solve / find(p, from, "supine", "int16", 1));
   }
   const double batch = find(p, from, "supine_batch64", "", 1);
   printf("batch of 64, multiplications a ns: %.1f; sgemm of the same shape %.1f, square %.1f\n\n",
@@ -239,6 +263,7 @@ int main(int argc, char **argv) {
   }
   free(p->amount);
   free(p->product);
+  full_solve_destroy(p->solve);
   free(p);
   return code != 0 ? code : run_modes(1000000);
 }
