@@ -97,7 +97,7 @@ static void range_batch(void *context, size_t begin, size_t end, size_t thread) 
   const task *t = context;
   (void)thread;
   supine_deform_batch(t->basis, BATCH, t->work->weights, t->work->scales, begin, end,
-                      t->work->batch);
+                      t->work->batch + 3 * BATCH * begin); /* a part of its own each thread */
 }
 
 /* The loop that anyone would write. */
