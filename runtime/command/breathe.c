@@ -183,26 +183,37 @@ static int compare(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
-                   double *seconds) {
-  const double *volumes = breath_frames_volumes(frames);
-  double peak = 0.0;
-  double worst = 0.0;
-  for (size_t t = 0; t < course->count; ++t) {
-    double sum = 0.0;
-    for (size_t lung = 0; lung < course->lungs; ++lung) {
-      sum += volumes[t * course->lungs + lung];
-    }
-    peak = fmax(peak, sum);
-    worst = fmax(worst, fabs(sum - course->volume[t]));
+/* What the frames' own surfaces enclose, against what was asked. */
+typedef struct gauge {
+  supine_mesh mesh; /* shares the rest surface's triangles */
+  double rest;      /* mL */
+  double peak, worst;
+} gauge;
+
+static supine_status gauge_begin(const supine_mesh *rest, gauge *g) {
+  *g = (gauge){.mesh = *rest, .rest = 1e-3 * supine_mesh_volume(rest)};
+  g->mesh.vertices = malloc(3 * rest->vertex_count * sizeof *g->mesh.vertices);
+  return g->mesh.vertices != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+}
+
+static void gauge_frame(gauge *g, const float *xyz, double wanted) {
+  for (size_t i = 0; i < 3 * g->mesh.vertex_count; ++i) {
+    g->mesh.vertices[i] = (double)xyz[i];
   }
+  const double gained = 1e-3 * supine_mesh_volume(&g->mesh) - g->rest;
+  g->peak = fmax(g->peak, gained);
+  g->worst = fmax(g->worst, fabs(gained - wanted));
+}
+
+static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
+                   const gauge *measured, double *seconds) {
   qsort(seconds, course->count, sizeof *seconds, compare);
   const double median = seconds[course->count / 2];
   const double most = seconds[course->count - 1];
-  (void)printf("%s: %zu frames, %.2f s at %.4g a second; up to %.2f mL above rest, volumes within "
-               "%.2g mL\n",
-               wanted->path, course->count, course->time[course->count - 1], wanted->fps, peak,
-               worst);
+  (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces grow by up to %.2f mL, each "
+               "within %.2g mL of its volume\n",
+               wanted->path, course->count, course->time[course->count - 1], wanted->fps,
+               measured->peak, measured->worst);
   if (course->fixed) {
     (void)printf("one posture: %zu of the frames by three additions a vertex\n",
                  breath_frames_stepped(frames));
@@ -219,11 +230,13 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   breath_course course = {0};
   breath_frames *frames = NULL;
   breath_output *output = NULL;
+  gauge measured = {0};
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
   supine_progress progress = {0};
   supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || supine_basis_rest_mesh(basis, &rest) != SUPINE_OK) {
+  if (xyz == NULL || seconds == NULL || supine_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+      gauge_begin(&rest, &measured) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
   }
@@ -247,6 +260,7 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   progress = supine_progress_begin(name);
   for (size_t t = 0; t < count && status == SUPINE_OK; ++t) {
     seconds[t] = breath_frames_next(frames, xyz);
+    gauge_frame(&measured, xyz, course.volume[t]);
     status = breath_output_add(output, xyz, error);
     if (!supine_progress_step(&progress, (double)(t + 1) / (double)count)) {
       status =
@@ -258,13 +272,14 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   }
   supine_progress_end(&progress);
   if (status == SUPINE_OK) {
-    report(wanted, &course, frames, seconds);
+    report(wanted, &course, frames, &measured, seconds);
   }
 cleanup:
   breath_output_close(output);
   breath_frames_destroy(frames);
   breath_course_free(&course);
   supine_mesh_free(&rest);
+  free(measured.mesh.vertices);
   free(xyz);
   free(seconds);
   return status;
