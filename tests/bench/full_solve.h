@@ -15,7 +15,7 @@ full_solve *full_solve_create(size_t vertices);
 void full_solve_destroy(full_solve *solve);
 size_t full_solve_vertex_count(const full_solve *solve);
 
-/* Force, equilibrium and displaced positions for one direction. */
-void full_solve_run(void *solve);
+/* Force, equilibrium and displaced positions for one direction; the context is a full_solve. */
+void full_solve_run(void *context);
 
 #endif
