@@ -49,7 +49,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy) {
 }
 
 static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model) {
-  static const char *const models[] = {"box", "normal", "radial"};
+  static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
   const double *c = model->direction.c;
   add(list, "midline_mm", "%.9g", lungs->midline);

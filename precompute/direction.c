@@ -6,7 +6,7 @@
 #include <supine/force.h>
 
 supine_direction_law supine_direction_law_default(void) {
-  return (supine_direction_law){SUPINE_DIRECTION_BOX, {2.0, 1.5, 1.5, 1.0, 16.0, 1.4}};
+  return (supine_direction_law){SUPINE_DIRECTION_BOX, {2.0, 1.5, 1.5, 1.0, 16.0, 1.4}, NULL};
 }
 
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
@@ -90,6 +90,14 @@ supine_status supine_directions(const supine_lungs *lungs, const supine_directio
   case SUPINE_DIRECTION_RADIAL:
     radial_directions(lungs, directions);
     normalise(n, directions);
+    break;
+  case SUPINE_DIRECTION_VECTORS:
+    if (law->vectors == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no direction vectors");
+    }
+    for (size_t i = 0; i < 3 * n; ++i) {
+      directions[i] = law->vectors[i];
+    }
     break;
   default:
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no direction model %d", (int)law->model);

@@ -256,6 +256,22 @@ static void test_mesh_wrong_units_warned(void **state) {
   assert_null(strstr(printed, "warning"));
 }
 
+static void test_direction_file_moves_vertices_along_it(void **state) {
+  (void)state;
+  write_text("tetra.obj",
+             "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write_text("d.csv", "dx,dy,dz\n0,0,0\n0,0,0\n0,0,0\n3,0,4\n");
+  EXPECT(0, "displacement 5.000 mm",
+         "solve tetra.obj --direction d.csv --posture inverted --scale 5 -o i.ply");
+  EXPECT(0, "one lung", "precompute tetra.obj --direction d.csv -o i.safetensors --band 3");
+  write_text("d.csv", "dx,dy,dz\n0,0,0\n3,0,4\n");
+  EXPECT(2, "2 rows, where the model has 4", "solve tetra.obj --direction d.csv --tilt 9 -o j.ply");
+  write_text("d.csv", "dx,dy,dz\n0,0,0\n3,nan,4\n");
+  EXPECT(2, "d.csv:3", "solve tetra.obj --direction d.csv --tilt 9 -o j.ply");
+  EXPECT(1, "--direction takes", "solve tetra.obj --direction sideways --tilt 9 -o j.ply");
+  assert_int_equal(count_files("j."), 0);
+}
+
 static void test_solve_unit_force_writes_column(void **state) {
   (void)state;
   static char text[1 << 20];
@@ -320,6 +336,7 @@ int main(void) {
       cmocka_unit_test(test_mesh_bad_input_named_and_nothing_left),
       cmocka_unit_test(test_mesh_open_surface_explains_volume),
       cmocka_unit_test(test_mesh_wrong_units_warned),
+      cmocka_unit_test(test_direction_file_moves_vertices_along_it),
       cmocka_unit_test(test_solve_unit_force_writes_column),
       cmocka_unit_test(test_bench_prints_rows),
       cmocka_unit_test(test_mesh_hostile_files_never_crash),

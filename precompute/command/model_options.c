@@ -26,6 +26,8 @@ const char supine_model_options_help[] =
     "\n"
     "Direction of displacement:\n"
     "  --direction MODEL    box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
+    "  --direction FILE     any vectors: CSV with the columns dx,dy,dz, mm, a row a vertex in the\n"
+    "                       order that 'supine solve' writes\n"
     "  --constants C1,...,C6  of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to\n"
     "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law "
     "explains\n"
@@ -89,15 +91,19 @@ static bool parse_units(const char *text, double *millimetres) {
   return supine_parse_number(text, millimetres) && *millimetres > 0.0;
 }
 
-static bool parse_direction(const char *text, supine_direction_model *model) {
+/* A model's name; anything with a dot or a slash is a file of vectors. */
+static bool parse_direction(const char *text, supine_model_options *options) {
   static const char *const names[] = {"box", "normal", "radial"};
+  options->direction = NULL;
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     if (strcmp(text, names[i]) == 0) {
-      *model = (supine_direction_model)i;
+      options->model.direction.model = (supine_direction_model)i;
       return true;
     }
   }
-  return false;
+  options->model.direction.model = SUPINE_DIRECTION_VECTORS;
+  options->direction = text;
+  return strpbrk(text, "./") != NULL;
 }
 
 /* "linear:z:0.5:1.5"; anything without such a beginning names a file. False where the rest of it is
@@ -189,9 +195,9 @@ int supine_model_options_take(supine_model_options *options, const char *command
     wanted = supine_parse_number(value, &force->soften) ? NULL : "--soften takes a number";
     break;
   case OPTION_DIRECTION:
-    wanted = parse_direction(value, &options->model.direction.model)
+    wanted = parse_direction(value, options)
                  ? NULL
-                 : "--direction takes box, normal or radial";
+                 : "--direction takes box, normal, radial or a CSV file of vectors";
     break;
   case OPTION_CONSTANTS:
     wanted = supine_parse_numbers(value, 6, options->model.direction.c)
@@ -309,6 +315,20 @@ static supine_status set_expandability(supine_model_options *options, const load
   return status;
 }
 
+static supine_status set_directions(supine_model_options *options, const supine_lungs *lungs,
+                                    supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->direction == NULL) {
+    return SUPINE_OK;
+  }
+  options->vectors = malloc(3 * n * sizeof *options->vectors);
+  if (options->vectors == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  options->model.direction.vectors = options->vectors;
+  return supine_directions_load(options->direction, n, options->vectors, error);
+}
+
 static supine_status set_lesions(const supine_model_options *options, const char *command,
                                  supine_lungs *lungs, supine_error *error) {
   for (size_t l = 0; l < options->lesion_count; ++l) {
@@ -355,7 +375,10 @@ static supine_status set_shares(const supine_model_options *options, supine_lung
 
 void supine_model_options_free(supine_model_options *options) {
   free(options->stiffness);
+  free(options->vectors);
   options->stiffness = NULL;
+  options->vectors = NULL;
+  options->model.direction.vectors = NULL;
   options->model.stiffness = NULL;
 }
 
@@ -391,6 +414,7 @@ int supine_model_load(supine_model_options *options, const char *command, char *
   }
   lungs->reach = options->reach;
   if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
+      set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||
       set_shares(options, lungs, &error) != SUPINE_OK) {
     result = supine_command_fail(command, &error);

@@ -62,7 +62,8 @@ void supine_force_functions(const supine_lungs *lungs, const supine_force_law *l
 typedef enum supine_direction_model {
   SUPINE_DIRECTION_BOX = 0, /**< (15)-(17): d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm */
   SUPINE_DIRECTION_NORMAL,  /**< the outward unit normal, 1 mm */
-  SUPINE_DIRECTION_RADIAL   /**< away from the centroid of the lung's vertices, 1 mm */
+  SUPINE_DIRECTION_RADIAL,  /**< away from the centroid of the lung's vertices, 1 mm */
+  SUPINE_DIRECTION_VECTORS  /**< whatever the caller says, mm */
 } supine_direction_model;
 
 /** The model and the constants c1 to c6 of the box model.
@@ -73,9 +74,16 @@ typedef enum supine_direction_model {
 typedef struct supine_direction_law {
   supine_direction_model model;
   double c[6];
+  const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; the caller's */
 } supine_direction_law;
 
 supine_direction_law supine_direction_law_default(void);
+
+/** Reads vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each of
+ * `count` vertices in the model's order, into vectors [count, 3].
+ * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (line named), SUPINE_ERROR_MEMORY */
+supine_status supine_directions_load(const char *path, size_t count, double *vectors,
+                                     supine_error *error);
 
 /** d [N, 3], mm; of any length, so that the fixed planes stay fixed.
  * @retval SUPINE_ERROR_ARGUMENT  a constant that is not finite, or an exponent that is not positive
