@@ -3,6 +3,7 @@
 #ifndef SUPINE_EQUILIBRIUM_INTERNAL_H
 #define SUPINE_EQUILIBRIUM_INTERNAL_H
 
+#include <supine/denormals.h>
 #include <supine/parallel.h>
 
 #include "internal.h"

@@ -5,12 +5,10 @@
 
 #include <supine/force.h>
 
+#include "internal.h"
+
 supine_force_law supine_force_law_default(void) {
   return (supine_force_law){.gain = 1.0};
-}
-
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static bool has_fixed_part(const supine_force_law *law) {
@@ -20,14 +18,14 @@ static bool has_fixed_part(const supine_force_law *law) {
 static double fixed_part(const supine_lungs *lungs, const supine_force_law *law, size_t vertex) {
   double box[3];
   supine_lungs_box_coordinates(lungs, vertex, box);
-  return dot(law->box, box);
+  return supine_dot(law->box, box);
 }
 
 void supine_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
                   double minimum, double maximum, double *force) {
   const bool fixed = has_fixed_part(law);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    const double h = (dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
+    const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
     force[i] = law->base + law->gain * h + (fixed ? fixed_part(lungs, law, i) : 0.0); /* (18) */
   }
 }
@@ -36,7 +34,7 @@ void supine_force_stiffness(const supine_lungs *lungs, const supine_force_law *l
                             const double *stiffness, const double g[3], double minimum,
                             double maximum, double *softened) {
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    const double h = (dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
+    const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
     softened[i] = (stiffness == NULL ? 1.0 : stiffness[i]) * exp(-law->soften * (h - 0.5));
   }
 }
@@ -77,7 +75,7 @@ void supine_force_functions(const supine_lungs *lungs, const supine_force_law *l
   double centre[3];
   const double radius = box_frame(lungs, centre);
   const double slope = law->gain / (maximum - minimum);
-  functions[0] = law->base + slope * (dot(g, centre) - minimum);
+  functions[0] = law->base + slope * (supine_dot(g, centre) - minimum);
   for (size_t k = 0; k < 3; ++k) {
     functions[1 + k] = slope * radius * g[k];
   }

@@ -26,10 +26,6 @@ typedef struct range_work {
   double *minimum, *maximum;
 } range_work;
 
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static block_box box_of(const double *vertices, size_t count) {
   block_box box;
   for (size_t k = 0; k < 3; ++k) {
@@ -59,12 +55,12 @@ static double highest(const range_work *work, const double *g, size_t *seed) {
   for (size_t step = 0; step <= work->box_count; ++step) {
     const size_t block = step == 0 ? first : step - 1;
     const block_box *box = &work->boxes[block];
-    if (dot(g, box->centre) + dot(size, box->half) <= best) {
+    if (supine_dot(g, box->centre) + supine_dot(size, box->half) <= best) {
       continue;
     }
     const double *p = work->mesh->vertices + 3 * block * BLOCK;
     for (size_t i = 0; i < block_size(work, block); ++i) {
-      const double h = dot(g, p + 3 * i);
+      const double h = supine_dot(g, p + 3 * i);
       if (h > best) {
         best = h;
         *seed = block;

@@ -34,8 +34,9 @@ double supine_link_distance(const double *first, const double *second);
 supine_status supine_network_set_reach(supine_network *network, const supine_mesh *mesh,
                                        const supine_topology *topology, double reach);
 
-/* Sets the processor to treat denormal numbers as zero; returns what to restore. */
-unsigned supine_denormals_flush(void);
-void supine_denormals_restore(unsigned saved);
+/* Of vectors of three. */
+static inline double supine_dot(const double *a, const double *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 #endif

@@ -10,18 +10,12 @@
 #endif
 
 #include <supine/bench.h>
+#include <supine/clones.h>
 #include <supine/parallel.h>
 
 #include "internal.h"
 
 enum { ENTRIES_MAX = 64, BATCH = 64, HUGE_PAGE = 1 << 21, ARITHMETIC = 2000000, ENOUGH = 2000000 };
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SUPINE_NO_CLONES)
-/* What -march=native gives on processors of these kinds. */
-#define CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define CLONES
-#endif
 
 const char *supine_bench_storage_name(supine_storage storage) {
   static const char *const names[SUPINE_STORAGE_COUNT] = {"auto", "exact", "float32", "float16",
@@ -115,14 +109,14 @@ plain_any(size_t n, size_t modes, const float *restrict w, const float *restrict
   }
 }
 
-CLONES static void plain_loop(size_t n, size_t modes, const float *w, const float *c,
-                              const float *d, const float *p, float *xyz) {
+SUPINE_CLONES static void plain_loop(size_t n, size_t modes, const float *w, const float *c,
+                                     const float *d, const float *p, float *xyz) {
   plain_any(n, modes, w, c, d, p, xyz);
 }
 
 /* With a number of modes that the compiler knows. */
-CLONES static void plain_loop16(size_t n, const float *w, const float *c, const float *d,
-                                const float *p, float *xyz) {
+SUPINE_CLONES static void plain_loop16(size_t n, const float *w, const float *c, const float *d,
+                                       const float *p, float *xyz) {
   plain_any(n, 16, w, c, d, p, xyz);
 }
 

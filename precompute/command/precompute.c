@@ -45,15 +45,6 @@ static const char examples[] =
     "  supine precompute left.ply right.ply -o lungs.safetensors\n"
     "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors\n";
 
-/* The command line in one line, for the file's metadata: names of files without their folders. */
-static void describe(int argc, char **argv, char *text, size_t size) {
-  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
-  for (int i = 0; i < argc && used < size; ++i) {
-    const char *slash = strrchr(argv[i], '/');
-    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
-  }
-}
-
 static void report_result(const char *path, const supine_lungs *lungs,
                           const supine_precompute_options *options,
                           const supine_precompute_report *report) {
@@ -140,7 +131,7 @@ int supine_command_precompute(int argc, char **argv) {
   const char *path = NULL;
   const char *fields = NULL;
   char made_by[512];
-  describe(argc, argv, made_by, sizeof made_by);
+  supine_command_describe(argc, argv, made_by, sizeof made_by);
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {

@@ -2,8 +2,8 @@
 /* The surfaces of a breath, frame after frame. */
 #include <math.h>
 #include <stdlib.h>
-#include <time.h>
 
+#include <supine/clock.h>
 #include <supine/volume.h>
 
 #include "breath_frames.h"
@@ -172,21 +172,15 @@ static void place(breath_frames *frames, size_t t, float *xyz) {
   }
 }
 
-static double now(void) {
-  struct timespec time;
-  (void)clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
 double breath_frames_next(breath_frames *frames, float *xyz) {
   const size_t t = frames->next++;
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   if (frames->run[t] == t) {
     place(frames, t, xyz);
   } else {
     supine_step(supine_basis_get_info(frames->basis)->vertex_count, frames->step, xyz);
   }
-  return now() - begin;
+  return supine_clock_seconds() - begin;
 }
 
 const double *breath_frames_volumes(const breath_frames *frames) {

@@ -285,15 +285,6 @@ cleanup:
   return status;
 }
 
-/* The command line in one line; names of files without their folders. */
-static void describe(int argc, char **argv, char *text, size_t size) {
-  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
-  for (int i = 0; i < argc && used < size; ++i) {
-    const char *slash = strrchr(argv[i], '/');
-    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
-  }
-}
-
 int supine_command_breathe(int argc, char **argv) {
   static const struct option options[] = {{"output", required_argument, NULL, 'o'},
                                           {"turn", required_argument, NULL, TURN},
@@ -311,7 +302,7 @@ int supine_command_breathe(int argc, char **argv) {
                                           {NULL, 0, NULL, 0}};
   request wanted = {.breath = supine_pv_breath_default(), .fps = 66.66};
   char made_by[512];
-  describe(argc, argv, made_by, sizeof made_by);
+  supine_command_describe(argc, argv, made_by, sizeof made_by);
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {

@@ -71,6 +71,14 @@ int supine_command_finish(const char *command) {
   return SUPINE_EXIT_OK;
 }
 
+void supine_command_describe(int argc, char **argv, char *text, size_t size) {
+  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc && used < size; ++i) {
+    const char *slash = strrchr(argv[i], '/');
+    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
+  }
+}
+
 /* The number at the front of `text`; NULL where there is none, else where it ends. */
 static const char *scan_number(const char *text, double *value) {
   char *end = NULL;

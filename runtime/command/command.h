@@ -50,6 +50,10 @@ int supine_command_usage(const char *command, const char *format, ...) SUPINE_PR
 /* Results reached stdout? Flushes; a full disk or closed pipe ends with SUPINE_EXIT_OUTPUT. */
 int supine_command_finish(const char *command);
 
+/* The command line in one line, for what a file says of how it was made; names of files without
+ * their folders. */
+void supine_command_describe(int argc, char **argv, char *text, size_t size);
+
 /* Reads a finite number, or a whole one, that takes up the whole text. */
 bool supine_parse_number(const char *text, double *value);
 bool supine_parse_count(const char *text, size_t *value);

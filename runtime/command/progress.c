@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Progress on a terminal, and an orderly end when the user interrupts. */
 #include <signal.h>
-#include <time.h>
 #include <unistd.h>
+
+#include <supine/clock.h>
 
 #include "command.h"
 
@@ -25,20 +26,14 @@ bool supine_interrupted(void) {
   return interrupted != 0;
 }
 
-static double now(void) {
-  struct timespec time;
-  (void)clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
 supine_progress supine_progress_begin(const char *label) {
-  const double start = now();
+  const double start = supine_clock_seconds();
   return (supine_progress){label, start, start, isatty(STDERR_FILENO) == 1};
 }
 
 bool supine_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
-  const double time = now();
+  const double time = supine_clock_seconds();
   if (state->terminal && time - state->shown > 0.1) {
     state->shown = time;
     const double spent = time - state->start;

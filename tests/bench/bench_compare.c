@@ -5,17 +5,12 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
+
+#include <supine/clock.h>
 
 #include "../../runtime/command/comparison.h"
 
 enum { REPEATS = 5, PAIRS = 10000, PASSES = 20, DIRECTIONS = 200 };
-
-static double now(void) {
-  struct timespec t;
-  (void)clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* Number in [-1, 1) (splitmix64). */
 static double random_number(uint64_t *state) {
@@ -36,7 +31,7 @@ static int time_pairs(const supine_basis *basis, const supine_compare *compare, 
   if (distance == NULL) {
     return 1;
   }
-  const double start = now();
+  const double start = supine_clock_seconds();
   for (int i = 0; i < DIRECTIONS; ++i) {
     const double g[3] = {random_number(&state), random_number(&state), 0.1 + random_number(&state)};
     const supine_inflation inflation = {SUPINE_INFLATION_RMS, 5};
@@ -52,8 +47,8 @@ static int time_pairs(const supine_basis *basis, const supine_compare *compare, 
     const int b = (7 * pair + pair / DIRECTIONS + 1) % DIRECTIONS;
     sum += supine_compare_rms(compare, weights[a], scales[a], weights[b], scales[b]);
   }
-  *gram = now() - start;
-  const double middle = now();
+  *gram = supine_clock_seconds() - start;
+  const double middle = supine_clock_seconds();
   for (int pair = 0; pair < PASSES; ++pair) {
     supine_distance_statistics statistics;
     supine_compare_distances(compare, weights[pair], scales[pair], weights[pair + 1],
@@ -61,7 +56,7 @@ static int time_pairs(const supine_basis *basis, const supine_compare *compare, 
     supine_compare_statistics(compare, distance, &statistics);
     sum += statistics.rms;
   }
-  *direct = (now() - middle) / PASSES;
+  *direct = (supine_clock_seconds() - middle) / PASSES;
   free(distance);
   return sum > 0 ? 0 : 1;
 }
@@ -79,12 +74,12 @@ int main(int argc, char **argv) {
   for (int repeat = 0; repeat < REPEATS; ++repeat) {
     supine_comparison comparison = {.path = argv[1], .inflation = {SUPINE_INFLATION_VOLUME, 500}};
     supine_basis *basis = NULL;
-    const double start = now();
+    const double start = supine_clock_seconds();
     if (supine_basis_open(argv[1], &basis, &error) != SUPINE_OK) {
       (void)fprintf(stderr, "%s\n", error.message);
       return 2;
     }
-    const double opened = now();
+    const double opened = supine_clock_seconds();
     comparison.basis = basis;
     if (supine_posture_list_parse("compare", "supine,prone,left,right", &comparison.postures) !=
             0 ||
@@ -92,7 +87,7 @@ int main(int argc, char **argv) {
       (void)fprintf(stderr, "%s\n", error.message);
       return 2;
     }
-    const double compared = now();
+    const double compared = supine_clock_seconds();
     double pairs = 0;
     double pass = 0;
     if (time_pairs(basis, comparison.compare, &pairs, &pass) != 0) {

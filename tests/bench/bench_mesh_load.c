@@ -9,13 +9,13 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <assimp/cimport.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <supine/clock.h>
 #include <supine/mesh.h>
 #include <supine/parallel.h>
 
@@ -29,15 +29,9 @@ typedef struct lung {
   size_t edges;
 } lung;
 
-static double now(void) {
-  struct timespec time;
-  (void)clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1.0e-9 * (double)time.tv_nsec;
-}
-
 /* Seconds; negative where it failed. */
 static double run_assimp(const lung lungs[2], unsigned flags) {
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   for (int i = 0; i < 2; ++i) {
     const struct aiScene *scene = aiImportFile(lungs[i].path, flags);
     if (scene == NULL) {
@@ -45,7 +39,7 @@ static double run_assimp(const lung lungs[2], unsigned flags) {
     }
     aiReleaseImport(scene);
   }
-  return now() - begin;
+  return supine_clock_seconds() - begin;
 }
 
 static void load_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -55,27 +49,27 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
     supine_mesh mesh = {0};
     supine_topology topology = {0};
     supine_error error;
-    const double start = now();
+    const double start = supine_clock_seconds();
     if (supine_mesh_load(lungs[i].path, NULL, &mesh, NULL, &error) != SUPINE_OK) {
       (void)fprintf(stderr, "%s\n", error.message);
       continue;
     }
-    const double loaded = now();
+    const double loaded = supine_clock_seconds();
     if (supine_topology_create(&mesh, &topology) == SUPINE_OK) {
       lungs[i].vertices = mesh.vertex_count;
       lungs[i].edges = topology.edge_count;
     }
     lungs[i].load = loaded - start;
-    lungs[i].topology = now() - loaded;
+    lungs[i].topology = supine_clock_seconds() - loaded;
     supine_topology_free(&topology);
     supine_mesh_free(&mesh);
   }
 }
 
 static double run_ours(lung lungs[2], size_t threads) {
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   supine_parallel_for(2, 1, threads, load_range, lungs);
-  return now() - begin;
+  return supine_clock_seconds() - begin;
 }
 
 /* Peak MB of a process that does one or the other alone. */

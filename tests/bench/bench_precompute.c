@@ -7,13 +7,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <assimp/cimport.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <supine/clock.h>
 #include <supine/parallel.h>
 #include <supine/precompute.h>
 
@@ -33,14 +33,8 @@ typedef struct pair {
   supine_error error[2];
 } pair;
 
-static double now(void) {
-  struct timespec time;
-  (void)clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1.0e-9 * (double)time.tv_nsec;
-}
-
 static double run_assimp(const pair *files) {
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   for (size_t i = 0; i < 2; ++i) {
     const struct aiScene *scene = aiImportFile(files->path[i], aiProcess_JoinIdenticalVertices);
     if (scene == NULL) {
@@ -48,7 +42,7 @@ static double run_assimp(const pair *files) {
     }
     aiReleaseImport(scene);
   }
-  return now() - begin;
+  return supine_clock_seconds() - begin;
 }
 
 static void load_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -63,7 +57,7 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
 static bool note_write(void *context, double fraction) {
   double *time = context;
   if (fraction >= 0.9) {
-    *time = now();
+    *time = supine_clock_seconds();
   }
   return true;
 }
@@ -73,13 +67,13 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   supine_lungs lungs = {0};
   supine_error error;
   double writing = 0.0;
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   supine_parallel_for(2, 1, 2, load_range, files);
-  const double loaded = now();
+  const double loaded = supine_clock_seconds();
   supine_status status = supine_lungs_create(files->mesh, 2, NULL, &lungs, &error);
   supine_mesh_free(&files->mesh[0]);
   supine_mesh_free(&files->mesh[1]);
-  const double joined = now();
+  const double joined = supine_clock_seconds();
   *vertices = lungs.mesh.vertex_count;
   if (status == SUPINE_OK) {
     const supine_precompute_options options = {.model = supine_model_default(),
@@ -89,7 +83,7 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
     status = supine_precompute(&lungs, &options, out, NULL, &error);
   }
   supine_lungs_free(&lungs);
-  const double end = now();
+  const double end = supine_clock_seconds();
   if (status != SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);
     return -1.0;

@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include <supine/clock.h>
 #include <supine/parallel.h>
 #include <supine/phantom.h>
 #include <supine/projection.h>
@@ -20,12 +20,6 @@
 enum { RHS = 4 };
 
 static const double tolerance = 1e-14;
-
-static double now(void) {
-  struct timespec time;
-  (void)clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1.0e-9 * (double)time.tv_nsec;
-}
 
 /* Seconds of one iteration from zero, on the system that the last solve left. */
 static double iterate(supine_equilibrium *eq, const double *norm, bool relaxation,
@@ -39,13 +33,13 @@ static double iterate(supine_equilibrium *eq, const double *norm, bool relaxatio
   memcpy(work->norm, norm, sizeof work->norm);
   memset(eq->solution, 0, eq->network->vertex_count * eq->count * sizeof(double));
   *report = (supine_solve_report){0, INFINITY};
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   if (relaxation) {
     supine_relaxation(work, report);
   } else if (supine_conjugate_gradients(work, 200, report) != SUPINE_OK) {
     exit(EXIT_FAILURE);
   }
-  const double seconds = now() - begin;
+  const double seconds = supine_clock_seconds() - begin;
   free(work);
   if (!(report->residual <= tolerance)) {
     (void)fprintf(stderr, "did not converge\n");
@@ -98,13 +92,13 @@ static void sample(const supine_lungs *lungs) {
   supine_projection projection = {0};
   supine_error error;
   law.soften = 1.0;
-  const double begin = now();
+  const double begin = supine_clock_seconds();
   if (supine_project_sampled(lungs, &law, NULL, BAND, 0.0, NULL, NULL, &projection, &error) !=
       SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);
     exit(EXIT_FAILURE);
   }
-  const double seconds = now() - begin;
+  const double seconds = supine_clock_seconds() - begin;
   (void)printf("%8zu  %8.1f solves a second   %6.1f ns a vertex and solve   at most %zu steps\n",
                lungs->mesh.vertex_count, (double)projection.solve_count / seconds,
                1e9 * seconds / (double)(projection.solve_count * lungs->mesh.vertex_count),

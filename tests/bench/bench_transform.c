@@ -12,22 +12,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cblas.h>
 
+#include <supine/clock.h>
 #include <supine/grid.h>
 #include <supine/sh.h>
 #include <supine/transform.h>
 
 #define CHOSEN "SUPINE_BENCH_KERNELS"
-
-static double now(void) {
-  struct timespec t;
-  (void)clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void *allocate(size_t doubles) {
   void *memory = malloc(doubles * sizeof(double));
@@ -49,9 +43,9 @@ static double probe_dgemm(void) {
   double best = INFINITY;
   openblas_set_num_threads(1);
   for (int r = 0; r < 5; ++r) {
-    const double start = now();
+    const double start = supine_clock_seconds();
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, M, N, K, 1, a, K, b, N, 0, c, N);
-    best = fmin(best, now() - start);
+    best = fmin(best, supine_clock_seconds() - start);
   }
   free(c);
   free(b);
@@ -118,17 +112,17 @@ static double probe_threads(void) {
   double one = INFINITY;
   double two = INFINITY;
   for (int r = 0; r < 5; ++r) {
-    double start = now();
+    double start = supine_clock_seconds();
     (void)arithmetic(sums[0]);
-    one = fmin(one, now() - start);
+    one = fmin(one, supine_clock_seconds() - start);
     pthread_t other;
-    start = now();
+    start = supine_clock_seconds();
     if (pthread_create(&other, NULL, arithmetic, sums[1]) != 0) {
       return 1;
     }
     (void)arithmetic(sums[0]);
     (void)pthread_join(other, NULL);
-    two = fmin(two, now() - start);
+    two = fmin(two, supine_clock_seconds() - start);
   }
   return 2 * one / two;
 }
@@ -178,22 +172,22 @@ static void compare(size_t band, size_t fields, int repeats) {
     double worst = 0;
     openblas_set_num_threads((int)threads);
     for (int r = 0; r < repeats; ++r) {
-      double start = now();
+      double start = supine_clock_seconds();
       cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)count, (int)fields, (int)points,
                   1, matrix, (int)points, values, (int)fields, 0, dense, (int)fields);
-      time_dense = fmin(time_dense, now() - start);
-      start = now();
+      time_dense = fmin(time_dense, supine_clock_seconds() - start);
+      start = supine_clock_seconds();
       cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, (int)fields, (int)count, (int)points, 1,
                   values, (int)fields, matrix, (int)points, 0, dense_together, (int)count);
-      time_dense_together = fmin(time_dense_together, now() - start);
+      time_dense_together = fmin(time_dense_together, supine_clock_seconds() - start);
       supine_sh_batch batch = {.fields = fields, .threads = threads};
-      start = now();
+      start = supine_clock_seconds();
       (void)supine_sh_forward(plan, &batch, values, fast, NULL);
-      time_together = fmin(time_together, now() - start);
+      time_together = fmin(time_together, supine_clock_seconds() - start);
       batch.coefficient_stride = fields;
-      start = now();
+      start = supine_clock_seconds();
       (void)supine_sh_forward(plan, &batch, values, fast, NULL);
-      time_fast = fmin(time_fast, now() - start);
+      time_fast = fmin(time_fast, supine_clock_seconds() - start);
     }
     for (size_t i = 0; i < count * fields; ++i) {
       worst = fmax(worst, fabs(fast[i] - dense[i]));

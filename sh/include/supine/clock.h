@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * A clock for measuring how long things take. */
+#ifndef SUPINE_CLOCK_H
+#define SUPINE_CLOCK_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Seconds since some moment in the past; never runs backwards. */
+double supine_clock_seconds(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
