@@ -298,6 +298,37 @@ static void test_precompute_real_lung_stated_error_is_found_and_small(void **sta
   supine_lungs_free(&lungs);
 }
 
+/* Default basis against the paper's form: least ratio of their errors, and most error. */
+static void check_default_basis(const char *name, supine_axes axes, double soften, double most,
+                                double least_ratio) {
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(&name, 1, axes, &lungs)) {
+    skip();
+    return;
+  }
+  const supine_precompute_report harmonics = make_basis(&lungs, 3, 0, soften, 0);
+  const supine_precompute_report modes = make_basis(&lungs, 23, 16, soften, 0);
+  const double error = modes.accuracy.relative_rms;
+  printf("%s, soften %g: harmonics %.2f %%, %zu modes %.3f %%\n", name, soften,
+         100.0 * harmonics.accuracy.relative_rms, modes.mode_count, 100.0 * error);
+  assert_true(modes.mode_count <= (soften == 0.0 ? 4 : 16));
+  assert_true(error <= most);
+  assert_true(harmonics.accuracy.relative_rms >= least_ratio * error);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_real_lung_default_error_within_half_a_percent(void **state) {
+  (void)state;
+  check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 0.0, 0.005, 8.0);
+  check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
+}
+
+static void test_precompute_another_real_lung_same_ratio(void **state) {
+  (void)state;
+  check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 0.0, 0.005, 8.0);
+  check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 1.0, 0.006, 8.0);
+}
+
 /* Volume of the deformed surface itself, mL above rest. */
 static double measured_volume(const supine_basis *basis, const double *weights,
                               const double *scales) {
@@ -458,6 +489,8 @@ int main(void) {
       cmocka_unit_test(test_precompute_stated_error_equals_deform_against_solve),
       cmocka_unit_test(test_precompute_stated_error_is_found_on_other_directions),
       cmocka_unit_test(test_precompute_real_lung_stated_error_is_found_and_small),
+      cmocka_unit_test(test_precompute_real_lung_default_error_within_half_a_percent),
+      cmocka_unit_test(test_precompute_another_real_lung_same_ratio),
       cmocka_unit_test(test_precompute_volumes_exact_in_every_direction),
       cmocka_unit_test(test_precompute_real_lungs_volumes_exact_in_every_direction),
       cmocka_unit_test(test_precompute_default_law_keeps_four_modes),
