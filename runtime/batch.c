@@ -30,7 +30,6 @@ static void batch_tiles(const supine_basis *basis, size_t count, block *scratch,
       const supine_target target = {.x = positions + j * apart + t * TILE_NUMBERS,
                                     .rest = true,
                                     .stream = stream,
-                                    .near = true,
                                     .held = scratch->held[j],
                                     .continues = t > 0,
                                     .continued = t + here < tiles};

@@ -23,8 +23,7 @@ static void deform_part(const supine_basis *basis, const float *folded, size_t b
   const supine_target whole = {.x = aside,
                                .y = joined ? NULL : aside + TILE,
                                .z = joined ? NULL : aside + (size_t)2 * TILE,
-                               .rest = target->rest,
-                               .near = true};
+                               .rest = target->rest};
   basis->kernels->deform(&basis->tiles, folded, begin / TILE, 1, &whole);
   const size_t first = begin % TILE;
   const size_t count = end - begin;
@@ -73,7 +72,8 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
 
 void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
                          size_t begin, size_t end, float *xyz) {
-  const supine_target target = {.x = xyz, .rest = true, .stream = basis->stream};
+  const supine_target target = {
+      .x = xyz, .rest = true, .stream = basis->stream, .ahead = basis->ahead};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
@@ -84,12 +84,13 @@ void supine_deform(const supine_basis *basis, const double *weights, const doubl
 
 void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *x, float *y, float *z) {
-  const supine_target target = {.x = x, .y = y, .z = z, .rest = true, .stream = basis->stream};
+  const supine_target target = {
+      .x = x, .y = y, .z = z, .rest = true, .stream = basis->stream, .ahead = basis->ahead};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
 void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
                            size_t begin, size_t end, float *xyz) {
-  const supine_target target = {.x = xyz, .stream = basis->stream};
+  const supine_target target = {.x = xyz, .stream = basis->stream, .ahead = basis->ahead};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }

@@ -146,7 +146,7 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                        const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
-  const size_t fetched = target->near ? 0 : tiles->stride;
+  const size_t fetched = target->ahead ? tiles->stride : 0;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     const char *ahead = (const char *)tile + PREFETCH_BYTES;
     for (size_t line = 0; line < fetched; line += 64) {

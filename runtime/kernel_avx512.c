@@ -212,7 +212,7 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
       w.v[k] = _mm512_set1_ps(weights[k]);
     }
   }
-  const size_t fetched = target->near ? 0 : tiles->stride;
+  const size_t fetched = target->ahead ? tiles->stride : 0;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     const char *ahead = (const char *)tile + PREFETCH_BYTES;
     for (size_t line = 0; line < fetched; line += 64) {

@@ -19,11 +19,29 @@ static bool has_avx2(void) {
 static bool has_avx512(void) {
   return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
 }
+
+/* Measured at 16 million vertices with 16 modes: on AMD's family 25 (Zen 4) the processor's own
+ * prefetchers bring 39 GB/s of int16 tiles and 37 of float32, and being asked as well cuts that to
+ * 33 and 23; on family 26 (Zen 5) asking is the faster way. */
+bool supine_prefetch_pays(void) {
+  unsigned a = 0;
+  unsigned b = 0;
+  unsigned c = 0;
+  unsigned d = 0;
+  const bool amd = __get_cpuid(0, &a, &b, &c, &d) != 0 && b == signature_AMD_ebx &&
+                   d == signature_AMD_edx && c == signature_AMD_ecx;
+  const bool known = __get_cpuid(1, &a, &b, &c, &d) != 0;
+  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* the second counts from 15 up */
+  return amd && known && family == 26;
+}
 #else
 static bool has_avx2(void) {
   return false;
 }
 static bool has_avx512(void) {
+  return false;
+}
+bool supine_prefetch_pays(void) {
   return false;
 }
 #endif

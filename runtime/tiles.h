@@ -69,7 +69,7 @@ typedef struct supine_target {
   float *x, *y, *z;
   bool rest;   /**< positions; otherwise displacements alone */
   bool stream; /**< store past the cache */
-  bool near;   /**< the tiles are in the cache: do not ask for them ahead */
+  bool ahead;  /**< ask for tiles PREFETCH_BYTES ahead */
   /** [16] or NULL. Where one array is written in several runs, what one run leaves to the next, so
    * that a line that both share is stored once. */
   float *held;
@@ -111,5 +111,9 @@ extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
 /** The code of the given kind, or of the widest kind where AUTO (then *simd says which); NULL where
  * this processor or build has not got it. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
+
+/** Is it worth while on this processor to ask for tiles that come from memory ahead of their use?
+ */
+bool supine_prefetch_pays(void);
 
 #endif
