@@ -189,6 +189,51 @@ static void range_triad(void *context, size_t begin, size_t end, size_t thread) 
   triad(t->basis->info.simd, end - begin, work->a + begin, work->b + begin, work->c + begin);
 }
 
+#if defined(__x86_64__) && defined(__GNUC__)
+__attribute__((target("avx512f"))) static void
+traffic_avx512(const unsigned char *tiles, size_t stride, size_t count, float *xyz) {
+  for (size_t t = 0; t < count; ++t, tiles += stride, xyz += TILE_NUMBERS) {
+    __m512i sum = _mm512_setzero_si512();
+    for (size_t line = 0; line < stride; line += 64) {
+      sum = _mm512_xor_si512(sum, _mm512_load_si512(tiles + line));
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      _mm512_stream_si512((void *)(xyz + 16 * j), sum);
+    }
+  }
+  _mm_sfence();
+}
+#endif
+
+/* The evaluator's loads and stores without its arithmetic: what memory allows at best. */
+static void range_traffic(void *context, size_t begin, size_t end, size_t thread) {
+  const task *t = context;
+  const supine_tiles *tiles = &t->basis->tiles;
+  const unsigned char *tile = tiles->bytes + begin / TILE * tiles->stride;
+  float *xyz = t->work->xyz + 3 * begin;
+  const size_t count = (end - begin) / TILE;
+  (void)thread;
+#if defined(__x86_64__) && defined(__GNUC__)
+  if (t->basis->info.simd == SUPINE_SIMD_AVX512) {
+    traffic_avx512(tile, tiles->stride, count, xyz);
+    return;
+  }
+#endif
+  for (size_t i = 0; i < count; ++i, tile += tiles->stride, xyz += TILE_NUMBERS) {
+    float sum[TILE] = {0};
+    for (size_t at = 0; at < tiles->stride; at += sizeof sum) {
+      float line[TILE];
+      memcpy(line, tile + at, sizeof line);
+      for (size_t v = 0; v < TILE; ++v) {
+        sum[v] = sum[v] < line[v] ? line[v] : sum[v];
+      }
+    }
+    for (size_t j = 0; j < TILE_NUMBERS; ++j) {
+      xyz[j] = sum[j % TILE];
+    }
+  }
+}
+
 /* Arithmetic alone: eight chains of multiplications that stay in registers. */
 static void range_arithmetic(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
@@ -306,6 +351,12 @@ static void add_all(list *l, bench *work, size_t threads) {
     row = add(l, work, "supine", basis, threads, range_deform, n,
               basis->info.bytes_per_vertex + output);
     say_basis(row, basis);
+  }
+  for (int storage = SUPINE_STORAGE_COUNT - 1; storage >= SUPINE_STORAGE_EXACT; --storage) {
+    const supine_basis *basis = work->bases[storage];
+    row = add(l, work, "traffic", basis, threads, range_traffic, n,
+              basis->info.bytes_per_vertex + output);
+    row->storage = supine_bench_storage_name(basis->info.storage);
   }
   const supine_basis *basis = work->bases[SUPINE_STORAGE_INT16];
   row = add(l, work, "supine_separate", basis, threads, range_separate, n,

@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Numbers in fewer bits: halves, and floats of 24 bits. Plain C, one at a time. */
+ * Numbers in fewer bits: halves; two numbers in a word of 32 bits; three in two words. Plain C, one
+ * at a time.
+ *
+ * A number that shares a word stands in its upper bits and is read as the whole word, a signed
+ * integer, so that reading costs one conversion: what stands below is noise that is known when the
+ * number is chosen, and it is chosen so that both together come nearest. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -36,22 +42,61 @@ static inline uint16_t half_narrow(float value) {
   return (uint16_t)(sign | ((bits + 0xFFFU + ((bits >> 13) & 1U)) >> 13));
 }
 
-/** A float of 24 bits, from the low 24 of a word (the others are ignored): sign, 5 exponent bits
- * counted from `bias` (shifted by 23), 18 bits of fraction. */
-static inline float float24_widen(uint32_t word, uint32_t bias) {
-  const uint32_t sign = (word & 0x800000U) << 8;
-  return bits_float(sign | (((word & 0x7FFFFFU) << 5) + bias));
+/** The integer that `word` stands for. */
+static inline int32_t word_integer(uint32_t word) {
+  int32_t value = 0;
+  memcpy(&value, &word, sizeof value);
+  return value;
 }
 
-/** The nearest such float; the smallest where |value| is below all, the largest where above. */
-static inline uint32_t float24_narrow(float value, uint32_t bias) {
-  const uint32_t sign = (float_bits(value) >> 8) & 0x800000U;
-  const uint32_t bits = float_bits(value) & 0x7FFFFFFFU;
-  if (bits <= bias) {
-    return sign;
+/** The word nearest to `value` with the given lowest `bits`, which are all that is set in `low`;
+ * the nearest of the least and the greatest such where |value| is beyond 2^31. */
+static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
+  const double step = (double)(UINT32_C(1) << bits);
+  const double top = 0x1p31 / step - 1;
+  const double above = rint((value - (double)low) / step);
+  const double held = above > top ? top : above < -top ? -top : above;
+  return (uint32_t)(int32_t)(held * step) | low;
+}
+
+/** Two numbers in a word, in units of 2^-31 of their limits: the first in the lower half. */
+static inline uint32_t pair_narrow(double first, double second) {
+  return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
+}
+
+/** @{ The numbers of a pair. */
+static inline float pair_first(uint32_t word) {
+  return (float)word_integer(word << 16);
+}
+
+static inline float pair_second(uint32_t word) {
+  return (float)word_integer(word);
+}
+/** @} */
+
+/** Three numbers in two words, in units of 2^-31 of their limit: the first and second in the upper
+ * 21 bits of a word each, the third in what is left of both. None becomes 0 (see fixed_scale). */
+static inline void fixed_narrow(const double *numbers, uint32_t *words) {
+  uint32_t third = word_nearest(numbers[2], 0, 10);
+  third = third == 0 ? UINT32_C(1) << 10 : third;
+  for (int i = 0; i < 2; ++i) {
+    const uint32_t low = third >> (i == 0 ? 21 : 10) & 0x7FFU;
+    words[i] = word_nearest(numbers[i], low, 11);
+    words[i] = words[i] == 0 ? UINT32_C(1) << 11 : words[i];
   }
-  const uint32_t word = (bits - bias + 0xFU + (((bits - bias) >> 5) & 1U)) >> 5;
-  return sign | (word > 0x7FFFFFU ? 0x7FFFFFU : word);
+}
+
+/** The three numbers. */
+static inline void fixed_widen(const uint32_t *words, float *numbers) {
+  numbers[0] = (float)word_integer(words[0]);
+  numbers[1] = (float)word_integer(words[1]);
+  numbers[2] = (float)word_integer(words[0] << 21 | (words[1] << 10 & 0x1FFC00U));
+}
+
+/** A number other than 0 times the power of two whose exponent, in its place in a float's bits, is
+ * `unit`. */
+static inline float fixed_scale(float number, uint32_t unit) {
+  return bits_float(float_bits(number) + unit);
 }
 
 #endif

@@ -73,7 +73,7 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
 void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
                          size_t begin, size_t end, float *xyz) {
   const supine_target target = {
-      .x = xyz, .rest = true, .stream = basis->stream, .ahead = basis->ahead};
+      .x = xyz, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
@@ -85,12 +85,12 @@ void supine_deform(const supine_basis *basis, const double *weights, const doubl
 void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *x, float *y, float *z) {
   const supine_target target = {
-      .x = x, .y = y, .z = z, .rest = true, .stream = basis->stream, .ahead = basis->ahead};
+      .x = x, .y = y, .z = z, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }
 
 void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
                            size_t begin, size_t end, float *xyz) {
-  const supine_target target = {.x = xyz, .stream = basis->stream, .ahead = basis->ahead};
+  const supine_target target = {.x = xyz, .stream = basis->stream, .prefetch = basis->prefetch};
   deform_lungs(basis, weights, scales, begin, end, &target);
 }

@@ -29,7 +29,7 @@ struct supine_basis {
   supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
   const supine_kernels *kernels;
   bool stream; /**< positions outgrow the cache: store past it */
-  bool ahead;  /**< ask for tiles ahead of their use */
+  supine_prefetch prefetch;
   /** Of mode k: what one unit of its packed coefficients stands for. */
   double mode_scale[SUPINE_MODES_MAX];
   double mode_error[SUPINE_MODES_MAX]; /**< largest error by packing, mm at weight and scale 1 */

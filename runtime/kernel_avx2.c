@@ -7,58 +7,83 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* Coefficient k of vertices 8 half to 8 half + 7. */
-INLINE __m256 coefficient(const unsigned char *at, size_t k, size_t half, supine_storage storage) {
-  const __m128i *const shorts = (const __m128i *)(at + 32 * k + 16 * half);
-  switch (storage) {
-  case SUPINE_STORAGE_INT16:
-    return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_load_si128(shorts)));
-  case SUPINE_STORAGE_FLOAT16:
-    return _mm256_cvtph_ps(_mm_load_si128(shorts));
-  default:
-    return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+/* Coefficient 2 pair, or the one after it, of vertices 8 half to 8 half + 7. */
+INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
+                          supine_storage storage) {
+  const size_t k = 2 * pair + second;
+  if (storage == SUPINE_STORAGE_INT16) { /* compact.h: pair_first, pair_second */
+    const __m256i words = _mm256_load_si256((const __m256i *)(at + 64 * pair + 32 * half));
+    return _mm256_cvtepi32_ps(second ? words : _mm256_slli_epi32(words, 16));
   }
+  if (storage == SUPINE_STORAGE_FLOAT16) {
+    return _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)));
+  }
+  return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
 }
 
 typedef struct halves {
   __m256 v[2];
 } halves;
 
-/* sum over k of w_k c_k: K multiplications, K - 1 additions. */
-INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
-  const __m256 first = _mm256_broadcast_ss(w);
-  halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, 0, storage)),
-                 _mm256_mul_ps(first, coefficient(at, 0, 1, storage))}};
-  for (size_t k = 1; k < modes; ++k) {
-    const __m256 weight = _mm256_broadcast_ss(w + k);
-    sum.v[0] = _mm256_fmadd_ps(weight, coefficient(at, k, 0, storage), sum.v[0]);
-    sum.v[1] = _mm256_fmadd_ps(weight, coefficient(at, k, 1, storage), sum.v[1]);
+INLINE halves add_mode(halves sum, const unsigned char *at, const float *w, size_t pair,
+                       bool second, supine_storage storage) {
+  const __m256 weight = _mm256_broadcast_ss(w + 2 * pair + second);
+  for (size_t half = 0; half < 2; ++half) {
+    sum.v[half] =
+        _mm256_fmadd_ps(weight, coefficient(at, pair, second, half, storage), sum.v[half]);
   }
   return sum;
 }
 
-/* Numbers 8 j to 8 j + 7 of a direction or rest position. Compact: 24 bytes (the loads take 4 more,
- * which lie in the tile or in the padding behind the last), four numbers to each half of a
- * register, each number to the upper three bytes of a word; then the exponent moves to its place.
- */
-INLINE __m256 numbers(const unsigned char *at, size_t j, bool compact, __m256i bias) {
-  if (!compact) {
-    return _mm256_load_ps((const float *)(const void *)(at + 32 * j));
+/* sum over k of w_k c_k: K multiplications, K - 1 additions. */
+INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
+  const __m256 first = _mm256_broadcast_ss(w);
+  halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, false, 0, storage)),
+                 _mm256_mul_ps(first, coefficient(at, 0, false, 1, storage))}};
+  for (size_t pair = 0; pair < modes / 2; ++pair) {
+    if (pair > 0) {
+      sum = add_mode(sum, at, w, pair, false, storage);
+    }
+    sum = add_mode(sum, at, w, pair, true, storage);
   }
-  const __m256i spread = _mm256_broadcastsi128_si256(
-      _mm_setr_epi8(-1, 0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11));
-  const __m128i first = _mm_loadu_si128((const __m128i *)(at + 24 * j));
-  const __m128i second = _mm_loadu_si128((const __m128i *)(at + 24 * j + 12));
-  __m256i word = _mm256_inserti128_si256(_mm256_castsi128_si256(first), second, 1);
-  word = _mm256_srai_epi32(_mm256_shuffle_epi8(word, spread), 3);
-  word = _mm256_and_si256(word, _mm256_set1_epi32((int)0x8FFFFFFFU));
-  return _mm256_castsi256_ps(_mm256_add_epi32(word, bias));
+  return modes > 1 && modes % 2 != 0 ? add_mode(sum, at, w, modes / 2, false, storage) : sum;
 }
 
 /* 48 numbers in order. */
 typedef struct triples {
   __m256 v[6];
 } triples;
+
+/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+INLINE triples numbers(const unsigned char *at, bool compact) {
+  triples n;
+  if (!compact) {
+    for (size_t j = 0; j < 6; ++j) {
+      n.v[j] = _mm256_load_ps((const float *)(const void *)(at + 32 * j));
+    }
+    return n;
+  }
+  for (size_t half = 0; half < 2; ++half) {
+    const __m256i first = _mm256_load_si256((const __m256i *)(at + 32 * half));
+    const __m256i second = _mm256_load_si256((const __m256i *)(at + 64 + 32 * half));
+    const __m256i third = _mm256_or_si256(_mm256_slli_epi32(first, 21),
+                                          _mm256_srli_epi32(_mm256_slli_epi32(second, 21), 11));
+    n.v[half] = _mm256_cvtepi32_ps(first);
+    n.v[2 + half] = _mm256_cvtepi32_ps(second);
+    n.v[4 + half] = _mm256_cvtepi32_ps(third);
+  }
+  return n;
+}
+
+/* Rest positions, mm. */
+INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
+  const __m256i unit = _mm256_set1_epi32((int)tiles->rest_unit);
+  triples p = numbers(tile + tiles->rest_begin, compact);
+  for (size_t j = 0; j < 6 && compact; ++j) {
+    p.v[j] = _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(p.v[j]), unit));
+  }
+  return p;
+}
 
 /* a's lane of vertex i at numbers 3 i, 3 i + 1, 3 i + 2. */
 INLINE triples spread_amount(halves a) {
@@ -105,10 +130,6 @@ INLINE void put(float *to, __m256 v, bool stream) {
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
                            bool with_rest, supine_storage storage, bool vector) {
   const bool compact = supine_tiles_compact(storage);
-  const __m256i direction_bias = _mm256_set1_epi32((int)tiles->direction_bias);
-  const __m256i rest_bias = _mm256_set1_epi32((int)tiles->rest_bias);
-  const unsigned char *direction = tile + tiles->direction_begin;
-  const unsigned char *rest = tile + tiles->rest_begin;
   triples result;
   if (vector) {
     const halves x = dot(tile, w, tiles->modes, storage);
@@ -116,16 +137,25 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
     const halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
     interleave8(x.v[0], y.v[0], z.v[0], result.v);
     interleave8(x.v[1], y.v[1], z.v[1], result.v + 3);
-    for (size_t j = 0; j < 6 && with_rest; ++j) {
-      result.v[j] = _mm256_add_ps(result.v[j], numbers(rest, j, compact, rest_bias));
+    if (with_rest) {
+      const triples rest = rest_positions(tiles, tile, compact);
+      for (size_t j = 0; j < 6; ++j) {
+        result.v[j] = _mm256_add_ps(result.v[j], rest.v[j]);
+      }
     }
     return result;
   }
   const triples amount = spread_amount(dot(tile, w, tiles->modes, storage));
-  for (size_t j = 0; j < 6; ++j) {
-    const __m256 d = numbers(direction, j, compact, direction_bias);
-    result.v[j] = with_rest ? _mm256_fmadd_ps(amount.v[j], d, numbers(rest, j, compact, rest_bias))
-                            : _mm256_mul_ps(amount.v[j], d);
+  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  if (with_rest) {
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 6; ++j) {
+      result.v[j] = _mm256_fmadd_ps(amount.v[j], direction.v[j], rest.v[j]);
+    }
+  } else {
+    for (size_t j = 0; j < 6; ++j) {
+      result.v[j] = _mm256_mul_ps(amount.v[j], direction.v[j]);
+    }
   }
   return result;
 }
@@ -143,19 +173,26 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
   }
 }
 
+/* A tile of this size, ahead of the one at hand. */
+INLINE void prefetch(const unsigned char *tile, size_t stride, supine_prefetch how) {
+  const char *near = (const char *)tile + 640;
+  const char *far = (const char *)tile + 8192;
+  if (how == SUPINE_PREFETCH_NEAR) {
+    for (size_t line = 0; line < stride; line += 128) {
+      _mm_prefetch(near + line, _MM_HINT_T1);
+    }
+  } else if (how == SUPINE_PREFETCH_FAR) {
+    for (size_t line = 0; line < stride; line += 64) {
+      _mm_prefetch(far + line, _MM_HINT_NTA);
+    }
+  }
+}
+
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                        const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
-  const size_t fetched = target->ahead ? tiles->stride : 0;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    const char *ahead = (const char *)tile + PREFETCH_BYTES;
-    for (size_t line = 0; line < fetched; line += 64) {
-      if (target->stream) { /* used once a frame: leave the caches alone */
-        _mm_prefetch(ahead + line, _MM_HINT_NTA);
-      } else {
-        _mm_prefetch(ahead + line, _MM_HINT_T0);
-      }
-    }
+    prefetch(tile, tiles->stride, target->prefetch);
     const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
     if (target->y != NULL) {
       put_separate(&xyz, target, t * TILE);
@@ -197,14 +234,12 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
   for (size_t k = 0; k < modes; ++k) {
-    _mm256_store_ps(c + 16 * k, coefficient(at, k, 0, storage));
-    _mm256_store_ps(c + 16 * k + 8, coefficient(at, k, 1, storage));
+    _mm256_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, 0, storage));
+    _mm256_store_ps(c + 16 * k + 8, coefficient(at, k / 2, k % 2 != 0, 1, storage));
   }
 }
 
 static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  const __m256i direction_bias = _mm256_set1_epi32((int)tiles->direction_bias);
-  const __m256i rest_bias = _mm256_set1_epi32((int)tiles->rest_bias);
   const bool compact = supine_tiles_compact(tiles->storage);
   for (size_t t = 0; t < count; ++t) {
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
@@ -226,12 +261,15 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
         break;
       }
     }
-    for (size_t j = 0; j < 6; ++j) {
-      if (tiles->axes == 1) {
-        _mm256_store_ps(d + 8 * j,
-                        numbers(tile + tiles->direction_begin, j, compact, direction_bias));
+    if (tiles->axes == 1) {
+      const triples direction = numbers(tile + tiles->direction_begin, compact);
+      for (size_t j = 0; j < 6; ++j) {
+        _mm256_store_ps(d + 8 * j, direction.v[j]);
       }
-      _mm256_store_ps(p + 8 * j, numbers(tile + tiles->rest_begin, j, compact, rest_bias));
+    }
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 6; ++j) {
+      _mm256_store_ps(p + 8 * j, rest.v[j]);
     }
   }
 }

@@ -25,60 +25,72 @@ INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
   return common ? w->v[k] : _mm512_set1_ps(w->at[k]);
 }
 
-/* Coefficient k of 16 vertices. */
-INLINE __m512 coefficient(const unsigned char *at, size_t k, supine_storage storage) {
-  const __m256i *const shorts = (const __m256i *)(at + 32 * k);
-  switch (storage) {
-  case SUPINE_STORAGE_INT16:
-    return _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_load_si256(shorts)));
-  case SUPINE_STORAGE_FLOAT16:
-    return _mm512_cvtph_ps(_mm256_load_si256(shorts));
-  default:
-    return _mm512_loadu_ps(at + 64 * k);
+/* Coefficient 2 pair, or the one after it, of 16 vertices. */
+INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
+                          supine_storage storage) {
+  const size_t k = 2 * pair + second;
+  if (storage == SUPINE_STORAGE_INT16) { /* compact.h: pair_first, pair_second */
+    const __m512i words = _mm512_load_si512(at + 64 * pair);
+    return _mm512_cvtepi32_ps(second ? words : _mm512_slli_epi32(words, 16));
   }
+  if (storage == SUPINE_STORAGE_FLOAT16) {
+    return _mm512_cvtph_ps(_mm256_load_si256((const __m256i *)(at + 32 * k)));
+  }
+  return _mm512_load_ps(at + 64 * k);
 }
 
 /* sum over k of w_k c_k, in two chains: K multiplications, K - 1 additions. */
 INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, bool common,
                   supine_storage storage) {
-  __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, storage));
+  __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, false, storage));
   if (modes == 1) {
     return even;
   }
-  __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 1, storage));
-  size_t k = 2;
-  UNROLL for (; k + 1 < modes; k += 2) {
-    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
-    odd = _mm512_fmadd_ps(weight(w, k + 1, common), coefficient(at, k + 1, storage), odd);
+  __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 0, true, storage));
+  UNROLL for (size_t pair = 1; pair < modes / 2; ++pair) {
+    even =
+        _mm512_fmadd_ps(weight(w, 2 * pair, common), coefficient(at, pair, false, storage), even);
+    odd =
+        _mm512_fmadd_ps(weight(w, 2 * pair + 1, common), coefficient(at, pair, true, storage), odd);
   }
-  if (k < modes) {
-    even = _mm512_fmadd_ps(weight(w, k, common), coefficient(at, k, storage), even);
+  if (modes % 2 != 0) {
+    even = _mm512_fmadd_ps(weight(w, modes - 1, common), coefficient(at, modes / 2, false, storage),
+                           even);
   }
   return _mm512_add_ps(even, odd);
 }
 
-/* Numbers 16 j to 16 j + 15 of a direction or rest position. Compact: 48 bytes (the load takes 16
- * more, which lie in the tile or in the padding behind the last), four numbers to each quarter of a
- * register, each number to the upper three bytes of a word; then the exponent moves to its place.
- */
-INLINE __m512 numbers(const unsigned char *at, size_t j, bool compact, __m512i bias) {
-  if (!compact) {
-    return _mm512_loadu_ps(at + 64 * j);
-  }
-  const __m512i quarters = _mm512_setr_epi32(0, 1, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 10, 11, 12);
-  const __m512i spread =
-      _mm512_broadcast_i32x4(_mm_setr_epi8(-1, 0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11));
-  __m512i word = _mm512_permutexvar_epi32(quarters, _mm512_loadu_si512(at + 48 * j));
-  word = _mm512_srai_epi32(_mm512_shuffle_epi8(word, spread), 3);
-  word = _mm512_and_si512(word, _mm512_set1_epi32((int)0x8FFFFFFFU));
-  return _mm512_castsi512_ps(_mm512_add_epi32(word, bias));
-}
-
-/* v0 of vertices 0 to 5, v1 of 5 to 10, v2 of 10 to 15: a's lane of vertex i at numbers 3 i ... */
+/* Numbers 0 to 15, 16 to 31, 32 to 47. */
 typedef struct triples {
   __m512 v[3];
 } triples;
 
+/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+INLINE triples numbers(const unsigned char *at, bool compact) {
+  if (!compact) {
+    return (triples){{_mm512_load_ps(at), _mm512_load_ps(at + 64), _mm512_load_ps(at + 128)}};
+  }
+  enum { A_OR_B_AND_C = 0xF8 };
+  const __m512i first = _mm512_load_si512(at);
+  const __m512i second = _mm512_load_si512(at + 64);
+  const __m512i third =
+      _mm512_ternarylogic_epi32(_mm512_slli_epi32(first, 21), _mm512_slli_epi32(second, 10),
+                                _mm512_set1_epi32(0x1FFC00), A_OR_B_AND_C);
+  return (triples){
+      {_mm512_cvtepi32_ps(first), _mm512_cvtepi32_ps(second), _mm512_cvtepi32_ps(third)}};
+}
+
+/* Rest positions, mm. */
+INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
+  const __m512i unit = _mm512_set1_epi32((int)tiles->rest_unit);
+  triples p = numbers(tile + tiles->rest_begin, compact);
+  for (size_t j = 0; j < 3 && compact; ++j) {
+    p.v[j] = _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(p.v[j]), unit));
+  }
+  return p;
+}
+
+/* The amount of each vertex at its three numbers. */
 INLINE triples spread_amount(__m512 a) {
   const __m512i lane0 = _mm512_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5);
   const __m512i lane1 = _mm512_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10);
@@ -165,28 +177,48 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
                            bool with_rest, bool common, supine_storage storage, bool vector) {
   const size_t modes = common ? COMMON_MODES : tiles->modes;
   const bool compact = supine_tiles_compact(storage);
-  const __m512i direction_bias = _mm512_set1_epi32((int)tiles->direction_bias);
-  const __m512i rest_bias = _mm512_set1_epi32((int)tiles->rest_bias);
-  const unsigned char *direction = tile + tiles->direction_begin;
-  const unsigned char *rest = tile + tiles->rest_begin;
   triples result;
   if (vector) {
     const __m512 x = dot(tile, w, modes, common, storage);
     const __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
     const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
     result = interleave(x, y, z);
-    for (size_t j = 0; j < 3 && with_rest; ++j) {
-      result.v[j] = _mm512_add_ps(result.v[j], numbers(rest, j, compact, rest_bias));
+    if (with_rest) {
+      const triples rest = rest_positions(tiles, tile, compact);
+      for (size_t j = 0; j < 3; ++j) {
+        result.v[j] = _mm512_add_ps(result.v[j], rest.v[j]);
+      }
     }
     return result;
   }
   const triples amount = spread_amount(dot(tile, w, modes, common, storage));
-  for (size_t j = 0; j < 3; ++j) {
-    const __m512 d = numbers(direction, j, compact, direction_bias);
-    result.v[j] = with_rest ? _mm512_fmadd_ps(amount.v[j], d, numbers(rest, j, compact, rest_bias))
-                            : _mm512_mul_ps(amount.v[j], d);
+  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  if (with_rest) {
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 3; ++j) {
+      result.v[j] = _mm512_fmadd_ps(amount.v[j], direction.v[j], rest.v[j]);
+    }
+  } else {
+    for (size_t j = 0; j < 3; ++j) {
+      result.v[j] = _mm512_mul_ps(amount.v[j], direction.v[j]);
+    }
   }
   return result;
+}
+
+/* A tile of this size, ahead of the one at hand. */
+INLINE void prefetch(const unsigned char *tile, size_t stride, supine_prefetch how) {
+  const char *near = (const char *)tile + 640;
+  const char *far = (const char *)tile + 8192;
+  if (how == SUPINE_PREFETCH_NEAR) {
+    for (size_t line = 0; line < stride; line += 128) {
+      _mm_prefetch(near + line, _MM_HINT_T1);
+    }
+  } else if (how == SUPINE_PREFETCH_FAR) {
+    for (size_t line = 0; line < stride; line += 64) {
+      _mm_prefetch(far + line, _MM_HINT_NTA);
+    }
+  }
 }
 
 /* What a caller's constants make of one loop. */
@@ -212,16 +244,8 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
       w.v[k] = _mm512_set1_ps(weights[k]);
     }
   }
-  const size_t fetched = target->ahead ? tiles->stride : 0;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    const char *ahead = (const char *)tile + PREFETCH_BYTES;
-    for (size_t line = 0; line < fetched; line += 64) {
-      if (target->stream) { /* used once a frame: leave the caches alone */
-        _mm_prefetch(ahead + line, _MM_HINT_NTA);
-      } else {
-        _mm_prefetch(ahead + line, _MM_HINT_T0);
-      }
-    }
+    prefetch(tile, tiles->stride, target->prefetch);
     triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
     if (f.joined) {
       writer_put(&out[0], xyz.v[0]);
@@ -282,18 +306,14 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
   for (size_t k = 0; k < modes; ++k) {
-    _mm512_storeu_ps(c + 16 * k, coefficient(at, k, storage));
+    _mm512_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, storage));
   }
 }
 
 static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  const __m512i direction_bias = _mm512_set1_epi32((int)tiles->direction_bias);
-  const __m512i rest_bias = _mm512_set1_epi32((int)tiles->rest_bias);
   const bool compact = supine_tiles_compact(tiles->storage);
   for (size_t t = 0; t < count; ++t) {
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
-    const unsigned char *direction = tile + tiles->direction_begin;
-    const unsigned char *rest = tile + tiles->rest_begin;
     unsigned char *wide = to->bytes + t * to->stride;
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
       const unsigned char *from = tile + axis * tiles->axis_bytes;
@@ -310,12 +330,15 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
         break;
       }
     }
-    for (size_t j = 0; j < 3; ++j) {
-      if (tiles->axes == 1) {
-        _mm512_storeu_ps(wide + to->direction_begin + 64 * j,
-                         numbers(direction, j, compact, direction_bias));
+    if (tiles->axes == 1) {
+      const triples direction = numbers(tile + tiles->direction_begin, compact);
+      for (size_t j = 0; j < 3; ++j) {
+        _mm512_store_ps(wide + to->direction_begin + 64 * j, direction.v[j]);
       }
-      _mm512_storeu_ps(wide + to->rest_begin + 64 * j, numbers(rest, j, compact, rest_bias));
+    }
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 3; ++j) {
+      _mm512_store_ps(wide + to->rest_begin + 64 * j, rest.v[j]);
     }
   }
 }

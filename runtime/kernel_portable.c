@@ -3,63 +3,73 @@
 #include "compact.h"
 #include "tiles.h"
 
-/* Adds w c_v of one mode to the sums of 16 vertices. */
-static inline void add_mode(supine_storage storage, const unsigned char *at, float w,
-                            float *restrict sum) {
+/* 16 coefficients of mode k as floats, in the units they are packed in. */
+static inline void widen_mode(supine_storage storage, const unsigned char *at, size_t k,
+                              float *restrict c) {
   if (storage == SUPINE_STORAGE_INT16) {
-    int16_t c[TILE];
-    memcpy(c, at, sizeof c);
+    uint32_t words[TILE];
+    memcpy(words, at + k / 2 * sizeof words, sizeof words);
     for (size_t v = 0; v < TILE; ++v) {
-      sum[v] += w * (float)c[v];
+      c[v] = k % 2 == 0 ? pair_first(words[v]) : pair_second(words[v]);
     }
   } else if (storage == SUPINE_STORAGE_FLOAT16) {
-    uint16_t c[TILE];
-    memcpy(c, at, sizeof c);
+    uint16_t half[TILE];
+    memcpy(half, at + k * sizeof half, sizeof half);
     for (size_t v = 0; v < TILE; ++v) {
-      sum[v] += w * half_widen(c[v]);
+      c[v] = half_widen(half[v]);
     }
   } else {
-    float c[TILE];
-    memcpy(c, at, sizeof c);
-    for (size_t v = 0; v < TILE; ++v) {
-      sum[v] += w * c[v];
-    }
+    memcpy(c, at + k * TILE * sizeof *c, TILE * sizeof *c);
   }
 }
 
 /* sum over k of w_k c_vk of 16 vertices. */
 static void dot(const supine_tiles *tiles, const unsigned char *at, const float *w, float *sum) {
-  const size_t step = tiles->axis_bytes / tiles->modes;
   float total[TILE] = {0};
   for (size_t k = 0; k < tiles->modes; ++k) {
-    add_mode(tiles->storage, at + k * step, w[k], total);
+    float c[TILE];
+    widen_mode(tiles->storage, at, k, c);
+    for (size_t v = 0; v < TILE; ++v) {
+      total[v] += w[k] * c[v];
+    }
   }
   memcpy(sum, total, sizeof total);
 }
 
-/* 48 numbers. */
-static void widen_numbers(const unsigned char *at, bool compact, uint32_t bias, float *numbers) {
+/* 48 numbers; compact ones in the unit they are packed in. */
+static void widen_numbers(const unsigned char *at, bool compact, float *numbers) {
   if (!compact) {
     memcpy(numbers, at, TILE_NUMBERS * sizeof *numbers);
     return;
   }
-  for (size_t j = 0; j < TILE_NUMBERS; ++j) {
-    uint32_t word = 0; /* and a byte of the next, or of the padding behind the last */
-    memcpy(&word, at + 3 * j, sizeof word);
-    numbers[j] = float24_widen(word, bias);
+  uint32_t words[2][TILE];
+  memcpy(words, at, sizeof words);
+  for (size_t v = 0; v < TILE; ++v) {
+    float three[3];
+    fixed_widen((const uint32_t[2]){words[0][v], words[1][v]}, three);
+    numbers[v] = three[0];
+    numbers[TILE + v] = three[1];
+    numbers[2 * TILE + v] = three[2];
+  }
+}
+
+static void widen_rest(const supine_tiles *tiles, const unsigned char *tile, float *p) {
+  const bool compact = supine_tiles_compact(tiles->storage);
+  widen_numbers(tile + tiles->rest_begin, compact, p);
+  for (size_t j = 0; j < TILE_NUMBERS && compact; ++j) {
+    p[j] = fixed_scale(p[j], tiles->rest_unit);
   }
 }
 
 static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
                         bool rest, float *xyz) {
-  const bool compact = supine_tiles_compact(tiles->storage);
   float amount[3][TILE] = {{0}};
   float p[TILE_NUMBERS] = {0};
   for (size_t axis = 0; axis < tiles->axes; ++axis) {
     dot(tiles, tile + axis * tiles->axis_bytes, w, amount[axis]);
   }
   if (rest) {
-    widen_numbers(tile + tiles->rest_begin, compact, tiles->rest_bias, p);
+    widen_rest(tiles, tile, p);
   }
   if (tiles->axes == 3) {
     for (size_t v = 0; v < TILE; ++v) {
@@ -69,7 +79,7 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
     }
   } else {
     float d[TILE_NUMBERS];
-    widen_numbers(tile + tiles->direction_begin, compact, tiles->direction_bias, d);
+    widen_numbers(tile + tiles->direction_begin, supine_tiles_compact(tiles->storage), d);
     for (size_t v = 0; v < TILE; ++v) {
       for (size_t axis = 0; axis < 3; ++axis) {
         xyz[3 * v + axis] = p[3 * v + axis] + amount[0][v] * d[3 * v + axis];
@@ -96,42 +106,21 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   }
 }
 
-/* 16 coefficients of each mode as floats, in the units they are packed in. */
-static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, float *c) {
-  for (size_t k = 0; k < tiles->modes; ++k, c += TILE) {
-    if (tiles->storage == SUPINE_STORAGE_INT16) {
-      int16_t packed[TILE];
-      memcpy(packed, at + k * sizeof packed, sizeof packed);
-      for (size_t v = 0; v < TILE; ++v) {
-        c[v] = packed[v];
-      }
-    } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
-      uint16_t half[TILE];
-      memcpy(half, at + k * sizeof half, sizeof half);
-      for (size_t v = 0; v < TILE; ++v) {
-        c[v] = half_widen(half[v]);
-      }
-    } else {
-      memcpy(c, at + k * TILE * sizeof *c, TILE * sizeof *c);
-    }
-  }
-}
-
 static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  const bool compact = supine_tiles_compact(tiles->storage);
   for (size_t t = 0; t < count; ++t) {
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
     unsigned char *wide = to->bytes + t * to->stride;
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
-                         (float *)(void *)(wide + axis * to->axis_bytes));
+      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
+      for (size_t k = 0; k < tiles->modes; ++k) {
+        widen_mode(tiles->storage, tile + axis * tiles->axis_bytes, k, c + k * TILE);
+      }
     }
     if (tiles->axes == 1) {
-      widen_numbers(tile + tiles->direction_begin, compact, tiles->direction_bias,
+      widen_numbers(tile + tiles->direction_begin, supine_tiles_compact(tiles->storage),
                     (float *)(void *)(wide + to->direction_begin));
     }
-    widen_numbers(tile + tiles->rest_begin, compact, tiles->rest_bias,
-                  (float *)(void *)(wide + to->rest_begin));
+    widen_rest(tiles, tile, (float *)(void *)(wide + to->rest_begin));
   }
 }
 

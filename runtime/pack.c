@@ -7,7 +7,7 @@
 #include "compact.h"
 #include "internal.h"
 
-enum { INT16_TOP = 32767, HUGE_PAGE = 1 << 21 };
+enum { INT16_TOP = 32767, HUGE_PAGE = 1 << 21, FLOAT_FRACTION_BITS = 23 };
 
 /* One tile before it is packed: coefficients [axes][K][16], direction and rest [48]. */
 typedef struct source {
@@ -16,9 +16,10 @@ typedef struct source {
   float rest[TILE_NUMBERS];
 } source;
 
-/* Of each mode what one packed unit stands for, and its inverse. */
+/* What one packed unit stands for. */
 typedef struct units {
-  float mode[SUPINE_MODES_MAX], inverse[SUPINE_MODES_MAX];
+  double mode[SUPINE_MODES_MAX];
+  double direction, rest; /* powers of two */
 } units;
 
 /* Numbers so small that products with them would be subnormal, and slow. */
@@ -31,17 +32,16 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   const size_t axes = basis->tiles.axes;
   const size_t begin = tile * TILE;
   const size_t left = basis->info.vertex_count - begin;
-  const size_t present = left < TILE ? left : TILE;
-  memset(from->direction, 0, sizeof from->direction);
-  memset(from->rest, 0, sizeof from->rest);
-  memcpy(from->rest, basis->vertices + 3 * begin, 3 * present * sizeof *from->rest);
-  if (basis->direction != NULL) {
-    memcpy(from->direction, basis->direction + 3 * begin, 3 * present * sizeof *from->direction);
-  }
-  for (size_t row = 0; row < axes * modes; ++row) {
-    for (size_t v = 0; v < TILE; ++v) {
-      from->coefficients[row * TILE + v] =
-          v < present ? flush(basis->coefficients[(begin + v) * axes * modes + row]) : 0;
+  for (size_t v = 0; v < TILE; ++v) {
+    const size_t i = begin + (v < left ? v : left - 1);
+    memcpy(from->rest + 3 * v, basis->vertices + 3 * i, 3 * sizeof *from->rest);
+    if (basis->direction != NULL) {
+      memcpy(from->direction + 3 * v, basis->direction + 3 * i, 3 * sizeof *from->direction);
+    } else {
+      memset(from->direction + 3 * v, 0, 3 * sizeof *from->direction);
+    }
+    for (size_t row = 0; row < axes * modes; ++row) {
+      from->coefficients[row * TILE + v] = flush(basis->coefficients[i * axes * modes + row]);
     }
   }
 }
@@ -70,36 +70,31 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* The bias of 24-bit floats that makes the largest fit (compact.h). */
-static uint32_t choose_bias(const float *values, size_t count) {
-  const uint32_t exponent = float_bits(largest(values, count)) >> 23;
-  return exponent > 31 ? (exponent - 31) << 23 : 0;
+/* 2^e such that the largest of the values is about 2^31 of it, within what fixed_scale can do. */
+static double fixed_unit(const float *values, size_t count) {
+  const float top = flush(largest(values, count));
+  const int exponent = top > 0 ? ilogbf(top) - 30 : -130;
+  return ldexp(1, exponent < 96 ? exponent : 96);
 }
 
 static void choose_units(supine_basis *basis, units *u) {
   const supine_storage storage = basis->tiles.storage;
+  const bool compact = supine_tiles_compact(storage);
   const size_t numbers = 3 * basis->info.vertex_count;
+  u->rest = compact ? fixed_unit(basis->vertices, numbers) : 1;
+  u->direction = compact && basis->direction != NULL ? fixed_unit(basis->direction, numbers) : 1;
+  basis->tiles.rest_unit = (uint32_t)ilogb(u->rest) << FLOAT_FRACTION_BITS;
   float top[SUPINE_MODES_MAX];
   largest_coefficients(basis, top);
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     u->mode[k] = 1;
     if (flush(top[k]) > 0 && storage == SUPINE_STORAGE_INT16) {
-      u->mode[k] = top[k] / INT16_TOP;
+      u->mode[k] = (double)top[k] / INT16_TOP * 0x1p-16; /* compact.h: the upper half of a word */
     } else if (flush(top[k]) > 0 && storage == SUPINE_STORAGE_FLOAT16) {
-      u->mode[k] = ldexpf(1, ilogbf(top[k]) - 14); /* the largest below 2^15 */
+      u->mode[k] = ldexp(1, ilogbf(top[k]) - 14); /* the largest below 2^15 */
     }
-    u->inverse[k] = 1 / u->mode[k];
-    basis->mode_scale[k] = (double)u->mode[k];
+    basis->mode_scale[k] = u->mode[k] * u->direction;
   }
-  basis->tiles.rest_bias = choose_bias(basis->vertices, numbers);
-  basis->tiles.direction_bias =
-      basis->direction == NULL ? 0 : choose_bias(basis->direction, numbers);
-}
-
-/* The nearest of -32767 ... 32767. */
-static float to_int16(float value, float inverse) {
-  const float scaled = rintf(value * inverse);
-  return scaled > INT16_TOP ? INT16_TOP : scaled < -INT16_TOP ? -INT16_TOP : scaled;
 }
 
 /* Packs rows of 16 coefficients of one axis; leaves in `rows` what they now stand for. */
@@ -107,41 +102,57 @@ static void pack_coefficients(const supine_tiles *tiles, const units *u, float *
                               unsigned char *at) {
   for (size_t k = 0; k < tiles->modes; ++k) {
     float *row = rows + k * TILE;
-    if (tiles->storage == SUPINE_STORAGE_INT16) {
-      int16_t packed[TILE];
-      for (size_t v = 0; v < TILE; ++v) {
-        const float q = to_int16(row[v], u->inverse[k]);
-        packed[v] = (int16_t)q;
-        row[v] = q * u->mode[k];
-      }
-      memcpy(at + k * sizeof packed, packed, sizeof packed);
-    } else if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
+    const double unit = u->mode[k];
+    if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
       uint16_t half[TILE];
       for (size_t v = 0; v < TILE; ++v) {
-        half[v] = half_narrow(row[v] * u->inverse[k]);
-        row[v] = half_widen(half[v]) * u->mode[k];
+        half[v] = half_narrow((float)((double)row[v] / unit));
+        row[v] = (float)((double)half_widen(half[v]) * unit);
       }
       memcpy(at + k * sizeof half, half, sizeof half);
-    } else {
+    } else if (tiles->storage == SUPINE_STORAGE_INT16 && k % 2 == 0) {
+      float *next = k + 1 < tiles->modes ? row + TILE : NULL;
+      const double next_unit = next != NULL ? u->mode[k + 1] : 1;
+      uint32_t words[TILE];
+      for (size_t v = 0; v < TILE; ++v) {
+        words[v] =
+            pair_narrow((double)row[v] / unit, next != NULL ? (double)next[v] / next_unit : 0);
+        row[v] = (float)((double)pair_first(words[v]) * unit);
+        if (next != NULL) {
+          next[v] = (float)((double)pair_second(words[v]) * next_unit);
+        }
+      }
+      memcpy(at + k / 2 * sizeof words, words, sizeof words);
+    } else if (tiles->storage != SUPINE_STORAGE_INT16) {
       memcpy(at + k * TILE * sizeof *row, row, TILE * sizeof *row);
     }
   }
 }
 
 /* Packs 48 numbers; leaves there what they now stand for. */
-static void pack_numbers(const supine_tiles *tiles, uint32_t bias, float *numbers,
+static void pack_numbers(const supine_tiles *tiles, double unit, float *numbers,
                          unsigned char *at) {
   if (!supine_tiles_compact(tiles->storage)) {
     memcpy(at, numbers, TILE_NUMBERS * sizeof *numbers);
     return;
   }
-  for (size_t j = 0; j < TILE_NUMBERS; ++j, at += 3) {
-    const uint32_t word = float24_narrow(numbers[j], bias);
-    at[0] = (unsigned char)(word & 0xFFU);
-    at[1] = (unsigned char)(word >> 8 & 0xFFU);
-    at[2] = (unsigned char)(word >> 16);
-    numbers[j] = float24_widen(word, bias);
+  uint32_t words[2][TILE];
+  for (size_t v = 0; v < TILE; ++v) {
+    double three[3];
+    uint32_t two[2];
+    float widened[3];
+    for (size_t j = 0; j < 3; ++j) {
+      three[j] = (double)numbers[j * TILE + v] / unit;
+    }
+    fixed_narrow(three, two);
+    fixed_widen(two, widened);
+    for (size_t j = 0; j < 3; ++j) {
+      numbers[j * TILE + v] = (float)((double)widened[j] * unit);
+    }
+    words[0][v] = two[0];
+    words[1][v] = two[1];
   }
+  memcpy(at, words, sizeof words);
 }
 
 /* Largest length of 16 vectors. */
@@ -230,7 +241,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   units *u = calloc(1, sizeof *u);
   free(tiles->bytes);
   supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
-  tiles->bytes = tiles_allocate(count * tiles->stride + 64); /* the kernels' last load */
+  tiles->bytes = tiles_allocate(count * tiles->stride);
   if (was == NULL || is == NULL || u == NULL || tiles->bytes == NULL) {
     goto cleanup;
   }
@@ -248,9 +259,9 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
                         tile + axis * tiles->axis_bytes);
     }
     if (tiles->axes == 1) {
-      pack_numbers(tiles, tiles->direction_bias, is->direction, tile + tiles->direction_begin);
+      pack_numbers(tiles, u->direction, is->direction, tile + tiles->direction_begin);
     }
-    pack_numbers(tiles, tiles->rest_bias, is->rest, tile + tiles->rest_begin);
+    pack_numbers(tiles, u->rest, is->rest, tile + tiles->rest_begin);
     measure(basis, was, is);
   }
   basis->info.storage = storage;

@@ -1,21 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * A basis as the evaluator reads it: tiles of 16 vertices, each one run of memory.
+ * A basis as the evaluator reads it: tiles of 16 vertices, each one run of whole cache lines.
  *
- *     coefficients   K modes of 16 vertices, for each axis (1, or 3 where the kind is vector)
+ *     coefficients   for each axis (1, or 3 where the kind is vector)
  *                      FLOAT32, EXACT   16 floats a mode
  *                      FLOAT16          16 halves a mode
- *                      INT16            16 integers of 16 bits a mode
+ *                      INT16            16 words of 32 bits for two modes, see compact.h
  *     direction      48 numbers x y z x y z ...; none where the kind is vector
  *     rest           48 numbers x y z x y z ...
  *
- * Tile t holds vertices 16 t to 16 t + 15, the last padded with zeros, and begins at a multiple of
- * 32 bytes. Scales of coefficients are folded into the weights, so they cost nothing.
- *
- * The numbers of directions and rest positions are floats (EXACT), or compact floats of 24 bits:
- * sign, 5 bits of exponent, 18 of fraction, the exponent counted from a bias that suits the
- * largest. Within half a metre of the origin they err by at most 0.0005 mm. They widen to float32
- * by shifts alone.
+ * Tile t holds vertices 16 t to 16 t + 15, the last padded with zeros. The numbers of directions
+ * and rest positions are floats (EXACT), or three to two words (compact.h): fixed point, in a unit
+ * that suits the largest. Rest positions within half a metre of the origin err by at most 0.0005
+ * mm. The units of coefficients and directions are folded into the weights, so they cost nothing.
  */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
@@ -23,9 +20,8 @@
 #include <supine/runtime.h>
 
 enum {
-  TILE = 16,             /**< vertices */
-  TILE_NUMBERS = 48,     /**< their coordinates */
-  PREFETCH_BYTES = 8192, /**< how far ahead the kernels ask for memory */
+  TILE = 16,         /**< vertices */
+  TILE_NUMBERS = 48, /**< their coordinates */
 };
 
 typedef struct supine_tiles {
@@ -37,8 +33,7 @@ typedef struct supine_tiles {
   size_t rest_begin;
   size_t stride; /**< bytes from tile to tile */
   size_t count;
-  uint32_t direction_bias; /**< what to add to a compact exponent, in its place in a float */
-  uint32_t rest_bias;
+  uint32_t rest_unit; /**< of compact rest positions: a power of two, to add to a float's bits */
   unsigned char *bytes;
 } supine_tiles;
 
@@ -53,23 +48,31 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
   const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16;
-  const size_t numbers = (size_t)TILE_NUMBERS * (compact ? 3 : 4);
+  const size_t line = 64;
+  const size_t numbers = compact ? 2 * line : TILE_NUMBERS * sizeof(float);
   tiles->storage = storage;
   tiles->modes = modes;
   tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = modes * TILE * (short_words ? 2 : 4);
+  tiles->axis_bytes = line * (short_words ? (modes + 1) / 2 : modes);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
   tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
-  tiles->stride = (tiles->rest_begin + numbers + 31) / 32 * 32;
+  tiles->stride = tiles->rest_begin + numbers;
   tiles->count = count;
 }
+
+/** How to ask for tiles that come from memory ahead of their use. */
+typedef enum supine_prefetch {
+  SUPINE_PREFETCH_NONE, /**< they are in the cache */
+  SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
+  SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, past the caches */
+} supine_prefetch;
 
 /** Where and how a kernel writes. Either one array of triples (x, with y NULL) or three arrays. */
 typedef struct supine_target {
   float *x, *y, *z;
   bool rest;   /**< positions; otherwise displacements alone */
   bool stream; /**< store past the cache */
-  bool ahead;  /**< ask for tiles PREFETCH_BYTES ahead */
+  supine_prefetch prefetch;
   /** [16] or NULL. Where one array is written in several runs, what one run leaves to the next, so
    * that a line that both share is stored once. */
   float *held;
@@ -112,8 +115,7 @@ extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
  * this processor or build has not got it. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
-/** Is it worth while on this processor to ask for tiles that come from memory ahead of their use?
- */
-bool supine_prefetch_pays(void);
+/** What serves this processor best. */
+supine_prefetch supine_prefetch_choose(void);
 
 #endif

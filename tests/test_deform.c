@@ -177,9 +177,9 @@ static void test_storage_error_orders_storages(void **state) {
   assert_true(error[SUPINE_STORAGE_FLOAT32] < error[SUPINE_STORAGE_INT16]);
   assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_FLOAT16]);
   assert_true(bytes[SUPINE_STORAGE_EXACT] == 88);   /* 64 + 12 + 12 */
-  assert_true(bytes[SUPINE_STORAGE_FLOAT32] == 82); /* 64 + 9 + 9 */
-  assert_true(bytes[SUPINE_STORAGE_FLOAT16] == 50); /* 32 + 9 + 9 */
-  assert_true(bytes[SUPINE_STORAGE_INT16] == 50);
+  assert_true(bytes[SUPINE_STORAGE_FLOAT32] == 80); /* 64 + 8 + 8 */
+  assert_true(bytes[SUPINE_STORAGE_FLOAT16] == 48); /* 32 + 8 + 8 */
+  assert_true(bytes[SUPINE_STORAGE_INT16] == 48);
   drop(&o);
 }
 

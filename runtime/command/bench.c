@@ -27,8 +27,8 @@ static const char help[] =
     "                       \"ns_per_vertex\", ...}]}\n"
     "\n"
     "Rows: supine (AoS output by storage, and others named in full), plain_loop (-O3, float32),\n"
-    "copy and triad (the memory's own speed, with stores past the caches), arithmetic (what "
-    "threads\n"
+    "traffic (the same loads and stores without arithmetic: the least that memory allows), copy\n"
+    "and triad (the memory's own speed, with stores past the caches), arithmetic (what threads\n"
     "gain where memory plays no part). triad is the share of the triad's bandwidth that is "
     "reached.\n"
     "A tracked head-worn display allows 15 ms a frame: 15 ns a vertex for a million vertices.\n";

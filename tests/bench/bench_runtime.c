@@ -179,11 +179,13 @@ static void print(const peers *p, size_t from) {
   static const char *const storages[] = {"int16", "float16", "float32", "exact"};
   for (size_t i = 0; i < 4; ++i) {
     const double own = find(p, from, "supine", storages[i], 1);
-    printf("%-8s  sgemv+displace %.2f  plain loop %.2f  plain native %.2f  two threads %.2f "
-           "(arithmetic %.2f)\n",
-           storages[i], sgemv / own, plain / own, native / own,
+    const double traffic = find(p, from, "traffic", storages[i], 1);
+    printf("%-8s  sgemv+displace %.2f (traffic alone %.2f)  plain loop %.2f  plain native %.2f  "
+           "two threads %.2f (arithmetic %.2f, traffic %.2f)\n",
+           storages[i], sgemv / own, sgemv / traffic, plain / own, native / own,
            own / find(p, from, "supine", storages[i], 2),
-           find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2));
+           find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2),
+           traffic / find(p, from, "traffic", storages[i], 2));
   }
   const double solve = find(p, from, "sparse_solve", "", 1);
   if (solve > 0) {

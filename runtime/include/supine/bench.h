@@ -75,8 +75,9 @@ typedef void supine_bench_report(void *context, const supine_bench_row *row);
 typedef size_t supine_bench_peers(void *context, const supine_bench_image *image, float *xyz,
                                   supine_bench_entry *entries, size_t room);
 
-/** Measures "supine" (every storage; separate arrays; a frozen step; a batch of 64), "plain_loop",
- * "copy", "triad" and "arithmetic" (what threads gain where memory plays no part) at each size.
+/** Measures "supine" (every storage; separate arrays; a frozen step; a batch of 64), "traffic"
+ * (the evaluator's loads and stores without its arithmetic), "plain_loop", "copy", "triad" and
+ * "arithmetic" (what threads gain where memory plays no part) at each size.
  * `peers` may be NULL.
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_ARGUMENT  no vertices, or more than 256 threads */
