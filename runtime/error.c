@@ -17,9 +17,10 @@ double supine_basis_error(const supine_basis *basis, const double *weights, cons
   for (size_t i = 0; i < basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(scales[i]));
   }
-  /* Folding and the sum over modes round K + 4 times; the last addition rounds each coordinate. */
+  /* Packing, folding and the sum over modes round K + 8 times; the last addition rounds each
+   * coordinate. */
   const double rounding =
-      ((double)modes + 4) * unit * scale * moved + unit * (basis->rest_size + scale * moved);
+      ((double)modes + 8) * unit * scale * moved + unit * (basis->rest_size + scale * moved);
   return 1.001 * (scale * stored + basis->rest_error + rounding);
 }
 

@@ -7,7 +7,12 @@
 #include "compact.h"
 #include "internal.h"
 
-enum { INT16_TOP = 32767, HUGE_PAGE = 1 << 21, FLOAT_FRACTION_BITS = 23 };
+enum {
+  INT16_TOP = 32767,
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */
+  HUGE_PAGE = 1 << 21,
+  FLOAT_FRACTION_BITS = 23
+};
 
 /* One tile before it is packed: coefficients [axes][K][16], direction and rest [48]. */
 typedef struct source {
@@ -19,12 +24,25 @@ typedef struct source {
 /* What one packed unit stands for. */
 typedef struct units {
   double mode[SUPINE_MODES_MAX];
-  double direction, rest; /* powers of two */
+  double direction;
+  double rest; /* a power of two */
 } units;
 
 /* Numbers so small that products with them would be subnormal, and slow. */
 static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
+}
+
+/* By what a vertex's direction is divided and its coefficients multiplied, so that directions are
+ * of length 1 and coefficients in mm, and one unit suits all vertices; 1 where the storage is
+ * exact. */
+static float direction_length(const supine_basis *basis, size_t i) {
+  if (!supine_tiles_compact(basis->tiles.storage) || basis->direction == NULL) {
+    return 1;
+  }
+  const float *d = basis->direction + 3 * i;
+  const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  return length > 1e-15F && length < 1e15F ? length : 1; /* its square is an ordinary number */
 }
 
 static void source_load(const supine_basis *basis, size_t tile, source *from) {
@@ -35,13 +53,14 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = begin + (v < left ? v : left - 1);
     memcpy(from->rest + 3 * v, basis->vertices + 3 * i, 3 * sizeof *from->rest);
-    if (basis->direction != NULL) {
-      memcpy(from->direction + 3 * v, basis->direction + 3 * i, 3 * sizeof *from->direction);
-    } else {
-      memset(from->direction + 3 * v, 0, 3 * sizeof *from->direction);
+    const float length = direction_length(basis, i);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      from->direction[3 * v + axis] =
+          basis->direction != NULL ? basis->direction[3 * i + axis] / length : 0;
     }
     for (size_t row = 0; row < axes * modes; ++row) {
-      from->coefficients[row * TILE + v] = flush(basis->coefficients[i * axes * modes + row]);
+      from->coefficients[row * TILE + v] =
+          flush(length * basis->coefficients[i * axes * modes + row]);
     }
   }
 }
@@ -58,31 +77,43 @@ static float largest(const float *values, size_t count) {
 /* The largest coefficient of each mode. */
 static void largest_coefficients(const supine_basis *basis, float *top) {
   const size_t modes = basis->info.mode_count;
-  const size_t rows = basis->info.vertex_count * basis->tiles.axes;
+  const size_t rows = basis->tiles.axes;
   for (size_t k = 0; k < modes; ++k) {
     top[k] = 0;
   }
-  for (size_t row = 0; row < rows; ++row) {
-    for (size_t k = 0; k < modes; ++k) {
-      const float size = fabsf(basis->coefficients[row * modes + k]);
-      top[k] = size > top[k] ? size : top[k];
+  for (size_t i = 0; i < basis->info.vertex_count; ++i) {
+    const float length = direction_length(basis, i);
+    for (size_t row = rows * i; row < rows * (i + 1); ++row) {
+      for (size_t k = 0; k < modes; ++k) {
+        const float size = length * fabsf(basis->coefficients[row * modes + k]);
+        top[k] = size > top[k] ? size : top[k];
+      }
     }
   }
 }
 
-/* 2^e such that the largest of the values is about 2^31 of it, within what fixed_scale can do. */
-static double fixed_unit(const float *values, size_t count) {
-  const float top = flush(largest(values, count));
-  const int exponent = top > 0 ? ilogbf(top) - 30 : -130;
+/* The largest component of a direction. */
+static float largest_direction(const supine_basis *basis) {
+  float top = 0;
+  for (size_t i = 0; basis->direction != NULL && i < basis->info.vertex_count; ++i) {
+    top = fmaxf(top, largest(basis->direction + 3 * i, 3) / direction_length(basis, i));
+  }
+  return top;
+}
+
+/* 2^e such that `top` is about 2^31 of it, within what fixed_scale can do. */
+static double fixed_unit(float top) {
+  const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
 
 static void choose_units(supine_basis *basis, units *u) {
   const supine_storage storage = basis->tiles.storage;
   const bool compact = supine_tiles_compact(storage);
-  const size_t numbers = 3 * basis->info.vertex_count;
-  u->rest = compact ? fixed_unit(basis->vertices, numbers) : 1;
-  u->direction = compact && basis->direction != NULL ? fixed_unit(basis->direction, numbers) : 1;
+  u->rest = compact ? fixed_unit(largest(basis->vertices, 3 * basis->info.vertex_count)) : 1;
+  /* Folded into the weights, so it need not be a power of two. */
+  const float top_direction = compact ? flush(largest_direction(basis)) : 0;
+  u->direction = top_direction > 0 ? (double)top_direction / FIXED_TOP : 1;
   basis->tiles.rest_unit = (uint32_t)ilogb(u->rest) << FLOAT_FRACTION_BITS;
   float top[SUPINE_MODES_MAX];
   largest_coefficients(basis, top);
