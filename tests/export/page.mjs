@@ -24,7 +24,7 @@ const browser = await chromium.launch({
 async function open(path, options = {}) {
   const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
   const complaints = [];
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type()) && !message.text().includes('GPU stall')) complaints.push(message.text()); });
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(error.stack));
   const own = pathToFileURL(path).href;
   page.on('request', (request) => { if (request.url() !== own && !request.url().startsWith('data:')) complaints.push(`asked for ${request.url()}`); });
@@ -105,6 +105,8 @@ async function checkPointer(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {
     await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
+    await picture(page);
+    await page.waitForFunction(() => !window.supine.picture.picking);
     await picture(page);
     if (await page.locator('#pointed').isVisible()) {
       const value = parseFloat(await page.locator('#pointed strong').textContent());

@@ -34,6 +34,7 @@ function start() {
   let stale = true;     // vertices are not where the state says
   let unseen = true;    // the picture is not what the state says
   let pointer = null;   // where on the canvas, CSS pixels
+  let asked = true;     // what is there has been asked, for this picture
   let before = null;    // time of the last frame, when frames follow each other
   let streak = 0;       // frames that have followed each other
   let frameTime = NaN;  // ms, smoothed
@@ -70,9 +71,20 @@ function start() {
     };
   }
 
-  function showPointed() {
+  /** Shows what is under the pointer once the graphics card has said it, and asks again where the
+   * picture or the pointer has changed since. */
+  function point() {
+    const found = picture.picked();
+    if (!pointer) showPointed(null);
+    else if (found !== undefined) showPointed(found);
+    if (!asked && pointer && view && !picture.picking) {
+      asked = true;
+      picture.pick(view, (2 * pointer.x) / canvas.clientWidth - 1, 1 - (2 * pointer.y) / canvas.clientHeight);
+    }
+  }
+
+  function showPointed(found) {
     const tip = $('pointed');
-    const found = pointer && picture.pick(view, (2 * pointer.x) / canvas.clientWidth - 1, 1 - (2 * pointer.y) / canvas.clientHeight);
     tip.hidden = $('needle').hidden = !found;
     if (!found) return;
     tip.firstChild.textContent = `${found.value.toFixed(2)} mm`;
@@ -127,6 +139,7 @@ function start() {
 
   function frame(now) {
     requestAnimationFrame(frame);
+    point();
     const seconds = before === null ? 0 : Math.min(0.1, (now - before) / 1000);
     const moving = state.advance(seconds);
     if (moving) stale = unseen = true;
@@ -149,7 +162,7 @@ function start() {
     }
     view = makeView();
     picture.draw(view);
-    showPointed();
+    asked = false;
     showState();
     stale = unseen = false;
     const gpu = Number.isNaN(picture.gpuTime) ? '' : `, drawing ${picture.gpuTime.toFixed(1)} ms`;
@@ -174,10 +187,10 @@ function start() {
   for (const type of ['pointermove', 'pointerdown', 'pointerup']) {
     canvas.addEventListener(type, (event) => {
       pointer = dragging() && event.pointerType === 'mouse' ? null : { x: event.offsetX, y: event.offsetY };
-      look();
+      asked = false;
     });
   }
-  canvas.addEventListener('pointerleave', () => { pointer = null; look(); });
+  canvas.addEventListener('pointerleave', () => { pointer = null; });
   canvas.addEventListener('keydown', (event) => {
     const arrow = ARROWS[event.key];
     if (arrow) orbit(arrow[0] * 0.09, arrow[1] * 0.09);
@@ -268,8 +281,10 @@ function start() {
   showLegend();
   requestAnimationFrame(frame);
 
-  /* For tests and the console: gravity in the patient's axes (x left, y back, z head), mL. */
+  /* For tests, benchmarks and the console: gravity in the patient's axes (x left, y back, z head), mL. */
   return {
+    picture,
+    view: () => view,
     /** Positions as the graphics card computes them: xyz of each vertex, mm LPS. */
     positions: (gravity, volume) => picture.readPositions(momentFor(basis, unit(gravity), volume)),
     /** Weights with the breath scale in them, and the scale. */

@@ -141,6 +141,7 @@ class Picture {
   /** One pixel that holds floats' bits. */
   makePick() {
     const { gl } = this;
+    this.picking = null;
     this.pickPlace = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     const pixel = this.texture(gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 1, 1, null);
@@ -274,7 +275,8 @@ class Picture {
     this.endTiming();
   }
 
-  /** What is at a place of the canvas, from -1 to 1 each way: {value, at} or null. */
+  /** Asks what is at a place of the canvas, from -1 to 1 each way. The answer is `picked` a frame or
+   * two later, so that no frame waits for it. */
   pick(view, x, y) {
     const { gl, canvas } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
@@ -283,9 +285,24 @@ class Picture {
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
     this.drawSurface(this.picker, view, [x, y, canvas.width, canvas.height]);
-    const bits = new Uint32Array(4);
-    gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, bits);
+    this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a used one would be waited for
+    gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    this.picking = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+
+  /** {value, at}, null where nothing was, undefined where no answer has come. */
+  picked() {
+    const { gl } = this;
+    if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;
+    const bits = new Uint32Array(4);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.pickBits);
+    gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, bits);
+    gl.deleteBuffer(this.pickBits);
+    gl.deleteSync(this.picking);
+    this.picking = null;
     const [value, ...at] = new Float32Array(bits.buffer);
     return Number.isNaN(value) ? null : { value, at };
   }

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a frame of the exported page costs, pass by pass, in turns, the fastest of each:
+//
+//     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
+//
+// Needs playwright-core (npm install in tests/export). CHROMIUM's flags choose the graphics: with
+// none, Chromium's software renderer; with a graphics card, --use-angle=gl or --use-angle=vulkan and
+// --enable-gpu, say. "still" draws the surface where it is, as a viewer of a plain mesh of as many
+// triangles would; "turning" is a frame in which the patient turns: weights, positions, normals and
+// that picture. Their ratio says what deforming costs over showing, whatever the graphics.
+import { createRequire } from 'node:module';
+import { resolve } from 'node:path';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+
+const [file, executablePath = '/usr/bin/chromium', ...flags] = process.argv.slice(2);
+if (!file) {
+  console.error('usage: node bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]');
+  process.exit(2);
+}
+const require = createRequire(fileURLToPath(new URL('../export/package.json', import.meta.url)));
+const { chromium } = require('playwright-core');
+const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+const browser = await chromium.launch({
+  executablePath,
+  args: ['--headless', '--no-sandbox', '--no-first-run', '--disable-background-networking', ...(flags.length ? flags : software)],
+});
+const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, reducedMotion: 'reduce' });
+page.setDefaultTimeout(300000);
+await page.goto(pathToFileURL(resolve(file)).href, { timeout: 300000 });
+await page.waitForFunction(() => window.supine?.state.moment && window.supine.view(), null, { timeout: 300000 });
+
+const found = await page.evaluate(() => {
+  const { picture, view, state } = window.supine;
+  const { gl, basis } = picture;
+  const pixel = new Uint8Array(4);
+  const done = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits
+  let tilt = 0;
+  const weights = () => {
+    tilt += 1;
+    state.settle(state.standing.q, tilt % 60, 0);
+    state.compute();
+  };
+  const passes = {
+    weights,
+    positions: () => picture.capturePositions(state.moment, picture.moved),
+    deform: () => picture.deform(state.moment, null),
+    still: () => picture.draw(view()),
+    turning: () => { weights(); picture.deform(state.moment, null); picture.draw(view()); },
+  };
+  const times = Object.fromEntries(Object.keys(passes).map((name) => [name, Infinity]));
+  const end = performance.now() + 30000;
+  for (let round = 0; round < 5 || (round < 30 && performance.now() < end); ++round) {
+    for (const [name, run] of Object.entries(passes)) {
+      done();
+      const begin = performance.now();
+      run();
+      done();
+      times[name] = Math.min(times[name], performance.now() - begin);
+    }
+  }
+  const names = gl.getExtension('WEBGL_debug_renderer_info');
+  return {
+    renderer: gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER),
+    vertices: basis.vertices, triangles: basis.corners.length / 3, modes: basis.modes, times,
+  };
+});
+await browser.close();
+
+console.log(found.renderer);
+console.log(`${found.vertices} vertices, ${found.triangles} triangles, ${found.modes} modes; ms:`);
+for (const [name, time] of Object.entries(found.times)) console.log(`  ${name.padEnd(10)} ${time.toFixed(2)}`);
+console.log(`turning / still: ${(found.times.turning / found.times.still).toFixed(2)}`);
