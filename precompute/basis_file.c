@@ -174,6 +174,9 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
     add_fit(list, content->fit);
   }
   add_accuracy(list, content->accuracy);
+  if (content->turned_over != NULL) {
+    add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
+  }
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
   supine_tensor tensors[11] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},

@@ -16,6 +16,7 @@ typedef struct supine_basis_content {
   const supine_compression *compression;
   const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
+  const double *turned_over;       /* optional, see supine_turned_over */
   const supine_error_table *table; /* optional */
   const char *route;               /* how the field was found */
   bool harmonics;                  /* the modes are the harmonics themselves */

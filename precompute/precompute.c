@@ -40,6 +40,7 @@ typedef struct pipeline {
   supine_volume_forms forms;
   supine_held_out held_out;
   supine_accuracy accuracy;
+  double turned_over;
   supine_error_table table;
 } pipeline;
 
@@ -189,6 +190,15 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
   return status == SUPINE_OK ? measure(p, error) : status;
 }
 
+static supine_status find_turned_over(pipeline *p, supine_error *error) {
+  const supine_status status =
+      p->forms.linear == NULL ? SUPINE_OK
+                              : supine_turned_over(p->lungs, p->directions, &p->compression,
+                                                   &p->forms, p->accuracy.volume, &p->turned_over);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "no memory to look for folds");
+}
+
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
   const supine_basis_content content = {.lungs = p->lungs,
                                         .model = &p->options->model,
@@ -196,6 +206,8 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .compression = &p->compression,
                                         .forms = p->forms.linear != NULL ? &p->forms : NULL,
                                         .accuracy = &p->accuracy,
+                                        .turned_over =
+                                            p->forms.linear != NULL ? &p->turned_over : NULL,
                                         .table = &p->table,
                                         .route = p->linear ? "linear" : "sampled",
                                         .harmonics = p->options->modes == 0,
@@ -212,7 +224,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 supine_error *error) {
   pipeline p = {.lungs = lungs, .options = options};
   supine_status (*const steps[])(pipeline *, supine_error *) = {
-      find_directions, project, compress, find_forms, hold_out, measure, tabulate, drop_modes};
+      find_directions, project,  compress,   find_forms,      hold_out,
+      measure,         tabulate, drop_modes, find_turned_over};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
     status = steps[i](&p, error);
@@ -227,7 +240,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                    .solve_count = p.projection.solve_count,
                                    .iterations = p.projection.iterations,
                                    .residual = p.projection.residual,
-                                   .accuracy = p.accuracy};
+                                   .accuracy = p.accuracy,
+                                   .turned_over = p.turned_over};
   }
   pipeline_free(&p);
   return status;

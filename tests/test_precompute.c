@@ -437,6 +437,92 @@ static void test_precompute_open_surface_has_no_volume(void **state) {
   supine_mesh_free(&lump);
 }
 
+static void normal_of(const float *xyz, const uint32_t *corner, double *normal) {
+  double u[2][3];
+  for (size_t j = 0; j < 2; ++j) {
+    for (size_t i = 0; i < 3; ++i) {
+      u[j][i] = (double)xyz[3 * (size_t)corner[j + 1] + i] - (double)xyz[3 * (size_t)corner[0] + i];
+    }
+  }
+  normal[0] = u[0][1] * u[1][2] - u[0][2] * u[1][1];
+  normal[1] = u[0][2] * u[1][0] - u[0][0] * u[1][2];
+  normal[2] = u[0][0] * u[1][1] - u[0][1] * u[1][0];
+}
+
+/* The file's lungs as the run time deforms them: share of reversed triangles, worst of six. */
+static double turned_over_at_run_time(double volume) {
+  supine_basis *basis = open_basis();
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const float *rest = supine_basis_vertices(basis);
+  const uint32_t *triangles = supine_basis_triangles(basis);
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  double worst = 0.0;
+  for (int g = 0; g < 6; ++g) {
+    double gravity[3] = {0.0, 0.0, 0.0};
+    double weights[SUPINE_MODES_MAX];
+    double scale;
+    gravity[g % 3] = g < 3 ? 1.0 : -1.0;
+    assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+    if (supine_basis_scale(basis, weights, volume, &scale, NULL) != SUPINE_OK) {
+      continue;
+    }
+    const double scales[SUPINE_LUNGS_MAX] = {scale, scale};
+    supine_deform(basis, weights, scales, xyz);
+    size_t turned = 0;
+    for (size_t t = 0; t < info->triangle_count; ++t) {
+      double before[3];
+      double after[3];
+      normal_of(rest, triangles + 3 * t, before);
+      normal_of(xyz, triangles + 3 * t, after);
+      turned += before[0] * after[0] + before[1] * after[1] + before[2] * after[2] < 0.0;
+    }
+    worst = fmax(worst, (double)turned / (double)info->triangle_count);
+  }
+  free(xyz);
+  supine_basis_close(basis);
+  return worst;
+}
+
+static void test_precompute_turned_over_is_what_the_run_time_turns(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(3000);
+  supine_precompute_options options = {
+      .model = supine_model_default(), .band = 7, .modes = 4, .held_out = 20};
+  double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
+  uint64_t seed = 3;
+  for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
+    stiffness[i] = exp(8.0 * helper_random(&seed));
+  }
+  supine_precompute_report report;
+  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  assert_true(report.turned_over < 0.001);
+  assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
+  options.model.stiffness = stiffness; /* torn on purpose */
+  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  assert_true(report.turned_over > 0.01);
+  assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
+  free(stiffness);
+  supine_lungs_free(&lungs);
+}
+
+static void test_precompute_reach_keeps_a_fine_real_surface_whole(void **state) {
+  (void)state;
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip();
+    return;
+  }
+  const supine_precompute_report links = make_basis(&lungs, 7, 4, 0.0, 20);
+  lungs.reach = 10.0;
+  const supine_precompute_report length = make_basis(&lungs, 7, 4, 0.0, 20);
+  printf("turned over at %g mL: %.2f %%; with a reach of 10 mm %.4f %%\n", links.accuracy.volume,
+         100.0 * links.turned_over, 100.0 * length.turned_over);
+  assert_true(links.turned_over > 0.01);
+  assert_true(length.turned_over < 1e-4);
+  supine_lungs_free(&lungs);
+}
+
 static bool stop_halfway(void *context, double fraction) {
   (void)context;
   return fraction < 0.4;
@@ -495,6 +581,8 @@ int main(void) {
       cmocka_unit_test(test_precompute_real_lungs_volumes_exact_in_every_direction),
       cmocka_unit_test(test_precompute_default_law_keeps_four_modes),
       cmocka_unit_test(test_precompute_open_surface_has_no_volume),
+      cmocka_unit_test(test_precompute_turned_over_is_what_the_run_time_turns),
+      cmocka_unit_test(test_precompute_reach_keeps_a_fine_real_surface_whole),
       cmocka_unit_test(test_precompute_interrupted_or_unwritable_leaves_old_file),
       cmocka_unit_test(test_precompute_bad_options_refused),
   };

@@ -60,7 +60,7 @@ const char supine_model_options_help[] =
     "  --reach MM           forces spread over this length along the surface, whatever the mesh\n"
     "                       (about exp(-r/MM)); default: over a few links, as in the paper, so "
     "that\n"
-    "                       a finer mesh spreads less\n";
+    "                       a finer mesh spreads less and may look torn: then try 10\n";
 
 supine_model_options supine_model_options_default(void) {
   return (supine_model_options){.model = supine_model_default()};

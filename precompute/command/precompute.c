@@ -45,6 +45,9 @@ static const char examples[] =
     "  supine precompute left.ply right.ply -o lungs.safetensors\n"
     "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors\n";
 
+/* Share of turned triangles that is worth a word. */
+static const double turned_over_limit = 0.01;
+
 static void report_result(const char *path, const supine_lungs *lungs,
                           const supine_precompute_options *options,
                           const supine_precompute_report *report) {
@@ -59,6 +62,16 @@ static void report_result(const char *path, const supine_lungs *lungs,
   if (accuracy->volume > 0.0) {
     (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %g mL\n",
                  accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, accuracy->volume);
+  }
+  if (report->turned_over > turned_over_limit) {
+    (void)printf(
+        "the surface looks torn: %.3g %% of its triangles turn over at %g mL in the worst of "
+        "six\npostures. %s\n",
+        100.0 * report->turned_over, accuracy->volume,
+        lungs->reach == 0.0
+            ? "The paper's forces spread over a few links, however short they are:\n"
+              "--reach 10 spreads them over 10 mm, and such a surface stays smooth"
+            : "A longer --reach spreads forces further");
   }
 }
 

@@ -81,6 +81,8 @@ static const char *const errors[] = {"error_directions",  "error_rms_percent", "
                                      "error_max_percent", "error_volume_ml",   "error_rms_mm",
                                      "error_p95_mm",      "error_max_mm"};
 
+static const char turned_over[] = "turned_over_percent";
+
 static const char *text_of(const supine_basis *basis, const char *key) {
   const char *value = supine_basis_metadata(basis, key);
   return value != NULL ? value : "?";
@@ -120,6 +122,11 @@ static void print_text(const char *path, const supine_basis *basis, const double
                    volume != NULL ? "at " : "of the fields as given", volume != NULL ? volume : "",
                    volume != NULL ? " mL" : "");
     }
+  }
+  if (supine_basis_metadata(basis, turned_over) != NULL) {
+    (void)printf(
+        "\nTriangles that a breath of %s mL turns over, in the worst of six postures: %s %%\n",
+        text_of(basis, "error_volume_ml"), text_of(basis, turned_over));
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;
@@ -205,6 +212,9 @@ static bool print_json(const char *path, const supine_basis *basis, const supine
     const char *value = supine_basis_metadata(basis, shown[i]);
     good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
   }
+  const char *folds = supine_basis_metadata(basis, turned_over);
+  good =
+      good && (folds == NULL || json_object_set_new(root, turned_over, number_or_text(folds)) == 0);
   for (size_t i = 0; good && i < 2; ++i) {
     static const char *const keys[] = {"error_harmonics", "error_modes"};
     size_t count;

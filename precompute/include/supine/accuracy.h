@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * How far a compressed field is from the full solve, on directions that no grid used. */
+ * How far a compressed field is from the full solve, on directions that no grid used; and how much
+ * of the surface the field turns over. */
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
@@ -47,6 +48,17 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double *directions, const supine_volume_forms *forms,
                                       double volume, supine_accuracy *accuracy,
                                       supine_error *error);
+
+/** Share, 0 to 1, of the triangles whose normal a breath of `volume` mL turns by more than a right
+ * angle: the largest of the six postures with gravity along an axis that reach the volume. Looks at
+ * up to 50,000 triangles, evenly taken. Where it is more than a few in a thousand, the surface
+ * looks torn: neighbours move apart by more than lies between them.
+ * @param directions  [N, 3] d
+ * @param forms       of the compression's coefficients: the surface is closed
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_turned_over(const supine_lungs *lungs, const double *directions,
+                                 const supine_compression *compression,
+                                 const supine_volume_forms *forms, double volume, double *share);
 
 #ifdef __cplusplus
 }
