@@ -91,21 +91,21 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
 }
 
 supine_status supine_turned_over(const supine_lungs *lungs, const double *directions,
-                                 const supine_compression *field, const supine_volume_forms *forms,
-                                 double volume, double *share) {
+                                 const supine_compression *compression,
+                                 const supine_volume_forms *forms, double volume, double *share) {
   const supine_mesh *mesh = &lungs->mesh;
   const size_t threads = supine_thread_count();
   const size_t stride = (mesh->triangle_count + SAMPLES_MAX - 1) / SAMPLES_MAX;
   const size_t samples = (mesh->triangle_count + stride - 1) / stride;
   search *s = calloc(1, sizeof *s);
   size_t(*turned)[POSTURES] = calloc(threads, sizeof *turned);
-  double *harmonics = malloc(supine_sh_count(field->band) * sizeof *harmonics);
+  double *harmonics = malloc(supine_sh_count(compression->band) * sizeof *harmonics);
   supine_status status =
       s == NULL || turned == NULL || harmonics == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
     s->mesh = mesh;
     s->directions = directions;
-    s->field = field;
+    s->field = compression;
     s->turned = turned;
     s->stride = stride;
   }
