@@ -222,7 +222,7 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Chooses the code and packs: AUTO is INT16 where that is accurate enough, else EXACT. */
+/* Chooses the code and packs: AUTO is the smallest storage that is accurate enough. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
   static const double error_limit = 0.005; /* mm */
@@ -239,14 +239,18 @@ static supine_status prepare(const check *c, supine_basis *basis,
                             "this processor or build lacks the instructions asked for");
   }
   basis->info.simd = simd;
+  static const supine_storage candidates[] = {SUPINE_STORAGE_MIXED, SUPINE_STORAGE_INT16,
+                                              SUPINE_STORAGE_EXACT};
   const bool choose = storage == SUPINE_STORAGE_AUTO;
-  supine_status status = supine_basis_pack(basis, choose ? SUPINE_STORAGE_INT16 : storage);
-  if (status == SUPINE_OK) {
-    basis->info.storage_error = supine_basis_storage_error(basis);
-    if (choose && !(basis->info.storage_error <= error_limit)) {
-      status = supine_basis_pack(basis, SUPINE_STORAGE_EXACT);
-      basis->info.storage_error =
-          status == SUPINE_OK ? supine_basis_storage_error(basis) : basis->info.storage_error;
+  const bool mixed = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
+  supine_status status = SUPINE_OK;
+  for (size_t i = choose ? (mixed ? 0 : 1) : 2; i < 3 && status == SUPINE_OK; ++i) {
+    status = supine_basis_pack(basis, choose ? candidates[i] : storage);
+    if (status == SUPINE_OK) {
+      basis->info.storage_error = supine_basis_storage_error(basis);
+    }
+    if (basis->info.storage_error <= error_limit) {
+      break;
     }
   }
   if (status != SUPINE_OK) {

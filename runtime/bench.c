@@ -18,8 +18,8 @@
 enum { ENTRIES_MAX = 64, BATCH = 64, HUGE_PAGE = 1 << 21, ARITHMETIC = 2000000, ENOUGH = 2000000 };
 
 const char *supine_bench_storage_name(supine_storage storage) {
-  static const char *const names[SUPINE_STORAGE_COUNT] = {"auto", "exact", "float32", "float16",
-                                                          "int16"};
+  static const char *const names[SUPINE_STORAGE_COUNT] = {"auto",    "exact", "float32",
+                                                          "float16", "int16", "mixed"};
   return storage < SUPINE_STORAGE_COUNT ? names[storage] : "";
 }
 

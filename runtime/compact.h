@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Numbers in fewer bits: halves; two numbers in a word of 32 bits; three in two words. Plain C, one
- * at a time.
+ * Numbers in fewer bits: halves; two or three numbers in a word of 32 bits; three in two words.
+ * Plain C, one at a time.
  *
  * A number that shares a word stands in its upper bits and is read as the whole word, a signed
  * integer, so that reading costs one conversion: what stands below is noise that is known when the
@@ -49,13 +49,12 @@ static inline int32_t word_integer(uint32_t word) {
   return value;
 }
 
-/** The word nearest to `value` with the given lowest `bits`, which are all that is set in `low`;
- * the nearest of the least and the greatest such where |value| is beyond 2^31. */
+/** The word nearest to `value` with the given lowest `bits`, which are all that is set in `low`. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = rint((value - (double)low) / step);
-  const double held = above > top ? top : above < -top ? -top : above;
+  const double held = above > top ? top : above < -top - 1 ? -top - 1 : above;
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
@@ -70,6 +69,27 @@ static inline float pair_first(uint32_t word) {
 }
 
 static inline float pair_second(uint32_t word) {
+  return (float)word_integer(word);
+}
+/** @} */
+
+/** Three numbers in a word, likewise: 10, 11 and 11 bits from the lowest. */
+static inline uint32_t triple_narrow(double first, double second, double third) {
+  const uint32_t one = word_nearest(first, 0, 22) >> 22;
+  const uint32_t two = word_nearest(second, one << 11, 21) >> 11;
+  return word_nearest(third, two, 21);
+}
+
+/** @{ The numbers of a triple. */
+static inline float triple_first(uint32_t word) {
+  return (float)word_integer(word << 22);
+}
+
+static inline float triple_second(uint32_t word) {
+  return (float)word_integer(word << 11);
+}
+
+static inline float triple_third(uint32_t word) {
   return (float)word_integer(word);
 }
 /** @} */

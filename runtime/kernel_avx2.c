@@ -11,7 +11,8 @@
 INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
                           supine_storage storage) {
   const size_t k = 2 * pair + second;
-  if (storage == SUPINE_STORAGE_INT16) { /* compact.h: pair_first, pair_second */
+  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+    /* compact.h: pair_first, pair_second */
     const __m256i words = _mm256_load_si256((const __m256i *)(at + 64 * pair + 32 * half));
     return _mm256_cvtepi32_ps(second ? words : _mm256_slli_epi32(words, 16));
   }
@@ -19,6 +20,14 @@ INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, siz
     return _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)));
   }
   return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+}
+
+/* The coefficient of one of the three last modes whose words are `at` (compact.h). */
+INLINE __m256 third_coefficient(const unsigned char *at, size_t which, size_t half) {
+  const __m256i words = _mm256_load_si256((const __m256i *)(at + 32 * half));
+  return _mm256_cvtepi32_ps(which == 0   ? words
+                            : which == 1 ? _mm256_slli_epi32(words, 11)
+                                         : _mm256_slli_epi32(words, 22));
 }
 
 typedef struct halves {
@@ -35,18 +44,37 @@ INLINE halves add_mode(halves sum, const unsigned char *at, const float *w, size
   return sum;
 }
 
+/* Three of the last modes. */
+INLINE halves add_thirds(halves sum, const unsigned char *words, const float *w) {
+  for (size_t which = 0; which < 3; ++which) {
+    const __m256 weight = _mm256_broadcast_ss(w + which);
+    for (size_t half = 0; half < 2; ++half) {
+      sum.v[half] = _mm256_fmadd_ps(weight, third_coefficient(words, which, half), sum.v[half]);
+    }
+  }
+  return sum;
+}
+
 /* sum over k of w_k c_k: K multiplications, K - 1 additions. */
 INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
   const __m256 first = _mm256_broadcast_ss(w);
   halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, false, 0, storage)),
                  _mm256_mul_ps(first, coefficient(at, 0, false, 1, storage))}};
-  for (size_t pair = 0; pair < modes / 2; ++pair) {
+  const size_t thirds = supine_tiles_thirds(storage, modes);
+  const size_t paired = modes - 3 * thirds;
+  for (size_t pair = 0; pair < paired / 2; ++pair) {
     if (pair > 0) {
       sum = add_mode(sum, at, w, pair, false, storage);
     }
     sum = add_mode(sum, at, w, pair, true, storage);
   }
-  return modes > 1 && modes % 2 != 0 ? add_mode(sum, at, w, modes / 2, false, storage) : sum;
+  if (paired > 1 && paired % 2 != 0) {
+    sum = add_mode(sum, at, w, paired / 2, false, storage);
+  }
+  for (size_t t = 0; t < thirds; ++t) {
+    sum = add_thirds(sum, at + 64 * ((paired + 1) / 2 + t), w + paired + 3 * t);
+  }
+  return sum;
 }
 
 /* 48 numbers in order. */
@@ -225,6 +253,9 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   case SUPINE_STORAGE_FLOAT16:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
     break;
+  case SUPINE_STORAGE_MIXED:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
+    break;
   default:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
     break;
@@ -233,9 +264,15 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
-  for (size_t k = 0; k < modes; ++k) {
+  const size_t paired = modes - 3 * supine_tiles_thirds(storage, modes);
+  for (size_t k = 0; k < paired; ++k) {
     _mm256_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, 0, storage));
     _mm256_store_ps(c + 16 * k + 8, coefficient(at, k / 2, k % 2 != 0, 1, storage));
+  }
+  for (size_t k = paired; k < modes; ++k) {
+    const unsigned char *words = at + 64 * ((paired + 1) / 2 + (k - paired) / 3);
+    _mm256_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3, 0));
+    _mm256_store_ps(c + 16 * k + 8, third_coefficient(words, (k - paired) % 3, 1));
   }
 }
 
@@ -252,6 +289,9 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
       switch (tiles->storage) {
       case SUPINE_STORAGE_INT16:
         widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_MIXED:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
         break;
       case SUPINE_STORAGE_FLOAT16:
         widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);

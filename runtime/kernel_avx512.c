@@ -29,7 +29,8 @@ INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
 INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
                           supine_storage storage) {
   const size_t k = 2 * pair + second;
-  if (storage == SUPINE_STORAGE_INT16) { /* compact.h: pair_first, pair_second */
+  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+    /* compact.h: pair_first, pair_second */
     const __m512i words = _mm512_load_si512(at + 64 * pair);
     return _mm512_cvtepi32_ps(second ? words : _mm512_slli_epi32(words, 16));
   }
@@ -37,6 +38,14 @@ INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
     return _mm512_cvtph_ps(_mm256_load_si256((const __m256i *)(at + 32 * k)));
   }
   return _mm512_load_ps(at + 64 * k);
+}
+
+/* The coefficient of one of the three last modes whose words are `at` (compact.h). */
+INLINE __m512 third_coefficient(const unsigned char *at, size_t which) {
+  const __m512i words = _mm512_load_si512(at);
+  return _mm512_cvtepi32_ps(which == 0   ? words
+                            : which == 1 ? _mm512_slli_epi32(words, 11)
+                                         : _mm512_slli_epi32(words, 22));
 }
 
 /* sum over k of w_k c_k, in two chains: K multiplications, K - 1 additions. */
@@ -47,15 +56,24 @@ INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, boo
     return even;
   }
   __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 0, true, storage));
-  UNROLL for (size_t pair = 1; pair < modes / 2; ++pair) {
+  const size_t thirds = supine_tiles_thirds(storage, modes);
+  const size_t halves = modes - 3 * thirds;
+  UNROLL for (size_t pair = 1; pair < halves / 2; ++pair) {
     even =
         _mm512_fmadd_ps(weight(w, 2 * pair, common), coefficient(at, pair, false, storage), even);
     odd =
         _mm512_fmadd_ps(weight(w, 2 * pair + 1, common), coefficient(at, pair, true, storage), odd);
   }
-  if (modes % 2 != 0) {
-    even = _mm512_fmadd_ps(weight(w, modes - 1, common), coefficient(at, modes / 2, false, storage),
-                           even);
+  if (halves % 2 != 0) {
+    even = _mm512_fmadd_ps(weight(w, halves - 1, common),
+                           coefficient(at, halves / 2, false, storage), even);
+  }
+  UNROLL for (size_t t = 0; t < thirds; ++t) {
+    const unsigned char *words = at + 64 * ((halves + 1) / 2 + t);
+    const size_t k = halves + 3 * t;
+    odd = _mm512_fmadd_ps(weight(w, k, common), third_coefficient(words, 0), odd);
+    even = _mm512_fmadd_ps(weight(w, k + 1, common), third_coefficient(words, 1), even);
+    odd = _mm512_fmadd_ps(weight(w, k + 2, common), third_coefficient(words, 2), odd);
   }
   return _mm512_add_ps(even, odd);
 }
@@ -297,6 +315,9 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   case SUPINE_STORAGE_FLOAT16:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
     break;
+  case SUPINE_STORAGE_MIXED:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
+    break;
   default:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
     break;
@@ -305,8 +326,13 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
-  for (size_t k = 0; k < modes; ++k) {
+  const size_t halves = modes - 3 * supine_tiles_thirds(storage, modes);
+  for (size_t k = 0; k < halves; ++k) {
     _mm512_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, storage));
+  }
+  for (size_t k = halves; k < modes; ++k) {
+    const unsigned char *words = at + 64 * ((halves + 1) / 2 + (k - halves) / 3);
+    _mm512_store_ps(c + 16 * k, third_coefficient(words, (k - halves) % 3));
   }
 }
 
@@ -321,6 +347,9 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
       switch (tiles->storage) {
       case SUPINE_STORAGE_INT16:
         widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_MIXED:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
         break;
       case SUPINE_STORAGE_FLOAT16:
         widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);

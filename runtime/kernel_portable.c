@@ -3,10 +3,25 @@
 #include "compact.h"
 #include "tiles.h"
 
+/* One of the last modes, three to a word: number `at` of its word. */
+static inline void widen_third(const uint32_t *words, size_t at, float *restrict c) {
+  for (size_t v = 0; v < TILE; ++v) {
+    c[v] = at == 0   ? triple_third(words[v])
+           : at == 1 ? triple_second(words[v])
+                     : triple_first(words[v]);
+  }
+}
+
 /* 16 coefficients of mode k as floats, in the units they are packed in. */
-static inline void widen_mode(supine_storage storage, const unsigned char *at, size_t k,
+static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at, size_t k,
                               float *restrict c) {
-  if (storage == SUPINE_STORAGE_INT16) {
+  const supine_storage storage = tiles->storage;
+  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(storage, tiles->modes);
+  if (storage == SUPINE_STORAGE_MIXED && k >= halves) {
+    uint32_t words[TILE];
+    memcpy(words, at + ((halves + 1) / 2 + (k - halves) / 3) * sizeof words, sizeof words);
+    widen_third(words, (k - halves) % 3, c);
+  } else if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
     uint32_t words[TILE];
     memcpy(words, at + k / 2 * sizeof words, sizeof words);
     for (size_t v = 0; v < TILE; ++v) {
@@ -28,7 +43,7 @@ static void dot(const supine_tiles *tiles, const unsigned char *at, const float 
   float total[TILE] = {0};
   for (size_t k = 0; k < tiles->modes; ++k) {
     float c[TILE];
-    widen_mode(tiles->storage, at, k, c);
+    widen_mode(tiles, at, k, c);
     for (size_t v = 0; v < TILE; ++v) {
       total[v] += w[k] * c[v];
     }
@@ -113,7 +128,7 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
       float *c = (float *)(void *)(wide + axis * to->axis_bytes);
       for (size_t k = 0; k < tiles->modes; ++k) {
-        widen_mode(tiles->storage, tile + axis * tiles->axis_bytes, k, c + k * TILE);
+        widen_mode(tiles, tile + axis * tiles->axis_bytes, k, c + k * TILE);
       }
     }
     if (tiles->axes == 1) {

@@ -8,7 +8,6 @@
 #include "internal.h"
 
 enum {
-  INT16_TOP = 32767,
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */
   HUGE_PAGE = 1 << 21,
   FLOAT_FRACTION_BITS = 23
@@ -107,6 +106,15 @@ static double fixed_unit(float top) {
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
 
+/* Bits of a coefficient of mode k that shares a word (compact.h); 0 where it shares none. */
+static int word_bits(const supine_tiles *tiles, size_t k) {
+  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(tiles->storage, tiles->modes);
+  if (tiles->storage != SUPINE_STORAGE_INT16 && tiles->storage != SUPINE_STORAGE_MIXED) {
+    return 0;
+  }
+  return k < halves ? 16 : (k - halves) % 3 == 2 ? 10 : 11;
+}
+
 static void choose_units(supine_basis *basis, units *u) {
   const supine_storage storage = basis->tiles.storage;
   const bool compact = supine_tiles_compact(storage);
@@ -118,9 +126,10 @@ static void choose_units(supine_basis *basis, units *u) {
   float top[SUPINE_MODES_MAX];
   largest_coefficients(basis, top);
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    const int bits = word_bits(&basis->tiles, k);
     u->mode[k] = 1;
-    if (flush(top[k]) > 0 && storage == SUPINE_STORAGE_INT16) {
-      u->mode[k] = (double)top[k] / INT16_TOP * 0x1p-16; /* compact.h: the upper half of a word */
+    if (flush(top[k]) > 0 && bits > 0) { /* the largest fills the upper bits of a word */
+      u->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
     } else if (flush(top[k]) > 0 && storage == SUPINE_STORAGE_FLOAT16) {
       u->mode[k] = ldexp(1, ilogbf(top[k]) - 14); /* the largest below 2^15 */
     }
@@ -128,35 +137,75 @@ static void choose_units(supine_basis *basis, units *u) {
   }
 }
 
+/* Packs two rows of 16 coefficients, the second of which may be missing; leaves in them what they
+ * now stand for. */
+static void pack_pair(const double *unit, float *first, float *second, unsigned char *at) {
+  uint32_t words[TILE];
+  for (size_t v = 0; v < TILE; ++v) {
+    words[v] =
+        pair_narrow((double)first[v] / unit[0], second != NULL ? (double)second[v] / unit[1] : 0);
+    first[v] = (float)((double)pair_first(words[v]) * unit[0]);
+    if (second != NULL) {
+      second[v] = (float)((double)pair_second(words[v]) * unit[1]);
+    }
+  }
+  memcpy(at, words, sizeof words);
+}
+
+/* The same for three rows: the first has the uppermost bits, as its numbers tend to be largest. */
+static void pack_triple(const double *unit, float *rows, unsigned char *at) {
+  uint32_t words[TILE];
+  for (size_t v = 0; v < TILE; ++v) {
+    float *first = rows + v;
+    float *second = rows + TILE + v;
+    float *third = rows + (size_t)2 * TILE + v;
+    words[v] = triple_narrow((double)*third / unit[2], (double)*second / unit[1],
+                             (double)*first / unit[0]);
+    *first = (float)((double)triple_third(words[v]) * unit[0]);
+    *second = (float)((double)triple_second(words[v]) * unit[1]);
+    *third = (float)((double)triple_first(words[v]) * unit[2]);
+  }
+  memcpy(at, words, sizeof words);
+}
+
+static void pack_words(const supine_tiles *tiles, const units *u, float *rows, unsigned char *at) {
+  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(tiles->storage, tiles->modes);
+  const size_t line = TILE * sizeof(uint32_t);
+  for (size_t k = 0; k < halves; k += 2, at += line) {
+    float *row = rows + k * TILE;
+    pack_pair(u->mode + k, row, k + 1 < halves ? row + TILE : NULL, at);
+  }
+  for (size_t k = halves; k < tiles->modes; k += 3, at += line) {
+    pack_triple(u->mode + k, rows + k * TILE, at);
+  }
+}
+
+static void pack_halves(const supine_tiles *tiles, const units *u, float *rows, unsigned char *at) {
+  for (size_t k = 0; k < tiles->modes; ++k) {
+    float *row = rows + k * TILE;
+    uint16_t half[TILE];
+    for (size_t v = 0; v < TILE; ++v) {
+      half[v] = half_narrow((float)((double)row[v] / u->mode[k]));
+      row[v] = (float)((double)half_widen(half[v]) * u->mode[k]);
+    }
+    memcpy(at + k * sizeof half, half, sizeof half);
+  }
+}
+
 /* Packs rows of 16 coefficients of one axis; leaves in `rows` what they now stand for. */
 static void pack_coefficients(const supine_tiles *tiles, const units *u, float *rows,
                               unsigned char *at) {
-  for (size_t k = 0; k < tiles->modes; ++k) {
-    float *row = rows + k * TILE;
-    const double unit = u->mode[k];
-    if (tiles->storage == SUPINE_STORAGE_FLOAT16) {
-      uint16_t half[TILE];
-      for (size_t v = 0; v < TILE; ++v) {
-        half[v] = half_narrow((float)((double)row[v] / unit));
-        row[v] = (float)((double)half_widen(half[v]) * unit);
-      }
-      memcpy(at + k * sizeof half, half, sizeof half);
-    } else if (tiles->storage == SUPINE_STORAGE_INT16 && k % 2 == 0) {
-      float *next = k + 1 < tiles->modes ? row + TILE : NULL;
-      const double next_unit = next != NULL ? u->mode[k + 1] : 1;
-      uint32_t words[TILE];
-      for (size_t v = 0; v < TILE; ++v) {
-        words[v] =
-            pair_narrow((double)row[v] / unit, next != NULL ? (double)next[v] / next_unit : 0);
-        row[v] = (float)((double)pair_first(words[v]) * unit);
-        if (next != NULL) {
-          next[v] = (float)((double)pair_second(words[v]) * next_unit);
-        }
-      }
-      memcpy(at + k / 2 * sizeof words, words, sizeof words);
-    } else if (tiles->storage != SUPINE_STORAGE_INT16) {
-      memcpy(at + k * TILE * sizeof *row, row, TILE * sizeof *row);
-    }
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_INT16:
+  case SUPINE_STORAGE_MIXED:
+    pack_words(tiles, u, rows, at);
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    pack_halves(tiles, u, rows, at);
+    break;
+  default:
+    memcpy(at, rows, tiles->modes * TILE * sizeof *rows);
+    break;
   }
 }
 

@@ -6,6 +6,7 @@
  *                      FLOAT32, EXACT   16 floats a mode
  *                      FLOAT16          16 halves a mode
  *                      INT16            16 words of 32 bits for two modes, see compact.h
+ *                      MIXED            the same, but 16 words for three of the last modes
  *     direction      48 numbers x y z x y z ...; none where the kind is vector
  *     rest           48 numbers x y z x y z ...
  *
@@ -42,18 +43,26 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
+/** How many words of a vertex hold three of the last coefficients each. */
+static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
+  return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
+}
+
 /** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. Inline, so that a
  * kernel's constants fold. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
-  const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16;
+  const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16 ||
+                           storage == SUPINE_STORAGE_MIXED;
+  const size_t thirds = supine_tiles_thirds(storage, modes);
+  const size_t halves = modes - 3 * thirds;
   const size_t line = 64;
   const size_t numbers = compact ? 2 * line : TILE_NUMBERS * sizeof(float);
   tiles->storage = storage;
   tiles->modes = modes;
   tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = line * (short_words ? (modes + 1) / 2 : modes);
+  tiles->axis_bytes = line * (short_words ? (halves + 1) / 2 + thirds : modes);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
   tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
   tiles->stride = tiles->rest_begin + numbers;

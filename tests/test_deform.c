@@ -180,6 +180,23 @@ static void test_storage_error_orders_storages(void **state) {
   assert_true(bytes[SUPINE_STORAGE_FLOAT32] == 80); /* 64 + 8 + 8 */
   assert_true(bytes[SUPINE_STORAGE_FLOAT16] == 48); /* 32 + 8 + 8 */
   assert_true(bytes[SUPINE_STORAGE_INT16] == 48);
+  assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_MIXED]);
+  assert_true(bytes[SUPINE_STORAGE_MIXED] == 44); /* 10 / 2 + 6 / 3 words of 4; 8 + 8 */
+  drop(&o);
+}
+
+/* Where the last modes carry little, as they do in lungs. */
+static void test_storage_auto_mixed_where_it_suffices(void **state) {
+  (void)state;
+  fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
+  for (size_t i = 0; i < (size_t)500 * 16; ++i) {
+    f->coefficient[i] *= i % 16 < 10 ? 1 : 0.02F;
+  }
+  opened o = made(f);
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_MIXED);
+  assert_true(supine_basis_get_info(basis)->storage_error <= 0.005);
+  supine_basis_close(basis);
   drop(&o);
 }
 
@@ -443,6 +460,7 @@ int main(void) {
       cmocka_unit_test(test_deform_every_mode_count_within_stated_error),
       cmocka_unit_test(test_basis_error_bound_near_what_happens),
       cmocka_unit_test(test_storage_error_orders_storages),
+      cmocka_unit_test(test_storage_auto_mixed_where_it_suffices),
       cmocka_unit_test(test_storage_auto_exact_where_int16_errs),
       cmocka_unit_test(test_open_bad_options_refused),
       cmocka_unit_test(test_deform_range_any_part_same_bits),

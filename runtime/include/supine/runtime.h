@@ -30,11 +30,13 @@ typedef struct supine_basis supine_basis;
 
 /** How an open basis keeps its numbers in memory. The file always has float32. */
 typedef enum supine_storage {
-  SUPINE_STORAGE_AUTO = 0, /**< INT16 where its error is at most 0.005 mm, else EXACT */
+  SUPINE_STORAGE_AUTO = 0, /**< the smallest of MIXED, INT16 and EXACT that errs by 0.005 mm at most
+                                (see storage_error) */
   SUPINE_STORAGE_EXACT,    /**< everything as in the file */
   SUPINE_STORAGE_FLOAT32,  /**< float32 coefficients; compact directions and rest positions */
   SUPINE_STORAGE_FLOAT16,  /**< IEEE half-precision coefficients, scaled; the rest as above */
   SUPINE_STORAGE_INT16,    /**< 16-bit coefficients, a scale for each mode; the rest as above */
+  SUPINE_STORAGE_MIXED,    /**< INT16, but the last three in eight modes at 10 or 11 bits */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
