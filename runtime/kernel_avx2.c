@@ -201,26 +201,11 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
   }
 }
 
-/* A tile of this size, ahead of the one at hand. */
-INLINE void prefetch(const unsigned char *tile, size_t stride, supine_prefetch how) {
-  const char *near = (const char *)tile + 640;
-  const char *far = (const char *)tile + 8192;
-  if (how == SUPINE_PREFETCH_NEAR) {
-    for (size_t line = 0; line < stride; line += 128) {
-      _mm_prefetch(near + line, _MM_HINT_T1);
-    }
-  } else if (how == SUPINE_PREFETCH_FAR) {
-    for (size_t line = 0; line < stride; line += 64) {
-      _mm_prefetch(far + line, _MM_HINT_NTA);
-    }
-  }
-}
-
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                        const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    prefetch(tile, tiles->stride, target->prefetch);
+    supine_prefetch_tile(tile, tiles->stride, target->prefetch);
     const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
     if (target->y != NULL) {
       put_separate(&xyz, target, t * TILE);

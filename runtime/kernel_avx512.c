@@ -224,21 +224,6 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
   return result;
 }
 
-/* A tile of this size, ahead of the one at hand. */
-INLINE void prefetch(const unsigned char *tile, size_t stride, supine_prefetch how) {
-  const char *near = (const char *)tile + 640;
-  const char *far = (const char *)tile + 8192;
-  if (how == SUPINE_PREFETCH_NEAR) {
-    for (size_t line = 0; line < stride; line += 128) {
-      _mm_prefetch(near + line, _MM_HINT_T1);
-    }
-  } else if (how == SUPINE_PREFETCH_FAR) {
-    for (size_t line = 0; line < stride; line += 64) {
-      _mm_prefetch(far + line, _MM_HINT_NTA);
-    }
-  }
-}
-
 /* What a caller's constants make of one loop. */
 typedef struct form {
   supine_storage storage;
@@ -263,7 +248,7 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
     }
   }
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
-    prefetch(tile, tiles->stride, target->prefetch);
+    supine_prefetch_tile(tile, tiles->stride, target->prefetch);
     triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
     if (f.joined) {
       writer_put(&out[0], xyz.v[0]);
