@@ -239,19 +239,22 @@ static supine_status prepare(const check *c, supine_basis *basis,
                             "this processor or build lacks the instructions asked for");
   }
   basis->info.simd = simd;
-  static const supine_storage candidates[] = {SUPINE_STORAGE_MIXED, SUPINE_STORAGE_INT16,
-                                              SUPINE_STORAGE_EXACT};
   const bool choose = storage == SUPINE_STORAGE_AUTO;
-  const bool mixed = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
+  if (choose) { /* the smallest first */
+    const bool thirds = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
+    storage = thirds ? SUPINE_STORAGE_MIXED : SUPINE_STORAGE_INT16;
+  }
   supine_status status = SUPINE_OK;
-  for (size_t i = choose ? (mixed ? 0 : 1) : 2; i < 3 && status == SUPINE_OK; ++i) {
-    status = supine_basis_pack(basis, choose ? candidates[i] : storage);
-    if (status == SUPINE_OK) {
-      basis->info.storage_error = supine_basis_storage_error(basis);
-    }
-    if (basis->info.storage_error <= error_limit) {
+  for (;;) {
+    status = supine_basis_pack(basis, storage);
+    if (status != SUPINE_OK) {
       break;
     }
+    basis->info.storage_error = supine_basis_storage_error(basis);
+    if (!choose || storage == SUPINE_STORAGE_EXACT || basis->info.storage_error <= error_limit) {
+      break;
+    }
+    storage = storage == SUPINE_STORAGE_MIXED ? SUPINE_STORAGE_INT16 : SUPINE_STORAGE_EXACT;
   }
   if (status != SUPINE_OK) {
     return supine_error_set(c->error, status, "%s: out of memory", c->name);

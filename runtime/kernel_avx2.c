@@ -61,7 +61,7 @@ INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_
   halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, false, 0, storage)),
                  _mm256_mul_ps(first, coefficient(at, 0, false, 1, storage))}};
   const size_t thirds = supine_tiles_thirds(storage, modes);
-  const size_t paired = modes - 3 * thirds;
+  const size_t paired = supine_tiles_paired(storage, modes);
   for (size_t pair = 0; pair < paired / 2; ++pair) {
     if (pair > 0) {
       sum = add_mode(sum, at, w, pair, false, storage);
@@ -249,7 +249,7 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
-  const size_t paired = modes - 3 * supine_tiles_thirds(storage, modes);
+  const size_t paired = supine_tiles_paired(storage, modes);
   for (size_t k = 0; k < paired; ++k) {
     _mm256_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, 0, storage));
     _mm256_store_ps(c + 16 * k + 8, coefficient(at, k / 2, k % 2 != 0, 1, storage));

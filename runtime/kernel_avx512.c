@@ -57,20 +57,20 @@ INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, boo
   }
   __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 0, true, storage));
   const size_t thirds = supine_tiles_thirds(storage, modes);
-  const size_t halves = modes - 3 * thirds;
-  UNROLL for (size_t pair = 1; pair < halves / 2; ++pair) {
+  const size_t paired = supine_tiles_paired(storage, modes);
+  UNROLL for (size_t pair = 1; pair < paired / 2; ++pair) {
     even =
         _mm512_fmadd_ps(weight(w, 2 * pair, common), coefficient(at, pair, false, storage), even);
     odd =
         _mm512_fmadd_ps(weight(w, 2 * pair + 1, common), coefficient(at, pair, true, storage), odd);
   }
-  if (halves % 2 != 0) {
-    even = _mm512_fmadd_ps(weight(w, halves - 1, common),
-                           coefficient(at, halves / 2, false, storage), even);
+  if (paired % 2 != 0) {
+    even = _mm512_fmadd_ps(weight(w, paired - 1, common),
+                           coefficient(at, paired / 2, false, storage), even);
   }
   UNROLL for (size_t t = 0; t < thirds; ++t) {
-    const unsigned char *words = at + 64 * ((halves + 1) / 2 + t);
-    const size_t k = halves + 3 * t;
+    const unsigned char *words = at + 64 * ((paired + 1) / 2 + t);
+    const size_t k = paired + 3 * t;
     odd = _mm512_fmadd_ps(weight(w, k, common), third_coefficient(words, 0), odd);
     even = _mm512_fmadd_ps(weight(w, k + 1, common), third_coefficient(words, 1), even);
     odd = _mm512_fmadd_ps(weight(w, k + 2, common), third_coefficient(words, 2), odd);
@@ -311,13 +311,13 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
 
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
-  const size_t halves = modes - 3 * supine_tiles_thirds(storage, modes);
-  for (size_t k = 0; k < halves; ++k) {
+  const size_t paired = supine_tiles_paired(storage, modes);
+  for (size_t k = 0; k < paired; ++k) {
     _mm512_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, storage));
   }
-  for (size_t k = halves; k < modes; ++k) {
-    const unsigned char *words = at + 64 * ((halves + 1) / 2 + (k - halves) / 3);
-    _mm512_store_ps(c + 16 * k, third_coefficient(words, (k - halves) % 3));
+  for (size_t k = paired; k < modes; ++k) {
+    const unsigned char *words = at + 64 * ((paired + 1) / 2 + (k - paired) / 3);
+    _mm512_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3));
   }
 }
 

@@ -16,11 +16,11 @@ static inline void widen_third(const uint32_t *words, size_t at, float *restrict
 static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at, size_t k,
                               float *restrict c) {
   const supine_storage storage = tiles->storage;
-  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(storage, tiles->modes);
-  if (storage == SUPINE_STORAGE_MIXED && k >= halves) {
+  const size_t paired = supine_tiles_paired(storage, tiles->modes);
+  if (storage == SUPINE_STORAGE_MIXED && k >= paired) {
     uint32_t words[TILE];
-    memcpy(words, at + ((halves + 1) / 2 + (k - halves) / 3) * sizeof words, sizeof words);
-    widen_third(words, (k - halves) % 3, c);
+    memcpy(words, at + ((paired + 1) / 2 + (k - paired) / 3) * sizeof words, sizeof words);
+    widen_third(words, (k - paired) % 3, c);
   } else if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
     uint32_t words[TILE];
     memcpy(words, at + k / 2 * sizeof words, sizeof words);

@@ -108,11 +108,11 @@ static double fixed_unit(float top) {
 
 /* Bits of a coefficient of mode k that shares a word (compact.h); 0 where it shares none. */
 static int word_bits(const supine_tiles *tiles, size_t k) {
-  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(tiles->storage, tiles->modes);
+  const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   if (tiles->storage != SUPINE_STORAGE_INT16 && tiles->storage != SUPINE_STORAGE_MIXED) {
     return 0;
   }
-  return k < halves ? 16 : (k - halves) % 3 == 2 ? 10 : 11;
+  return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
 static void choose_units(supine_basis *basis, units *u) {
@@ -169,13 +169,13 @@ static void pack_triple(const double *unit, float *rows, unsigned char *at) {
 }
 
 static void pack_words(const supine_tiles *tiles, const units *u, float *rows, unsigned char *at) {
-  const size_t halves = tiles->modes - 3 * supine_tiles_thirds(tiles->storage, tiles->modes);
+  const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   const size_t line = TILE * sizeof(uint32_t);
-  for (size_t k = 0; k < halves; k += 2, at += line) {
+  for (size_t k = 0; k < paired; k += 2, at += line) {
     float *row = rows + k * TILE;
-    pack_pair(u->mode + k, row, k + 1 < halves ? row + TILE : NULL, at);
+    pack_pair(u->mode + k, row, k + 1 < paired ? row + TILE : NULL, at);
   }
-  for (size_t k = halves; k < tiles->modes; k += 3, at += line) {
+  for (size_t k = paired; k < tiles->modes; k += 3, at += line) {
     pack_triple(u->mode + k, rows + k * TILE, at);
   }
 }

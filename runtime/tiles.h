@@ -10,11 +10,11 @@
  *     direction      48 numbers x y z x y z ...; none where the kind is vector
  *     rest           48 numbers x y z x y z ...
  *
- * Tile t holds vertices 16 t to 16 t + 15, the last padded with zeros. The numbers of directions
- * and rest positions are floats (EXACT), or three to two words (compact.h): fixed point, in a unit
- * that suits the largest. Rest positions within half a metre of the origin err by at most 0.0005
- * mm. The units of coefficients and directions are folded into the weights, so they cost nothing.
- */
+ * Tile t holds vertices 16 t to 16 t + 15, the last filled up with its last vertex. The numbers of
+ * directions and rest positions are floats (EXACT), or three to two words (compact.h): fixed point,
+ * in a unit that suits the largest. A rest position within half a metre of the origin errs by at
+ * most 0.0005 mm in each coordinate. The units of coefficients and directions are folded into the
+ * weights, so they cost nothing. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
@@ -48,6 +48,11 @@ static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
+/** How many modes come before those: two to a word where words are shared at all. */
+static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
+  return modes - 3 * supine_tiles_thirds(storage, modes);
+}
+
 /** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. Inline, so that a
  * kernel's constants fold. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
@@ -56,13 +61,13 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16 ||
                            storage == SUPINE_STORAGE_MIXED;
   const size_t thirds = supine_tiles_thirds(storage, modes);
-  const size_t halves = modes - 3 * thirds;
+  const size_t paired = supine_tiles_paired(storage, modes);
   const size_t line = 64;
   const size_t numbers = compact ? 2 * line : TILE_NUMBERS * sizeof(float);
   tiles->storage = storage;
   tiles->modes = modes;
   tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = line * (short_words ? (halves + 1) / 2 + thirds : modes);
+  tiles->axis_bytes = line * (short_words ? (paired + 1) / 2 + thirds : modes);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
   tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
   tiles->stride = tiles->rest_begin + numbers;
