@@ -69,8 +69,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
         "six\npostures. %s\n",
         100.0 * report->turned_over, accuracy->volume,
         lungs->reach == 0.0
-            ? "The paper's forces spread over a few links, however short they are:\n"
-              "--reach 10 spreads them over 10 mm, and such a surface stays smooth"
+            ? "The paper's forces spread over a few links, however short they are;\n"
+              "--reach 10 spreads them over 10 mm and leaves next to none"
             : "A longer --reach spreads forces further");
   }
 }
