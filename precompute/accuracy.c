@@ -9,6 +9,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
+#include "compression.h"
 #include "internal.h"
 #include "tally.h"
 
@@ -143,20 +144,15 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
 /* Weights of the modes at every direction: [D, K] = Y [D, P] modes^T. */
 static supine_status find_weights(const supine_truth *truth, const supine_compression *compression,
                                   double *weights) {
-  const size_t terms = supine_sh_count(compression->band);
-  double *y = malloc(terms * sizeof *y);
+  double *y = malloc(supine_sh_count(compression->band) * sizeof *y);
   if (y == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_status status = SUPINE_OK;
   for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
     status = supine_sh_evaluate(compression->band, truth->directions + 3 * d, y);
-    for (size_t k = 0; k < compression->mode_count && status == SUPINE_OK; ++k) {
-      double sum = 0.0;
-      for (size_t t = 0; t < terms; ++t) {
-        sum += compression->modes[k * terms + t] * y[t];
-      }
-      weights[d * compression->mode_count + k] = sum;
+    if (status == SUPINE_OK) {
+      supine_compression_weights(compression, y, weights + d * compression->mode_count);
     }
   }
   free(y);

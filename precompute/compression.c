@@ -114,6 +114,18 @@ void supine_compression_truncate(supine_compression *compression, size_t rank, s
   }
 }
 
+void supine_compression_weights(const supine_compression *compression, const double *y,
+                                double *weights) {
+  const size_t terms = supine_sh_count(compression->band);
+  for (size_t k = 0; k < compression->mode_count; ++k) {
+    double sum = 0.0;
+    for (size_t t = 0; t < terms; ++t) {
+      sum += compression->modes[k * terms + t] * y[t];
+    }
+    weights[k] = sum;
+  }
+}
+
 supine_status supine_compression_volume_forms(const supine_compression *compression,
                                               const supine_lungs *lungs, const double *directions,
                                               supine_volume_forms *forms, supine_error *error) {

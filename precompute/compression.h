@@ -18,6 +18,10 @@ void supine_compression_mix(const supine_projection *projection, supine_compress
 supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
                                         double *vectors);
 
+/* weights [K] of the modes where the harmonics are `y` [(band + 1)^2]. */
+void supine_compression_weights(const supine_compression *compression, const double *y,
+                                double *weights);
+
 /* Volume forms of the coefficients as they are stored. directions [N, 3]; NULL: a vector field. */
 supine_status supine_compression_volume_forms(const supine_compression *compression,
                                               const supine_lungs *lungs, const double *directions,

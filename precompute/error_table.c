@@ -7,6 +7,7 @@
 #include <supine/parallel.h>
 #include <supine/sh.h>
 
+#include "compression.h"
 #include "error_table.h"
 #include "internal.h"
 
@@ -100,18 +101,12 @@ static void errors_range(void *context, size_t begin, size_t end, size_t thread)
 
 static supine_status find_weights(const table_work *work) {
   const size_t terms = supine_sh_count(work->projection->band);
-  const size_t modes = work->field->mode_count;
   const size_t count = work->truth->direction_count;
   const supine_status status =
       supine_sh_evaluate_many(work->projection->band, count, work->truth->directions, work->y);
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
-    for (size_t k = 0; k < modes; ++k) {
-      double sum = 0.0;
-      for (size_t t = 0; t < terms; ++t) {
-        sum += work->field->modes[k * terms + t] * work->y[d * terms + t];
-      }
-      work->weights[d * modes + k] = sum;
-    }
+    supine_compression_weights(work->field, work->y + d * terms,
+                               work->weights + d * work->field->mode_count);
   }
   return status;
 }

@@ -8,6 +8,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
+#include "compression.h"
 #include "internal.h"
 
 enum { POSTURES = 6, SAMPLES_MAX = 50000 };
@@ -67,7 +68,6 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
 static supine_status find_posture(search *s, size_t g, const supine_volume_forms *forms,
                                   double volume, double *harmonics) {
   const supine_compression *field = s->field;
-  const size_t terms = supine_sh_count(field->band);
   double gravity[3] = {0.0, 0.0, 0.0};
   gravity[g / 2] = g % 2 == 0 ? 1.0 : -1.0;
   const supine_status status = supine_sh_evaluate(field->band, gravity, harmonics);
@@ -75,11 +75,7 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
     return status;
   }
   double *w = s->weights[g];
-  for (size_t k = 0; k < field->mode_count; ++k) {
-    for (size_t t = 0; t < terms; ++t) {
-      w[k] += field->modes[k * terms + t] * harmonics[t];
-    }
-  }
+  supine_compression_weights(field, harmonics, w);
   double cubic[3];
   double scale = 0.0;
   supine_volume_forms_contract(forms, w, cubic);

@@ -73,8 +73,8 @@ typedef struct supine_precompute_report {
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
-  double
-      turned_over; /**< at accuracy.volume, see supine_turned_over; 0 where the surface is open */
+  /** At accuracy.volume, see supine_turned_over; 0 where the surface is open. */
+  double turned_over;
 } supine_precompute_report;
 
 /** Projects, compresses, measures, and writes the basis file, whole or not at all.
