@@ -10,6 +10,7 @@
 #define SUPINE_COMPACT_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -54,7 +55,7 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = rint((value - (double)low) / step);
-  const double held = above > top ? top : above < -top - 1 ? -top - 1 : above;
+  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* or NaN */
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
@@ -73,26 +74,17 @@ static inline float pair_second(uint32_t word) {
 }
 /** @} */
 
-/** Three numbers in a word, likewise: 10, 11 and 11 bits from the lowest. */
+/** Three numbers in a word, likewise: 11, 11 and 10 bits from the uppermost. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
-  const uint32_t one = word_nearest(first, 0, 22) >> 22;
-  const uint32_t two = word_nearest(second, one << 11, 21) >> 11;
-  return word_nearest(third, two, 21);
+  const uint32_t low = word_nearest(third, 0, 22) >> 22;
+  const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
+  return word_nearest(first, lower, 21);
 }
 
-/** @{ The numbers of a triple. */
-static inline float triple_first(uint32_t word) {
-  return (float)word_integer(word << 22);
+/** Number 0, 1 or 2 of a triple. */
+static inline float triple_number(uint32_t word, size_t number) {
+  return (float)word_integer(word << 11 * number);
 }
-
-static inline float triple_second(uint32_t word) {
-  return (float)word_integer(word << 11);
-}
-
-static inline float triple_third(uint32_t word) {
-  return (float)word_integer(word);
-}
-/** @} */
 
 /** Three numbers in two words, in units of 2^-31 of their limit: the first and second in the upper
  * 21 bits of a word each, the third in what is left of both. None becomes 0 (see fixed_scale). */

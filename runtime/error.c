@@ -70,7 +70,8 @@ double supine_basis_storage_error(const supine_basis *basis) {
     for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
       scales[i] = scale;
     }
-    worst = fmax(worst, supine_basis_error(basis, weights, scales));
+    const double error = supine_basis_error(basis, weights, scales);
+    worst = isnan(error) ? INFINITY : fmax(worst, error); /* numbers beyond floats */
   }
   return worst;
 }

@@ -25,7 +25,7 @@ INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, siz
 /* The coefficient of one of the three last modes whose words are `at` (compact.h). */
 INLINE __m256 third_coefficient(const unsigned char *at, size_t which, size_t half) {
   const __m256i words = _mm256_load_si256((const __m256i *)(at + 32 * half));
-  return _mm256_cvtepi32_ps(which == 0   ? words
+  return _mm256_cvtepi32_ps(which == 0   ? words /* shifts take constants */
                             : which == 1 ? _mm256_slli_epi32(words, 11)
                                          : _mm256_slli_epi32(words, 22));
 }
@@ -60,7 +60,6 @@ INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_
   const __m256 first = _mm256_broadcast_ss(w);
   halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, false, 0, storage)),
                  _mm256_mul_ps(first, coefficient(at, 0, false, 1, storage))}};
-  const size_t thirds = supine_tiles_thirds(storage, modes);
   const size_t paired = supine_tiles_paired(storage, modes);
   for (size_t pair = 0; pair < paired / 2; ++pair) {
     if (pair > 0) {
@@ -71,8 +70,8 @@ INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_
   if (paired > 1 && paired % 2 != 0) {
     sum = add_mode(sum, at, w, paired / 2, false, storage);
   }
-  for (size_t t = 0; t < thirds; ++t) {
-    sum = add_thirds(sum, at + 64 * ((paired + 1) / 2 + t), w + paired + 3 * t);
+  for (size_t k = paired; k < modes; k += 3) {
+    sum = add_thirds(sum, at + supine_tiles_words_begin(paired, k), w + k);
   }
   return sum;
 }
@@ -94,8 +93,9 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
   for (size_t half = 0; half < 2; ++half) {
     const __m256i first = _mm256_load_si256((const __m256i *)(at + 32 * half));
     const __m256i second = _mm256_load_si256((const __m256i *)(at + 64 + 32 * half));
-    const __m256i third = _mm256_or_si256(_mm256_slli_epi32(first, 21),
-                                          _mm256_srli_epi32(_mm256_slli_epi32(second, 21), 11));
+    const __m256i third = _mm256_or_si256(
+        _mm256_slli_epi32(first, 21),
+        _mm256_and_si256(_mm256_slli_epi32(second, 10), _mm256_set1_epi32(0x1FFC00)));
     n.v[half] = _mm256_cvtepi32_ps(first);
     n.v[2 + half] = _mm256_cvtepi32_ps(second);
     n.v[4 + half] = _mm256_cvtepi32_ps(third);
@@ -255,7 +255,7 @@ INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_sto
     _mm256_store_ps(c + 16 * k + 8, coefficient(at, k / 2, k % 2 != 0, 1, storage));
   }
   for (size_t k = paired; k < modes; ++k) {
-    const unsigned char *words = at + 64 * ((paired + 1) / 2 + (k - paired) / 3);
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
     _mm256_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3, 0));
     _mm256_store_ps(c + 16 * k + 8, third_coefficient(words, (k - paired) % 3, 1));
   }

@@ -43,7 +43,7 @@ INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
 /* The coefficient of one of the three last modes whose words are `at` (compact.h). */
 INLINE __m512 third_coefficient(const unsigned char *at, size_t which) {
   const __m512i words = _mm512_load_si512(at);
-  return _mm512_cvtepi32_ps(which == 0   ? words
+  return _mm512_cvtepi32_ps(which == 0   ? words /* shifts take constants */
                             : which == 1 ? _mm512_slli_epi32(words, 11)
                                          : _mm512_slli_epi32(words, 22));
 }
@@ -69,8 +69,8 @@ INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, boo
                            coefficient(at, paired / 2, false, storage), even);
   }
   UNROLL for (size_t t = 0; t < thirds; ++t) {
-    const unsigned char *words = at + 64 * ((paired + 1) / 2 + t);
     const size_t k = paired + 3 * t;
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
     odd = _mm512_fmadd_ps(weight(w, k, common), third_coefficient(words, 0), odd);
     even = _mm512_fmadd_ps(weight(w, k + 1, common), third_coefficient(words, 1), even);
     odd = _mm512_fmadd_ps(weight(w, k + 2, common), third_coefficient(words, 2), odd);
@@ -316,7 +316,7 @@ INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_sto
     _mm512_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, storage));
   }
   for (size_t k = paired; k < modes; ++k) {
-    const unsigned char *words = at + 64 * ((paired + 1) / 2 + (k - paired) / 3);
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
     _mm512_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3));
   }
 }

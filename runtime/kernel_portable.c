@@ -3,29 +3,18 @@
 #include "compact.h"
 #include "tiles.h"
 
-/* One of the last modes, three to a word: number `at` of its word. */
-static inline void widen_third(const uint32_t *words, size_t at, float *restrict c) {
-  for (size_t v = 0; v < TILE; ++v) {
-    c[v] = at == 0   ? triple_third(words[v])
-           : at == 1 ? triple_second(words[v])
-                     : triple_first(words[v]);
-  }
-}
-
 /* 16 coefficients of mode k as floats, in the units they are packed in. */
 static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at, size_t k,
                               float *restrict c) {
   const supine_storage storage = tiles->storage;
-  const size_t paired = supine_tiles_paired(storage, tiles->modes);
-  if (storage == SUPINE_STORAGE_MIXED && k >= paired) {
+  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+    const size_t paired = supine_tiles_paired(storage, tiles->modes);
     uint32_t words[TILE];
-    memcpy(words, at + ((paired + 1) / 2 + (k - paired) / 3) * sizeof words, sizeof words);
-    widen_third(words, (k - paired) % 3, c);
-  } else if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
-    uint32_t words[TILE];
-    memcpy(words, at + k / 2 * sizeof words, sizeof words);
+    memcpy(words, at + supine_tiles_words_begin(paired, k), sizeof words);
     for (size_t v = 0; v < TILE; ++v) {
-      c[v] = k % 2 == 0 ? pair_first(words[v]) : pair_second(words[v]);
+      c[v] = k >= paired  ? triple_number(words[v], (k - paired) % 3)
+             : k % 2 == 0 ? pair_first(words[v])
+                          : pair_second(words[v]);
     }
   } else if (storage == SUPINE_STORAGE_FLOAT16) {
     uint16_t half[TILE];

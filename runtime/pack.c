@@ -35,13 +35,16 @@ static float flush(float value) {
 /* By what a vertex's direction is divided and its coefficients multiplied, so that directions are
  * of length 1 and coefficients in mm, and one unit suits all vertices; 1 where the storage is
  * exact. */
-static float direction_length(const supine_basis *basis, size_t i) {
+static double direction_length(const supine_basis *basis, size_t i) {
   if (!supine_tiles_compact(basis->tiles.storage) || basis->direction == NULL) {
     return 1;
   }
-  const float *d = basis->direction + 3 * i;
-  const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  return length > 1e-15F && length < 1e15F ? length : 1; /* its square is an ordinary number */
+  double square = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double d = (double)basis->direction[3 * i + axis];
+    square += d * d;
+  }
+  return square > 0 ? sqrt(square) : 1;
 }
 
 static void source_load(const supine_basis *basis, size_t tile, source *from) {
@@ -52,14 +55,14 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = begin + (v < left ? v : left - 1);
     memcpy(from->rest + 3 * v, basis->vertices + 3 * i, 3 * sizeof *from->rest);
-    const float length = direction_length(basis, i);
+    const double length = direction_length(basis, i);
     for (size_t axis = 0; axis < 3; ++axis) {
       from->direction[3 * v + axis] =
-          basis->direction != NULL ? basis->direction[3 * i + axis] / length : 0;
+          basis->direction != NULL ? (float)((double)basis->direction[3 * i + axis] / length) : 0;
     }
     for (size_t row = 0; row < axes * modes; ++row) {
       from->coefficients[row * TILE + v] =
-          flush(length * basis->coefficients[i * axes * modes + row]);
+          flush((float)(length * (double)basis->coefficients[i * axes * modes + row]));
     }
   }
 }
@@ -81,23 +84,14 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
     top[k] = 0;
   }
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
-    const float length = direction_length(basis, i);
+    const double length = direction_length(basis, i);
     for (size_t row = rows * i; row < rows * (i + 1); ++row) {
       for (size_t k = 0; k < modes; ++k) {
-        const float size = length * fabsf(basis->coefficients[row * modes + k]);
+        const float size = (float)(length * fabs((double)basis->coefficients[row * modes + k]));
         top[k] = size > top[k] ? size : top[k];
       }
     }
   }
-}
-
-/* The largest component of a direction. */
-static float largest_direction(const supine_basis *basis) {
-  float top = 0;
-  for (size_t i = 0; basis->direction != NULL && i < basis->info.vertex_count; ++i) {
-    top = fmaxf(top, largest(basis->direction + 3 * i, 3) / direction_length(basis, i));
-  }
-  return top;
 }
 
 /* 2^e such that `top` is about 2^31 of it, within what fixed_scale can do. */
@@ -119,9 +113,7 @@ static void choose_units(supine_basis *basis, units *u) {
   const supine_storage storage = basis->tiles.storage;
   const bool compact = supine_tiles_compact(storage);
   u->rest = compact ? fixed_unit(largest(basis->vertices, 3 * basis->info.vertex_count)) : 1;
-  /* Folded into the weights, so it need not be a power of two. */
-  const float top_direction = compact ? flush(largest_direction(basis)) : 0;
-  u->direction = top_direction > 0 ? (double)top_direction / FIXED_TOP : 1;
+  u->direction = compact && basis->direction != NULL ? 1.0 / FIXED_TOP : 1; /* of length 1 */
   basis->tiles.rest_unit = (uint32_t)ilogb(u->rest) << FLOAT_FRACTION_BITS;
   float top[SUPINE_MODES_MAX];
   largest_coefficients(basis, top);
@@ -159,11 +151,11 @@ static void pack_triple(const double *unit, float *rows, unsigned char *at) {
     float *first = rows + v;
     float *second = rows + TILE + v;
     float *third = rows + (size_t)2 * TILE + v;
-    words[v] = triple_narrow((double)*third / unit[2], (double)*second / unit[1],
-                             (double)*first / unit[0]);
-    *first = (float)((double)triple_third(words[v]) * unit[0]);
-    *second = (float)((double)triple_second(words[v]) * unit[1]);
-    *third = (float)((double)triple_first(words[v]) * unit[2]);
+    words[v] = triple_narrow((double)*first / unit[0], (double)*second / unit[1],
+                             (double)*third / unit[2]);
+    *first = (float)((double)triple_number(words[v], 0) * unit[0]);
+    *second = (float)((double)triple_number(words[v], 1) * unit[1]);
+    *third = (float)((double)triple_number(words[v], 2) * unit[2]);
   }
   memcpy(at, words, sizeof words);
 }

@@ -53,6 +53,11 @@ static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
+/** Where the words of mode k begin, bytes from the first mode's, in a storage that shares them. */
+static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
+  return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
+}
+
 /** Fills in the layout for a storage (never AUTO): offsets, stride; not bytes. Inline, so that a
  * kernel's constants fold. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
