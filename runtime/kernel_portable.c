@@ -11,10 +11,14 @@ static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at
     const size_t paired = supine_tiles_paired(storage, tiles->modes);
     uint32_t words[TILE];
     memcpy(words, at + supine_tiles_words_begin(paired, k), sizeof words);
-    for (size_t v = 0; v < TILE; ++v) {
-      c[v] = k >= paired  ? triple_number(words[v], (k - paired) % 3)
-             : k % 2 == 0 ? pair_first(words[v])
-                          : pair_second(words[v]);
+    if (k >= paired) {
+      for (size_t v = 0; v < TILE; ++v) {
+        c[v] = triple_number(words[v], (k - paired) % 3);
+      }
+    } else {
+      for (size_t v = 0; v < TILE; ++v) {
+        c[v] = k % 2 == 0 ? pair_first(words[v]) : pair_second(words[v]);
+      }
     }
   } else if (storage == SUPINE_STORAGE_FLOAT16) {
     uint16_t half[TILE];
