@@ -48,6 +48,16 @@ static supine_lungs phantom(size_t vertices) {
   return lungs;
 }
 
+/* An adult's two lungs of 20,001 vertices each; skips the test where they are not there. */
+static supine_lungs real_pair(void) {
+  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
+    skip(); /* does not return */
+  }
+  return lungs;
+}
+
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
   supine_precompute_options options = {
@@ -396,12 +406,7 @@ static void test_precompute_volumes_exact_in_every_direction(void **state) {
 
 static void test_precompute_real_lungs_volumes_exact_in_every_direction(void **state) {
   (void)state;
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
-  supine_lungs lungs = {0};
-  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
-    skip();
-    return;
-  }
+  supine_lungs lungs = real_pair();
   check_volumes(&lungs, 15, 16, 0.0, -300.0);
   supine_lungs_free(&lungs);
 }
@@ -507,12 +512,7 @@ static void test_precompute_turned_over_is_what_the_run_time_turns(void **state)
 
 static void test_precompute_reach_keeps_a_fine_real_surface_whole(void **state) {
   (void)state;
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
-  supine_lungs lungs = {0};
-  if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
-    skip();
-    return;
-  }
+  supine_lungs lungs = real_pair();
   const supine_precompute_report links = make_basis(&lungs, 7, 4, 0.0, 20);
   lungs.reach = 10.0;
   const supine_precompute_report length = make_basis(&lungs, 7, 4, 0.0, 20);

@@ -27,7 +27,7 @@ static const char help[] =
     "                       \"ns_per_vertex\", ...}]}\n"
     "\n"
     "Rows: supine (AoS output by storage, and others named in full), plain_loop (-O3, float32),\n"
-    "traffic (the same loads and stores without arithmetic: the least that memory allows), copy\n"
+    "traffic (the same loads and stores without arithmetic: with AVX-512, memory's bound), copy\n"
     "and triad (the memory's own speed, with stores past the caches), arithmetic (what threads\n"
     "gain where memory plays no part). triad is the share of the triad's bandwidth that is "
     "reached.\n"

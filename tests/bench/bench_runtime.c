@@ -177,7 +177,7 @@ static void print(const peers *p, size_t from) {
   const double plain = find(p, from, "plain_loop", "", 1);
   const double native = find(p, from, "plain_native", "", 1);
   static const char *const storages[] = {"mixed", "int16", "float16", "float32", "exact"};
-  for (size_t i = 0; i < 5; ++i) {
+  for (size_t i = 0; i < sizeof storages / sizeof *storages; ++i) {
     const double own = find(p, from, "supine", storages[i], 1);
     const double traffic = find(p, from, "traffic", storages[i], 1);
     printf("%-8s  sgemv+displace %.2f (traffic alone %.2f)  plain loop %.2f  plain native %.2f  "
