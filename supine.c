@@ -6,7 +6,7 @@
 
 #include <gsl/gsl_errno.h>
 
-#include "runtime/command/command.h"
+#include "runtime/options/command.h"
 
 static const struct {
   const char *name;

@@ -2,10 +2,10 @@
 /* A basis of another simulator's fields: fit, volumes, file. */
 #include <stdlib.h>
 
-#include <supine/precompute.h>
+#include "precompute/precompute.h"
 
-#include "basis_file.h"
-#include "compression.h"
+#include "precompute/writer/basis_file.h"
+#include "precompute/projection/compression.h"
 
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *made_by,

@@ -3,11 +3,11 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include <supine/precompute.h>
+#include "precompute/precompute.h"
 
-#include "basis_file.h"
-#include "compression.h"
-#include "held_out.h"
+#include "precompute/writer/basis_file.h"
+#include "precompute/projection/compression.h"
+#include "precompute/accuracy/held_out.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */

@@ -8,7 +8,7 @@
 
 #include <supine/sh.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 /* The file that is being checked, and where its name and a failure go. */
 typedef struct check {

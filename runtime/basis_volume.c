@@ -2,7 +2,7 @@
 /* Exact volumes of a basis, from its forms in the weights. */
 #include <supine/volume.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 static void add_lung(const supine_basis *basis, size_t lung, const double *weights,
                      double cubic[3]) {

@@ -3,7 +3,7 @@
  * while every orientation reads it. */
 #include <string.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 enum {
   BLOCK_TILES = 23,

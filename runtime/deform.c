@@ -2,7 +2,7 @@
 /* Deformed positions x_i = p_i + s (w . c_i) d_i, in runs of whole tiles of one lung. */
 #include <string.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 /* Moves a target on by `count` vertices. */
 static supine_target target_after(const supine_target *target, size_t count) {

@@ -2,7 +2,7 @@
 /* What storage and rounding may cost, in mm. */
 #include <math.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 double supine_basis_error(const supine_basis *basis, const double *weights, const double *scales) {
   const double unit = 0x1p-24; /* half a unit in the last place of a float */

@@ -2,7 +2,7 @@
 /* Vertex attributes and uniforms for supine.glsl. */
 #include <string.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                              float *attributes) {

@@ -7,7 +7,7 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "tiles.h"
+#include "runtime/kernels/tiles.h"
 
 /** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
  * through the caches rather than stay there. */

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 void supine_normals(const supine_basis *basis, const float *xyz, float *normals) {
   memset(normals, 0, 3 * basis->info.vertex_count * sizeof *normals);

@@ -6,7 +6,7 @@
 
 #include <supine/posture.h>
 
-#include "words.h"
+#include "runtime/words.h"
 
 static const struct {
   const char *name;

@@ -2,7 +2,7 @@
 /* Weights of the modes for one direction of gravity. */
 #include <supine/sh.h>
 
-#include "internal.h"
+#include "runtime/internal.h"
 
 supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                    double *weights) {

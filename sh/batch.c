@@ -4,9 +4,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include <supine/parallel.h>
+#include "sh/base/parallel.h"
 
-#include "internal.h"
+#include "sh/internal.h"
 
 enum { THREADS_MAX = 256 }; /* as supine_parallel_for: each has its own workspace */
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A block of coefficients to and from the caller's array: rows are put in their places, and turned
  * where the coefficients of a field lie together. */
-#include "internal.h"
+#include "sh/internal.h"
 
 /* turned[field, (band + 1)^2] from the rows of a block; eight fields, a cache line, at a time. */
 static void turn(const supine_sh_transform *plan, size_t fields, const double *block,

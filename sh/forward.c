@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Values to coefficients. */
-#include "internal.h"
+#include "sh/internal.h"
 
 typedef struct forward {
   const supine_sh_transform *plan;

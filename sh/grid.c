@@ -6,7 +6,7 @@
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_sf_legendre.h>
 
-#include <supine/grid.h>
+#include "sh/grid.h"
 
 /* GSL tabulates some sizes and computes the others to about 1e-11. One Newton step on P_n takes
  * those to rounding: quadratic convergence leaves 1e-22. work: [2 (n + 1)]

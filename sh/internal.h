@@ -18,8 +18,8 @@
 
 #include <fftw3.h>
 
-#include <supine/clones.h>
-#include <supine/transform.h>
+#include "sh/base/clones.h"
+#include "sh/transform.h"
 
 enum {
   SUPINE_SH_LANES = 16,     /* fields that a kernel works on together; `width` is a multiple */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Coefficients to values. */
-#include "internal.h"
+#include "sh/internal.h"
 
 typedef struct inverse {
   const supine_sh_transform *plan;

@@ -7,7 +7,7 @@
 
 #include <supine/sh.h>
 
-#include "internal.h"
+#include "sh/internal.h"
 
 /* Each (m, parity, cosine or sine, l) of a coefficient block, in order. */
 static void fill_positions(supine_sh_transform *plan) {

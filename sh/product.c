@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The matrix product along latitude: small matrices, long rows of fields. */
-#include "internal.h"
+#include "sh/internal.h"
 
 enum { HALF = SUPINE_SH_LANES / 2, TILE = 4 };
 

@@ -13,7 +13,7 @@
  * The halves are in the matrices of legendre.c. */
 #include <string.h>
 
-#include "internal.h"
+#include "sh/internal.h"
 
 /* Asks for a row's part of the next block, or for nothing of use past the last: rows are far apart
  * in the caller's memory, and too short here for the processor to foresee. */

@@ -11,7 +11,7 @@
 #include <emmintrin.h>
 #endif
 
-#include "internal.h"
+#include "sh/internal.h"
 
 enum { LINE = 64 / sizeof(double) }; /* doubles in a cache line: written whole or not streamed */
 

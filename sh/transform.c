@@ -4,7 +4,7 @@
 
 #include <supine/sh.h>
 
-#include "internal.h"
+#include "sh/internal.h"
 
 /* Fields in a block: as measured. An odd number of lanes, so that the rows of a block do not fall
  * on the same few cache sets; the least where the rings alone would fill a cache. */

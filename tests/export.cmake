@@ -6,7 +6,7 @@ supine_test(export_html runtime_fixture supine_commands supine_gsl)
 # What other programs make of exported files, against the C evaluator: needs node and npm's packages
 # in tests/export (npm install there), the page a Chromium too; skipped where they are not.
 add_executable(export_positions export/positions.c)
-target_link_libraries(export_positions PRIVATE supine_options supine_runtime)
+target_link_libraries(export_positions PRIVATE supine_build supine_runtime)
 find_program(NODE_PROGRAM NAMES node nodejs)
 find_program(CHROMIUM_PROGRAM NAMES chromium chromium-browser google-chrome)
 set(SUPINE_NODE_MODULES ${CMAKE_CURRENT_SOURCE_DIR}/export CACHE PATH

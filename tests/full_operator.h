@@ -9,7 +9,7 @@
 
 #include <suitesparse/umfpack.h>
 
-#include <supine/mesh.h>
+#include "mesh/mesh.h"
 
 typedef struct full_operator {
   size_t node_count;  /* masses, then springs */

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include <supine/lungs.h>
-#include <supine/mesh.h>
+#include "precompute/lungs/lungs.h"
+#include "mesh/mesh.h"
 
-#include "../precompute/geodesic.h"
+#include "precompute/phantom/geodesic.h"
 #include "sh_helpers.h"
 
 /* Irregular numbers in [0, 1). */

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(mesh_topology supine_mesh)
-supine_test(mesh_measure supine_mesh m)
-supine_test(mesh_load supine_mesh Threads::Threads m)
-supine_test(mesh_hostile supine_mesh)
-supine_test(mesh_save supine_mesh m)
-supine_test(mesh_lungs supine_mesh m)
+supine_test(mesh_topology supine_mesh_read supine_mesh_save)
+supine_test(mesh_measure supine_mesh_read supine_mesh_save m)
+supine_test(mesh_load supine_mesh_read supine_mesh_save Threads::Threads m)
+supine_test(mesh_hostile supine_mesh_read supine_mesh_save)
+supine_test(mesh_save supine_mesh_read supine_mesh_save m)
+supine_test(mesh_lungs supine_mesh_read supine_mesh_save m)

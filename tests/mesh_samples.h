@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include <supine/mesh.h>
+#include "mesh/mesh.h"
 
 /* Copies arrays into a mesh that supine_mesh_free releases. */
 static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(pv_curve supine_pv supine_gsl)
-supine_test(pv_fit supine_pv supine_gsl)
-supine_test(pv_file supine_pv supine_gsl)
-supine_test(pv_breath supine_pv supine_gsl)
+supine_test(pv_curve supine_breath supine_gsl)
+supine_test(pv_fit supine_breath supine_gsl)
+supine_test(pv_file supine_breath supine_gsl)
+supine_test(pv_breath supine_breath supine_gsl)
 supine_test(pv_command supine_commands supine_gsl)

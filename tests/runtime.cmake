@@ -3,7 +3,7 @@
 # Made bases, and reference evaluations of them.
 add_library(runtime_fixture STATIC runtime_fixture.c)
 target_link_libraries(runtime_fixture
-  PRIVATE supine_options PkgConfig::CMOCKA
+  PRIVATE supine_build PkgConfig::CMOCKA
   PUBLIC supine_runtime supine_safetensors_write)
 
 supine_test(safetensors runtime_fixture)
@@ -16,7 +16,7 @@ supine_test(deform_lung runtime_fixture)
 # The library as others have it: installed, through CMake and pkg-config.
 add_executable(make_basis example/make_basis.c)
 target_include_directories(make_basis PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
-target_link_libraries(make_basis PRIVATE supine_options runtime_fixture PkgConfig::CMOCKA)
+target_link_libraries(make_basis PRIVATE supine_build runtime_fixture PkgConfig::CMOCKA)
 include(CheckLanguage)
 check_language(CXX)
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)

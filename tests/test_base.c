@@ -12,8 +12,8 @@
 
 #include <cmocka.h>
 
-#include <supine/output.h>
-#include <supine/parallel.h>
+#include "sh/base/output.h"
+#include "sh/base/parallel.h"
 #include <supine/status.h>
 
 static void test_status_string_every_code_distinct(void **state) {

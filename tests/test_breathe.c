@@ -18,13 +18,14 @@
 
 #include <cmocka.h>
 
-#include <supine/mesh.h>
-#include <supine/phantom.h>
-#include <supine/precompute.h>
+#include "mesh/mesh.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/safetensors.h>
 
-#include "../runtime/command/breath_course.h"
-#include "../runtime/command/command.h"
+#include "runtime/breath/breath_course.h"
+#include "runtime/options/command.h"
 #include "lungs_helpers.h"
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";

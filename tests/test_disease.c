@@ -10,10 +10,11 @@
 
 #include <cmocka.h>
 
-#include <supine/disease.h>
-#include <supine/precompute.h>
+#include "precompute/tissue/disease.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/volume.h>
-#include <supine/volume_forms.h>
+#include "precompute/physics/volume_forms.h"
 
 #include "lungs_helpers.h"
 

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include <gsl/gsl_linalg.h>
-#include <supine/equilibrium.h>
+#include "precompute/physics/equilibrium.h"
 
 #include "full_operator.h"
 #include "lungs_helpers.h"

@@ -12,8 +12,9 @@
 
 #include <cmocka.h>
 
-#include <supine/expandability.h>
-#include <supine/precompute.h>
+#include "precompute/tissue/expandability.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 
 #include "lungs_helpers.h"
 

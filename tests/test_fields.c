@@ -11,10 +11,11 @@
 
 #include <cmocka.h>
 
-#include <supine/fields.h>
-#include <supine/grid.h>
-#include <supine/phantom.h>
-#include <supine/precompute.h>
+#include "precompute/fields/fields.h"
+#include "sh/grid.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>

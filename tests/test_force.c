@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include <supine/force.h>
+#include "precompute/physics/force.h"
 
 #include "lungs_helpers.h"
 

@@ -10,9 +10,9 @@
 
 #include <cmocka.h>
 
-#include <supine/force.h>
-#include <supine/phantom.h>
-#include <supine/volume_forms.h>
+#include "precompute/physics/force.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/physics/volume_forms.h"
 
 #include "lungs_helpers.h"
 

@@ -10,9 +10,10 @@
 
 #include <cmocka.h>
 
-#include <supine/grid.h>
-#include <supine/phantom.h>
-#include <supine/precompute.h>
+#include "sh/grid.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>

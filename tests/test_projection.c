@@ -12,9 +12,10 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include <supine/grid.h>
-#include <supine/phantom.h>
-#include <supine/precompute.h>
+#include "sh/grid.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

@@ -11,8 +11,8 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include <supine/disease.h>
-#include <supine/equilibrium.h>
+#include "precompute/tissue/disease.h"
+#include "precompute/physics/equilibrium.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

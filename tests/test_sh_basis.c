@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include <supine/grid.h>
+#include "sh/grid.h"
 #include <supine/sh.h>
 
 #include "sh_helpers.h"

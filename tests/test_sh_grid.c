@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include <supine/grid.h>
+#include "sh/grid.h"
 
 #include "sh_helpers.h"
 

@@ -13,11 +13,11 @@
 
 #include <cmocka.h>
 
-#include <supine/mesh.h>
-#include <supine/phantom.h>
+#include "mesh/mesh.h"
+#include "precompute/phantom/phantom.h"
 #include <supine/runtime.h>
 
-#include "../runtime/command/command.h"
+#include "runtime/options/command.h"
 
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
 static char lungs[64], csv[64], out[64], other[64], printed[64];

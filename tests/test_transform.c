@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include <supine/sh.h>
-#include <supine/transform.h>
+#include "sh/transform.h"
 
 #include "sh_helpers.h"
 

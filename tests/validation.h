@@ -13,8 +13,9 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include <supine/disease.h>
-#include <supine/precompute.h>
+#include "precompute/tissue/disease.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 #include <supine/volume.h>
 
 /* Masses and the links between them; no surface need be there. */

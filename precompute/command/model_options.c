@@ -4,9 +4,9 @@
 #include <string.h>
 #include <strings.h>
 
-#include <supine/parallel.h>
+#include "sh/base/parallel.h"
 
-#include "model_options.h"
+#include "precompute/command/model_options.h"
 
 const char supine_model_options_help[] =
     "Surfaces:\n"

@@ -4,11 +4,12 @@
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
-#include <supine/disease.h>
-#include <supine/expandability.h>
-#include <supine/precompute.h>
+#include "precompute/tissue/disease.h"
+#include "precompute/tissue/expandability.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 
-#include "../../runtime/command/command.h"
+#include "runtime/options/command.h"
 
 /* Values of struct option beyond the short options'. */
 enum {

@@ -2,9 +2,9 @@
 /* supine phantom: a made pair of lungs. */
 #include <string.h>
 
-#include <supine/phantom.h>
+#include "precompute/phantom/phantom.h"
 
-#include "../../runtime/command/command.h"
+#include "runtime/options/command.h"
 
 static const char name[] = "phantom";
 

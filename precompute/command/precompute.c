@@ -5,7 +5,7 @@
 
 #include <supine/sh.h>
 
-#include "model_options.h"
+#include "precompute/command/model_options.h"
 
 static const char name[] = "precompute";
 

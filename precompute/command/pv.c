@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <supine/pv.h>
+#include "runtime/breath/pv.h"
 
-#include "../../runtime/command/command.h"
+#include "runtime/options/command.h"
 
 static const char command[] = "pv";
 

@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/disease.h>
-#include <supine/output.h>
+#include "precompute/tissue/disease.h"
+#include "sh/base/output.h"
 #include <supine/volume.h>
 
-#include "../../runtime/command/orientation.h"
-#include "model_options.h"
+#include "runtime/options/orientation.h"
+#include "precompute/command/model_options.h"
 
 static const char name[] = "solve";
 

@@ -5,9 +5,9 @@
 
 #include <jansson.h>
 
-#include <supine/bench.h>
+#include "runtime/bench/bench.h"
 
-#include "command.h"
+#include "runtime/options/command.h"
 
 static const char name[] = "bench";
 

@@ -8,11 +8,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <supine/output.h>
+#include "sh/base/output.h"
 #include <supine/safetensors.h>
 
-#include "breath_output.h"
-#include "comparison_html.h"
+#include "runtime/command/breath_output.h"
+#include "runtime/report/comparison_html.h"
 
 struct breath_output {
   const supine_mesh *rest;

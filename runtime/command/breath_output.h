@@ -3,9 +3,9 @@
 #ifndef SUPINE_BREATH_OUTPUT_H
 #define SUPINE_BREATH_OUTPUT_H
 
-#include <supine/mesh.h>
+#include "mesh/mesh.h"
 
-#include "breath_course.h"
+#include "runtime/breath/breath_course.h"
 
 typedef struct breath_output breath_output;
 

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "basis_input.h"
-#include "breath_frames.h"
-#include "breath_output.h"
-#include "orientation.h"
+#include "runtime/options/basis_input.h"
+#include "runtime/breath/breath_frames.h"
+#include "runtime/command/breath_output.h"
+#include "runtime/options/orientation.h"
 
 static const char name[] = "breathe";
 

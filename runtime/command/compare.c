@@ -2,10 +2,10 @@
 /* supine compare: how far postures differ, and where the lungs ventilate in each. */
 #include <string.h>
 
-#include <supine/output.h>
+#include "sh/base/output.h"
 
-#include "basis_input.h"
-#include "comparison.h"
+#include "runtime/options/basis_input.h"
+#include "runtime/report/comparison.h"
 
 static const char name[] = "compare";
 

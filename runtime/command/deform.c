@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/mesh.h>
+#include "mesh/mesh.h"
 #include <supine/runtime.h>
 
-#include "basis_input.h"
-#include "orientation.h"
+#include "runtime/options/basis_input.h"
+#include "runtime/options/orientation.h"
 
 static const char name[] = "deform";
 

@@ -5,7 +5,7 @@
 
 #include <export.h>
 
-#include "basis_input.h"
+#include "runtime/options/basis_input.h"
 
 static const char name[] = "export";
 static const double default_volume = 500.0; /* mL */

@@ -9,7 +9,7 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "basis_input.h"
+#include "runtime/options/basis_input.h"
 
 static const char name[] = "info";
 

@@ -5,11 +5,11 @@
 #include <string.h>
 
 #include <supine/compare.h>
-#include <supine/output.h>
+#include "sh/base/output.h"
 
-#include "../render/render.h"
-#include "basis_input.h"
-#include "posture_list.h"
+#include "runtime/render/render.h"
+#include "runtime/options/basis_input.h"
+#include "runtime/options/posture_list.h"
 
 static const char name[] = "render";
 

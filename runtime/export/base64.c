@@ -2,7 +2,7 @@
 /* Base64: three bytes become four characters. */
 #include <stdint.h>
 
-#include "base64.h"
+#include "runtime/export/base64.h"
 
 void export_base64_write(const void *bytes, size_t size, FILE *file) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

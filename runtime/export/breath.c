@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "export.h"
+#include "runtime/export/export.h"
 
 supine_status export_breath_set(const export_source *source, double volume, double largest,
                                 export_breath *breath, supine_error *error) {

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "glb.h"
+#include "runtime/export/glb.h"
 
 enum { CHUNK_ALIGNMENT = 4, SHORT_STRIDE = 8 };
 static const uint32_t magic = 0x46546C67, version = 2, json_chunk = 0x4E4F534A,

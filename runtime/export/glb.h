@@ -5,9 +5,9 @@
 #define SUPINE_EXPORT_GLB_H
 
 #include <jansson.h>
-#include <supine/output.h>
+#include "sh/base/output.h"
 
-#include "targets.h"
+#include "runtime/export/targets.h"
 
 /** glTF's numbers for component types and buffer targets. */
 enum { GLTF_SHORT = 5122, GLTF_UINT = 5125, GLTF_FLOAT = 5126 };

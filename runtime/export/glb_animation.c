@@ -6,7 +6,7 @@
 
 #include <supine/sh.h>
 
-#include "glb.h"
+#include "runtime/export/glb.h"
 
 static const double pi = 3.14159265358979323846;
 enum { RATE = 20, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "glb.h"
+#include "runtime/export/glb.h"
 
 enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
 

@@ -4,11 +4,11 @@
 #include <string.h>
 
 #include <jansson.h>
-#include <supine/output.h>
+#include "sh/base/output.h"
 
-#include "assets.h"
-#include "base64.h"
-#include "export.h"
+#include "runtime/export/assets.h"
+#include "runtime/export/base64.h"
+#include "runtime/export/export.h"
 
 typedef struct page {
   const export_source *source;

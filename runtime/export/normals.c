@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "glb.h"
+#include "runtime/export/glb.h"
 
 static void add_triangle(const export_source *source, const uint32_t *corner, double *sum) {
   double a[3];

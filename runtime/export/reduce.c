@@ -13,7 +13,7 @@
 #include <gsl/gsl_blas.h>
 #include <gsl/gsl_eigen.h>
 
-#include "targets.h"
+#include "runtime/export/targets.h"
 
 /* U^T U. */
 static void gram(const export_source *source, gsl_matrix *sum) {

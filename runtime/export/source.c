@@ -2,7 +2,7 @@
 /* A basis with all of its tensors; the run-time library has checked them. */
 #include <supine/sh.h>
 
-#include "export.h"
+#include "runtime/export/export.h"
 
 static const void *tensor(const supine_safetensors *file, const char *name) {
   const supine_tensor *found = supine_safetensors_find(file, name);

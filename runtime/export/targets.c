@@ -6,7 +6,7 @@
 
 #include <supine/sh.h>
 
-#include "targets.h"
+#include "runtime/export/targets.h"
 
 enum { EIGHT = 8, DIRECTIONS = 4096, COUNT_MAX = 32767 };
 static const double margin = 0.02; /* of a range, on both sides: between the directions tried */

@@ -4,7 +4,7 @@
 #ifndef SUPINE_EXPORT_TARGETS_H
 #define SUPINE_EXPORT_TARGETS_H
 
-#include "export.h"
+#include "runtime/export/export.h"
 
 /** J targets, each a mix of the basis' K modes:
  *

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Builds without EGL, OpenGL ES or cairo: every picture is refused. */
-#include "render.h"
+#include "runtime/render/render.h"
 
 static supine_status refuse(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,

@@ -2,7 +2,7 @@
 /* Ticks of colour bars. */
 #include <math.h>
 
-#include "render.h"
+#include "runtime/render/render.h"
 
 double supine_bar_step(double value) {
   if (!(value > 0)) {

@@ -3,7 +3,7 @@
  * processing", 2020. */
 #include <math.h>
 
-#include "render.h"
+#include "runtime/render/render.h"
 
 static const double degree = 3.14159265358979323846 / 180;
 

@@ -2,7 +2,7 @@
 /* An OpenGL ES 3 context without a window, by EGL. */
 #include <string.h>
 
-#include "gl.h"
+#include "runtime/render/gl.h"
 
 enum { DEVICES_MAX = 8 };
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../internal.h"
-#include "gl.h"
+#include "runtime/internal.h"
+#include "runtime/render/gl.h"
 
 /* Each pixel is the mean of 2 x 2 drawn ones, of four samples each where the driver has them. */
 enum { OVERSAMPLE = 2, SAMPLES = 4 };

@@ -7,7 +7,7 @@
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
 
-#include "render.h"
+#include "runtime/render/render.h"
 
 /* An OpenGL ES 3 context without a window. */
 typedef struct supine_gl_context {

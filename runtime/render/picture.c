@@ -6,7 +6,7 @@
 
 #include <cairo.h>
 
-#include "render.h"
+#include "runtime/render/render.h"
 
 static const double pi = 3.14159265358979323846;
 

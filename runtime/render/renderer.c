@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../internal.h"
-#include "gl.h"
+#include "runtime/internal.h"
+#include "runtime/render/gl.h"
 
 enum { COLOURS = 256 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The GPU's part: displacement, projection, light and colour. */
-#include "gl.h"
+#include "runtime/render/gl.h"
 #include "supine_glsl.h" /* supine.glsl as a string, made by the build */
 
 static const char version[] = "#version 300 es\n"

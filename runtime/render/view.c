@@ -2,7 +2,7 @@
 /* Where viewers stand, in body axes (LPS). */
 #include <string.h>
 
-#include "render.h"
+#include "runtime/render/render.h"
 
 static const struct {
   const char *name;

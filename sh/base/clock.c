@@ -2,7 +2,7 @@
 /* A clock for measuring how long things take. */
 #include <time.h>
 
-#include <supine/clock.h>
+#include "sh/base/clock.h"
 
 double supine_clock_seconds(void) {
   struct timespec time;

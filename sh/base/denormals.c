@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Denormal numbers: the tail of a unit force's response fades into them, and they are slow. */
-#include <supine/denormals.h>
+#include "sh/base/denormals.h"
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>

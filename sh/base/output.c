@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <supine/output.h>
+#include "sh/base/output.h"
 
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
   const int code = errno;

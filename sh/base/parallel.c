@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-#include <supine/parallel.h>
+#include "sh/base/parallel.h"
 
 enum { THREADS_MAX = 256 };
 

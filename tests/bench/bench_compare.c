@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include <supine/clock.h>
+#include "sh/base/clock.h"
 
-#include "../../runtime/command/comparison.h"
+#include "runtime/report/comparison.h"
 
 enum { REPEATS = 5, PAIRS = 10000, PASSES = 20, DIRECTIONS = 200 };
 

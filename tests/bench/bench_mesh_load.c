@@ -15,9 +15,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include <supine/clock.h>
-#include <supine/mesh.h>
-#include <supine/parallel.h>
+#include "sh/base/clock.h"
+#include "mesh/mesh.h"
+#include "sh/base/parallel.h"
 
 enum { REPEATS = 9 };
 

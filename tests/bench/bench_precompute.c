@@ -13,9 +13,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include <supine/clock.h>
-#include <supine/parallel.h>
-#include <supine/precompute.h>
+#include "sh/base/clock.h"
+#include "sh/base/parallel.h"
+#include "precompute/precompute.h"
 
 static const char *const sizes[][2] = {
     {"chaste_left_5k.obj", "chaste_right_5k.obj"},

@@ -10,7 +10,7 @@
 
 #include <cblas.h>
 
-#include <supine/bench.h>
+#include "runtime/bench/bench.h"
 
 #include "full_solve.h"
 

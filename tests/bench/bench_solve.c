@@ -10,12 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/clock.h>
-#include <supine/parallel.h>
-#include <supine/phantom.h>
-#include <supine/projection.h>
+#include "sh/base/clock.h"
+#include "sh/base/parallel.h"
+#include "precompute/phantom/phantom.h"
+#include "precompute/projection/projection.h"
 
-#include "../../precompute/equilibrium_internal.h"
+#include "precompute/physics/equilibrium_internal.h"
 
 enum { RHS = 4 };
 

@@ -16,10 +16,10 @@
 
 #include <cblas.h>
 
-#include <supine/clock.h>
-#include <supine/grid.h>
+#include "sh/base/clock.h"
+#include "sh/grid.h"
 #include <supine/sh.h>
-#include <supine/transform.h>
+#include "sh/transform.h"
 
 #define CHOSEN "SUPINE_BENCH_KERNELS"
 

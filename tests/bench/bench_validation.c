@@ -12,9 +12,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <supine/phantom.h>
+#include "precompute/phantom/phantom.h"
 
-#include "../validation.h"
+#include "tests/validation.h"
 
 static const char *folder = "validation";
 static const char *data = SUPINE_TEST_DATA;

@@ -2,8 +2,8 @@
 /* What a frame costs without a basis. */
 #include <stdlib.h>
 
-#include <supine/phantom.h>
-#include <supine/precompute.h>
+#include "precompute/phantom/phantom.h"
+#include "precompute/precompute.h"
 
 #include "full_solve.h"
 

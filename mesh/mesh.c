@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A surface in memory. */
+#include <stdlib.h>
+
+#include "mesh/mesh.h"
+
+void supine_mesh_free(supine_mesh *mesh) {
+  free(mesh->vertices);
+  free(mesh->triangles);
+  *mesh = (supine_mesh){0};
+}

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Are the coordinates of an OBJ file numbers? */
+#include "mesh/read/read.h"
+
+/* A surface needs no colours: makes a line that names a file of materials a comment. */
+static void drop_materials(mesh_file *file, mesh_text word) {
+  if (mesh_text_is(word, "mtllib")) {
+    file->bytes[word.at - file->bytes] = '#';
+  }
+}
+
+supine_status mesh_guard_obj(mesh_file *file, supine_error *error) {
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text line;
+  mesh_text word;
+  if (!mesh_guard_text(file, error)) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  for (size_t number = 1; mesh_text_line(&text, &line); ++number) {
+    if (!mesh_text_word(&line, &word)) {
+      continue;
+    }
+    drop_materials(file, word);
+    if (mesh_text_is(word, "v") && !mesh_text_skip_numbers(&line, 3)) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: line %zu: a vertex wants three numbers", file->path, number);
+    }
+  }
+  return SUPINE_OK;
+}

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the files of this folder share; no other folder sees it. */
+#ifndef SUPINE_MESH_INTERNAL_H
+#define SUPINE_MESH_INTERNAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "mesh/mesh.h"
+
+/* ---- text.c: lines and words of a file that may hold anything. ---- */
+
+/** Bytes at <= p < end, not NUL-terminated. */
+typedef struct mesh_text {
+  const unsigned char *at;
+  const unsigned char *end;
+} mesh_text;
+
+/** Takes the next line, without its LF or CRLF, off `text`; false where nothing is left. */
+bool mesh_text_line(mesh_text *text, mesh_text *line);
+/** Takes the next word between blanks off `text`; false where there is none. */
+bool mesh_text_word(mesh_text *text, mesh_text *word);
+/** Is the word `expected`, in any case? */
+bool mesh_text_is(mesh_text word, const char *expected);
+/** Is the word a decimal number, nan or inf? */
+bool mesh_text_is_number(mesh_text word);
+/** Reads decimal digits alone; false for anything else or beyond 2^63. */
+bool mesh_text_count(mesh_text word, uint64_t *value);
+/** Takes the next `count` words off `text`; true where all are there and are numbers. */
+bool mesh_text_skip_numbers(mesh_text *text, uint64_t count);
+
+/* ---- file.c: a file's bytes. ---- */
+
+typedef enum mesh_format {
+  MESH_FORMAT_OTHER = 0, /**< an ending that assimp knows, but no check of ours */
+  MESH_FORMAT_PLY,
+  MESH_FORMAT_STL,
+  MESH_FORMAT_OBJ,
+  MESH_FORMAT_OFF
+} mesh_format;
+
+/** The axes that a SPACE tag names. */
+typedef enum mesh_space {
+  MESH_SPACE_NONE = 0, /**< no tag */
+  MESH_SPACE_LPS,
+  MESH_SPACE_RAS,
+  MESH_SPACE_FOREIGN /**< a tag of other axes */
+} mesh_space;
+
+/** A file on its way in. */
+typedef struct mesh_file {
+  const char *path;
+  mesh_format format;
+  unsigned char *bytes; /**< all of PLY, STL, OBJ and OFF, the head of others */
+  size_t size;
+  mesh_space space;
+  bool mentions_ras; /**< the word RAS stands in a comment */
+  size_t faces;      /**< faces that the file promises, SIZE_MAX where it does not say */
+  bool whole;        /**< checked byte for byte: the importer cannot fail on it */
+} mesh_file;
+
+/** Opens, tells the format from the ending (or, without a known one, the first bytes), reads. */
+supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *error);
+void mesh_file_free(mesh_file *file);
+
+/* ---- space.c ---- */
+
+/** Looks for SPACE=LPS, SPACE=RAS and the word RAS in the first `size` bytes, and sets space and
+ * mentions_ras. */
+void mesh_space_note(mesh_file *file, size_t size);
+
+/* ---- guard*.c: is the file as long and as large as it says? The importers believe the counts in
+ * a file: they read past the end of some, take gigabytes for others, and read words that are no
+ * numbers as 0. Each guard returns SUPINE_ERROR_FORMAT with the place, notes the SPACE tag, and
+ * may take out of the bytes what importers misread or what would make them open other files. ----
+ */
+
+supine_status mesh_guard_ply(mesh_file *file, supine_error *error);
+supine_status mesh_guard_stl(mesh_file *file, supine_error *error);
+supine_status mesh_guard_obj(mesh_file *file, supine_error *error);
+supine_status mesh_guard_off(mesh_file *file, supine_error *error);
+/** Line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
+bool mesh_guard_text(const mesh_file *file, supine_error *error);
+
+/* ---- import.c: the surface as assimp gives it: all nodes joined, polygons cut. ---- */
+
+/** @param mesh     file's units and axes, not welded; written on success alone
+ *  @param dropped  points and lines
+ *  Frees the file's bytes as soon as it can. */
+supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped, supine_error *error);
+
+/* ---- weld.c ---- */
+
+/** Welds vertices of equal bits (the caller has made every -0 a 0), drops triangles with two
+ * corners at one vertex, then vertices without a triangle. Works in place; counts are added to. */
+supine_status mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
+
+/* ---- unit.c ---- */
+
+/** The unit in which a box with this longest side, taken as mm, would hold lungs; NULL where it
+ * does already. */
+const char *mesh_unit_likely(double longest_side);
+
+#endif

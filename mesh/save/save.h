@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Writing surfaces, one function a format. */
+#ifndef SUPINE_MESH_SAVE_H
+#define SUPINE_MESH_SAVE_H
+
+#include <stdio.h>
+
+#include "mesh/read/read.h"
+
+/** What the writers get: the mesh and how to write it. */
+typedef struct mesh_writer {
+  FILE *out;
+  const supine_mesh *mesh;
+  const double *rest; /**< NULL: no displacement */
+  double sign[3];     /**< of x, y, z in the file's axes */
+  const char *space;  /**< "LPS" or "RAS" */
+  char comment[256];  /**< one printable line, "" where there is none */
+} mesh_writer;
+
+/** Vertex i in the file's axes. */
+void mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
+/** Displacement of vertex i in the file's axes, and its length. */
+void mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
+
+/** Little-endian bytes of `count` values; at grows. */
+void mesh_put_f32(unsigned char **at, const float *values, size_t count);
+void mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
+
+/* Write errors stay in the stream, for the caller to find. */
+void mesh_save_ply(const mesh_writer *writer);
+void mesh_save_obj(const mesh_writer *writer);
+void mesh_save_stl(const mesh_writer *writer);
+void mesh_save_vtp(const mesh_writer *writer);
+
+#endif

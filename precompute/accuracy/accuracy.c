@@ -1,0 +1,222 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Error of a compressed field against the full solve on held-out directions. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/accuracy/accuracy.h"
+#include "sh/base/parallel.h"
+#include <supine/sh.h>
+#include <supine/volume.h>
+
+#include "precompute/projection/compression.h"
+#include "precompute/physics/network.h"
+#include "precompute/accuracy/tally.h"
+
+enum { BLOCK = 512, VOLUME_HALVINGS = 10 };
+
+/* What one thread has seen. */
+typedef struct tally {
+  double field2;
+  supine_tally error;    /* at one breath scale */
+  supine_tally error_mm; /* at one volume */
+} tally;
+
+typedef struct accuracy_work {
+  const supine_truth *truth;
+  const supine_compression *compression;
+  const double *directions; /* [N, 3] */
+  const double *weights;    /* [D, K] */
+  const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
+  tally *tallies;           /* one a thread */
+  struct turned_block *blocks;
+} accuracy_work;
+
+/* A block of vertices, turned so that vertices run along the rows: [rank or modes][BLOCK]. */
+typedef struct turned_block {
+  size_t count;
+  double length[BLOCK]; /* |d| */
+  double columns[SUPINE_FORCE_COLUMNS_MAX][BLOCK];
+  float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
+} turned_block;
+
+static void turn_block(const accuracy_work *work, size_t begin, size_t count, turned_block *block) {
+  const supine_truth *truth = work->truth;
+  const size_t modes = work->compression->mode_count;
+  block->count = count;
+  for (size_t i = 0; i < count; ++i) {
+    const double *u = work->directions + 3 * (begin + i);
+    const float *c = work->compression->coefficients + (begin + i) * modes;
+    block->length[i] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    for (size_t k = 0; k < modes; ++k) {
+      block->coefficients[k][i] = c[k];
+    }
+    for (size_t r = 0; truth->fields == NULL && r < truth->rank; ++r) {
+      block->columns[r][i] = truth->columns[(begin + i) * truth->rank + r];
+    }
+  }
+}
+
+/* F of the compression at one direction for the whole block. */
+SUPINE_CLONES static void compressed_block(const turned_block *block, size_t modes,
+                                           const double *weights, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t k = 0; k < modes; ++k) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += weights[k] * (double)block->coefficients[k][i];
+    }
+  }
+}
+
+SUPINE_CLONES static void true_block(const turned_block *block, size_t rank,
+                                     const double *functions, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = 0.0;
+  }
+  for (size_t r = 0; r < rank; ++r) {
+    for (size_t i = 0; i < BLOCK; ++i) {
+      out[i] += functions[r] * block->columns[r][i];
+    }
+  }
+}
+
+/* out = |s1 is - s0 should| length */
+SUPINE_CLONES static void miss_block(const double *is, const double *should, const double *length,
+                                     double s1, double s0, double *out) {
+  for (size_t i = 0; i < BLOCK; ++i) {
+    out[i] = fabs(s1 * is[i] - s0 * should[i]) * length[i];
+  }
+}
+
+static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
+                          const turned_block *block) {
+  const supine_truth *truth = work->truth;
+  const size_t modes = work->compression->mode_count;
+  double is[BLOCK];
+  double should[BLOCK] = {0.0}; /* to its end, though the last block is shorter */
+  double miss[BLOCK];
+  for (size_t d = 0; d < truth->direction_count; ++d) {
+    compressed_block(block, modes, work->weights + d * modes, is);
+    if (truth->fields != NULL) {
+      memcpy(should, truth->fields + d * work->compression->vertex_count + begin,
+             block->count * sizeof *should);
+    } else {
+      true_block(block, truth->rank, truth->functions + d * truth->rank, should);
+    }
+    for (size_t i = 0; i < block->count; ++i) {
+      const double field = should[i] * block->length[i];
+      sums->field2 += field * field;
+    }
+    miss_block(is, should, block->length, 1.0, 1.0, miss);
+    supine_tally_add(&sums->error, block->count, miss);
+    if (work->scales != NULL) {
+      miss_block(is, should, block->length, work->scales[2 * d + 1], work->scales[2 * d], miss);
+      supine_tally_add(&sums->error_mm, block->count, miss);
+    }
+  }
+}
+
+static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
+  const accuracy_work *work = context;
+  turned_block *block = &work->blocks[thread];
+  for (size_t first = begin; first < end; first += BLOCK) {
+    turn_block(work, first, end - first < BLOCK ? end - first : BLOCK, block);
+    compare_block(work, &work->tallies[thread], first, block);
+  }
+}
+
+/* Breath scales at which both sides gain `volume`; false where some direction does not reach it. */
+static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
+                        const double *weights, double volume, double *scales) {
+  for (size_t d = 0; d < truth->direction_count; ++d) {
+    double cubic[3];
+    supine_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
+    if (supine_volume_scale(truth->cubic + 3 * d, volume, &scales[2 * d], NULL) != SUPINE_OK ||
+        supine_volume_scale(cubic, volume, &scales[2 * d + 1], NULL) != SUPINE_OK) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Weights of the modes at every direction: [D, K] = Y [D, P] modes^T. */
+static supine_status find_weights(const supine_truth *truth, const supine_compression *compression,
+                                  double *weights) {
+  double *y = malloc(supine_sh_count(compression->band) * sizeof *y);
+  if (y == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_status status = SUPINE_OK;
+  for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
+    status = supine_sh_evaluate(compression->band, truth->directions + 3 * d, y);
+    if (status == SUPINE_OK) {
+      supine_compression_weights(compression, y, weights + d * compression->mode_count);
+    }
+  }
+  free(y);
+  return status;
+}
+
+supine_status supine_accuracy_measure(const supine_truth *truth,
+                                      const supine_compression *compression,
+                                      const double *directions, const supine_volume_forms *forms,
+                                      double volume, supine_accuracy *accuracy,
+                                      supine_error *error) {
+  const size_t count = truth->direction_count;
+  const size_t n = compression->vertex_count;
+  const size_t threads = supine_thread_count();
+  const bool closed = forms != NULL && truth->cubic != NULL;
+  double *weights = malloc(count * compression->mode_count * sizeof *weights);
+  double *scales = malloc(2 * count * sizeof *scales);
+  tally *tallies = calloc(threads, sizeof *tallies);
+  turned_block *blocks = calloc(threads, sizeof *blocks);
+  supine_accuracy made = {.direction_count = count};
+  supine_status status = SUPINE_OK;
+  if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
+    goto cleanup;
+  }
+  status = find_weights(truth, compression, weights);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "held-out directions: %s", supine_status_string(status));
+    goto cleanup;
+  }
+  if (closed) {
+    made.volume = volume;
+    for (int i = 0; !find_scales(truth, forms, weights, made.volume, scales); ++i) {
+      if (i == VOLUME_HALVINGS) {
+        status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                  "the lungs do not reach even %g mL before the surface folds",
+                                  made.volume);
+        goto cleanup;
+      }
+      made.volume *= 0.5;
+    }
+  }
+  accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
+                        tallies, blocks};
+  supine_parallel_for(n, BLOCK, threads, compare_range, &work);
+  tally *all = &tallies[0];
+  for (size_t t = 1; t < threads; ++t) {
+    all->field2 += tallies[t].field2;
+    supine_tally_merge(&all->error, &tallies[t].error);
+    supine_tally_merge(&all->error_mm, &tallies[t].error_mm);
+  }
+  const double samples = (double)n * (double)count;
+  const double field = sqrt(all->field2 / samples);
+  made.relative_rms = sqrt(all->error.square_sum / samples) / field;
+  made.relative_p95 = supine_tally_percentile(&all->error, 0.95) / field;
+  made.relative_max = all->error.largest / field;
+  made.rms_mm = sqrt(all->error_mm.square_sum / samples);
+  made.p95_mm = supine_tally_percentile(&all->error_mm, 0.95);
+  made.max_mm = all->error_mm.largest;
+  *accuracy = made;
+cleanup:
+  free(weights);
+  free(scales);
+  free(tallies);
+  free(blocks);
+  return status;
+}

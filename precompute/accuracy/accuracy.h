@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * How far a compressed field is from the full solve, on directions that no grid used; and how much
+ * of the surface the field turns over. */
+#ifndef SUPINE_ACCURACY_H
+#define SUPINE_ACCURACY_H
+
+#include "precompute/projection/projection.h"
+#include "precompute/physics/volume_forms.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Errors of displacement over all vertices and held-out directions. */
+typedef struct supine_accuracy {
+  size_t direction_count;
+  /** Of the field at one breath scale, relative to the RMS displacement. */
+  double relative_rms, relative_p95, relative_max;
+  /** Where both sides breathe exactly this volume, mL; 0: the surface is open, and the next three
+   * too. */
+  double volume;
+  double rms_mm, p95_mm, max_mm;
+} supine_accuracy;
+
+/** What the field is compared with: the full solve at some directions. */
+typedef struct supine_truth {
+  size_t direction_count;
+  const double *directions; /**< [D, 3] */
+  const double *fields;     /**< [D, N] F of the full solve; NULL: columns x functions */
+  size_t rank;
+  const double *columns;   /**< [N, rank] */
+  const double *functions; /**< [D, rank] */
+  const double *cubic;     /**< [D, 3] volume against breath scale, mL; NULL: open surface */
+} supine_truth;
+
+/** Spreads `count` directions [count, 3] evenly on the sphere along a spiral of golden angles; none
+ * is a node of a product grid. */
+void supine_held_out_directions(size_t count, double *directions);
+
+/** Measures. The 95th percentiles come from a histogram whose bins are 0.4 % wide.
+ * @param directions  [N, 3] d
+ * @param forms       of the compression's coefficients; NULL: open surface
+ * @param volume      mL to compare at, as 500; halved until every direction reaches it
+ * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (no volume is reached) */
+supine_status supine_accuracy_measure(const supine_truth *truth,
+                                      const supine_compression *compression,
+                                      const double *directions, const supine_volume_forms *forms,
+                                      double volume, supine_accuracy *accuracy,
+                                      supine_error *error);
+
+/** Share, 0 to 1, of the triangles whose normal a breath of `volume` mL turns by more than a right
+ * angle: the largest of the six postures with gravity along an axis that reach the volume. Looks at
+ * up to 50,000 triangles, evenly taken. Where it is more than a few in a thousand, the surface
+ * looks torn: neighbours move apart by more than lies between them.
+ * @param directions  [N, 3] d
+ * @param forms       of the compression's coefficients: the surface is closed
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_turned_over(const supine_lungs *lungs, const double *directions,
+                                 const supine_compression *compression,
+                                 const supine_volume_forms *forms, double volume, double *share);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The lungs of one model: surfaces joined, told left from right, and measured once. */
+#ifndef SUPINE_LUNGS_H
+#define SUPINE_LUNGS_H
+
+#include "mesh/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** One or two lungs as a single surface whose vertices and triangles are grouped by lung, in the
+ * order of the input within each. Where both lungs are there, the left is lung 0. */
+typedef struct supine_lungs {
+  supine_mesh mesh;
+  supine_topology topology;
+  size_t lung_count;        /**< 1 or 2 */
+  size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
+  size_t triangle_begin[3]; /**< likewise its triangles */
+  int side[2];              /**< +1 left, -1 right */
+  double minimum[3];        /**< bounding box over all lungs, mm */
+  double maximum[3];
+  double midline; /**< x of the sagittal plane that X is measured from, mm */
+  /* As made: healthy, and the paper's transfer. See disease.h and supine_lungs_network. */
+  double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
+  double *lesions; /**< [N] factors on the stiffness, or NULL: 1 everywhere */
+  double reach;    /**< spreading length, mm; 0: the paper's, a fixed number of links */
+} supine_lungs;
+
+/** Joins surfaces into a model.
+ *
+ * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
+ * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
+ * and the face of the box nearest x = 0 for one.
+ *
+ * @param meshes   [count] left as they are
+ * @param midline  mm, or NULL to find it; given, it alone decides who is left and who is right
+ * @param lungs    written on success; release with supine_lungs_free
+ * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach
+ * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
+                                  supine_lungs *lungs, supine_error *error);
+
+/** Frees the arrays; a zeroed struct is legal. */
+void supine_lungs_free(supine_lungs *lungs);
+
+/** "left" or "right". */
+const char *supine_lungs_name(const supine_lungs *lungs, size_t lung);
+
+/** The box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the back to
+ * the front, Z from the apex to the base. */
+void supine_lungs_box_coordinates(const supine_lungs *lungs, size_t vertex, double box[3]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

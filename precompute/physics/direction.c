@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The direction of displacement (15)-(17), and two plain alternatives. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "precompute/physics/force.h"
+
+supine_direction_law supine_direction_law_default(void) {
+  return (supine_direction_law){SUPINE_DIRECTION_BOX, {2.0, 1.5, 1.5, 1.0, 16.0, 1.4}, NULL};
+}
+
+static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
+  double box[3];
+  supine_lungs_box_coordinates(lungs, vertex, box);
+  const size_t lung = vertex >= lungs->lung_begin[1] ? 1 : 0;
+  d[0] = lungs->side[lung] * c[0] * pow(box[0], c[1]); /* (15) */
+  d[1] = -c[2] * pow(box[1], c[3]);                    /* (16) */
+  d[2] = -c[4] * pow(box[2], c[5]);                    /* (17) */
+}
+
+/* Sums of the triangles' area vectors at each vertex, not yet of unit length. */
+static void vertex_normals(const supine_mesh *mesh, double *normals) {
+  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+    normals[i] = 0.0;
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    const double *p = mesh->vertices + 3 * (size_t)corner[0];
+    const double *q = mesh->vertices + 3 * (size_t)corner[1];
+    const double *r = mesh->vertices + 3 * (size_t)corner[2];
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t a = (k + 1) % 3;
+      const size_t b = (k + 2) % 3;
+      const double area = (q[a] - p[a]) * (r[b] - p[b]) - (q[b] - p[b]) * (r[a] - p[a]);
+      for (size_t v = 0; v < 3; ++v) {
+        normals[3 * (size_t)corner[v] + k] += area;
+      }
+    }
+  }
+}
+
+static void radial_directions(const supine_lungs *lungs, double *d) {
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const size_t begin = lungs->lung_begin[lung];
+    const size_t end = lungs->lung_begin[lung + 1];
+    double centre[3] = {0.0, 0.0, 0.0};
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t k = 0; k < 3; ++k) {
+        centre[k] += lungs->mesh.vertices[3 * i + k] / (double)(end - begin);
+      }
+    }
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t k = 0; k < 3; ++k) {
+        d[3 * i + k] = lungs->mesh.vertices[3 * i + k] - centre[k];
+      }
+    }
+  }
+}
+
+static void normalise(size_t count, double *d) {
+  for (size_t i = 0; i < count; ++i) {
+    const double length =
+        sqrt(d[3 * i] * d[3 * i] + d[3 * i + 1] * d[3 * i + 1] + d[3 * i + 2] * d[3 * i + 2]);
+    for (size_t k = 0; k < 3 && length > 0.0; ++k) {
+      d[3 * i + k] /= length;
+    }
+  }
+}
+
+supine_status supine_directions(const supine_lungs *lungs, const supine_direction_law *law,
+                                double *directions, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  for (size_t k = 0; k < 6; ++k) {
+    if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s",
+                              k + 1, law->c[k],
+                              k % 2 == 1 ? "exponents must be positive" : "it must be finite");
+    }
+  }
+  switch (law->model) {
+  case SUPINE_DIRECTION_BOX:
+    for (size_t i = 0; i < n; ++i) {
+      box_direction(lungs, law->c, i, directions + 3 * i);
+    }
+    break;
+  case SUPINE_DIRECTION_NORMAL:
+    vertex_normals(&lungs->mesh, directions);
+    normalise(n, directions);
+    break;
+  case SUPINE_DIRECTION_RADIAL:
+    radial_directions(lungs, directions);
+    normalise(n, directions);
+    break;
+  case SUPINE_DIRECTION_VECTORS:
+    if (law->vectors == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no direction vectors");
+    }
+    for (size_t i = 0; i < 3 * n; ++i) {
+      directions[i] = law->vectors[i];
+    }
+    break;
+  default:
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no direction model %d", (int)law->model);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    if (directions[i] != 0.0) {
+      return SUPINE_OK;
+    }
+  }
+  return supine_error_set(error, SUPINE_ERROR_MESH,
+                          "no vertex would move: every direction is zero");
+}

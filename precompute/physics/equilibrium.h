@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The physics of [Santhanam2008] III-E: mass nodes at the vertices, spring nodes at the midpoints
+ * of the edges, and the equilibrium of what they pass to each other.
+ *
+ * With S = 1/E on masses and S = E on springs, D the distance (at least 1 mm; 1 to itself) and
+ * Z_j = sum over l in clique(j) of S_l / D(l, j):
+ *
+ *     Te[j->i] = S_i / (D(j, i) Z_j)                                        (8), columns sum to 1:
+ * (3) x = f + A x,  A[i, j] = Te[j->i] for i != j;    F_i = Te[i->i] x_i     (5), (12)-(14)
+ *
+ * With y = x / Z the springs eliminate exactly, and one unknown a vertex is left:
+ *
+ *     (Z_i / S_i - sum over edges ij of k_ij) y_i - sum over edges ij of k_ij y_j = f_i / S_i
+ *     k_ij = S_e / (D_e^2 Z_e) = E_e / (D_e (D_e E_e + S_i + S_j)),  F_i = S_i y_i
+ *
+ * a symmetric positive definite system of small condition number, solved by conjugate gradients
+ * with Jacobi scaling.
+ *
+ * The transfer spreads over links, and the share that a mass catches falls with its number of
+ * links, so results drift as links shrink. A reach R in mm takes the drift away. It is the same
+ * transfer with other link weights: a mass's weight to itself, above 1 / D(j, j) = 1, is its area
+ * over the mean area, own_j; a spring's is 0; and 1 / D(j, l) is
+ *
+ *     w = 4 (R^2 / mean area) a / h^2      a: a third of the link's triangles' area, h its length
+ *
+ * Columns still sum to 1, the matrix stays symmetric positive definite, and for E = 1 it is a
+ * discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance decays as exp(-r / R)
+ * whatever the mesh. What balances is then own F: sum of own_i F_i = sum of own_i f_i.
+ *
+ * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
+ * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf. Technol.
+ * Biomed. 12(2), 2008. */
+#ifndef SUPINE_EQUILIBRIUM_H
+#define SUPINE_EQUILIBRIUM_H
+
+#include "precompute/lungs/lungs.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Most right-hand sides of one solve. */
+enum { SUPINE_RHS_MAX = 64 };
+
+/** The geometry of the nodes: who is linked to whom and how far. Read-only once made, so that any
+ * number of equilibria in any threads may share it. */
+typedef struct supine_network supine_network;
+
+/** Builds the network of a surface. Vertices are renumbered inside (breadth first) where the file's
+ * order is so scattered that it would cost time; every function here speaks the file's order.
+ * @param mesh      [N] vertices in mm
+ * @param topology  its edges
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_network_create(const supine_mesh *mesh, const supine_topology *topology,
+                                    supine_network **network);
+
+/** The network of lungs as they are, with their lesions and their reach: what solves are set up
+ * with. The number of steps of a solve grows as R over the links' length.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **network);
+void supine_network_destroy(supine_network *network);
+size_t supine_network_vertex_count(const supine_network *network);
+
+/** One stiffness on a network, with the space to solve for it. For one thread at a time. */
+typedef struct supine_equilibrium supine_equilibrium;
+
+/** @param network   must outlive the equilibrium
+ *  @param rhs_max   most right-hand sides of one solve, 1 to SUPINE_RHS_MAX
+ *  @param threads   threads of one solve; 0: all that supine_thread_count() names
+ *  @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+supine_status supine_equilibrium_create(const supine_network *network, size_t rhs_max,
+                                        size_t threads, supine_equilibrium **equilibrium);
+void supine_equilibrium_destroy(supine_equilibrium *equilibrium);
+
+/** Sets the stiffness and computes the matrix: one pass over the edges.
+ * @param stiffness  [N] E > 0, relative: scaled here to geometric mean 1; NULL: 1 everywhere
+ * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
+supine_status supine_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
+                                               const double *stiffness, supine_error *error);
+
+/** How a solve went. */
+typedef struct supine_solve_report {
+  size_t iterations;
+  double residual; /**< largest over the right-hand sides, relative to theirs */
+} supine_solve_report;
+
+/** The catch F for `count` applied forces.
+ * @param force      [N, count] f on the masses (nothing is applied to springs)
+ * @param tolerance  relative residual to stop at; 0: 1e-14
+ * @param warm       start from this equilibrium's previous solution (same count) instead of zero
+ * @param catch_     [N, count] F, written
+ * @param report     optional
+ * @retval SUPINE_ERROR_ARGUMENT   count out of range
+ * @retval SUPINE_ERROR_NUMERICAL  200 steps (20,000 with a reach) did not reach the tolerance */
+supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
+                                       const double *force, double tolerance, bool warm,
+                                       double *catch_, supine_solve_report *report,
+                                       supine_error *error);
+
+/** What the spring nodes caught in the last solve, [edge_count, count] in the topology's order:
+ * with the masses' catch it sums to the sum of f. 0 with a reach. */
+void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
+                                     const supine_topology *topology, double *catch_);
+
+/** Column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force on that
+ * vertex alone.
+ * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
+supine_status supine_transfer_column(supine_equilibrium *equilibrium, size_t vertex, double *column,
+                                     supine_error *error);
+
+/** The Pitcher/Catcher iteration as the paper writes it: whichever node holds most distributes
+ * what it holds over its clique, until no node holds more than `tolerance` times the largest f.
+ * The reference for supine_equilibrium_solve; slow, for small meshes.
+ *
+ * @param stiffness  [N] or NULL, as above
+ * @param force      [N]
+ * @param masses     [N] F of the masses, written
+ * @param springs    [edge_count] F of the springs, written; NULL: not wanted
+ * @param progress   called after every N distributions with their number and the sum still held
+ * relative to the sum of |f|; NULL: not wanted
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
+                                     const double *stiffness, const double *force, double tolerance,
+                                     double *masses, double *springs,
+                                     void (*progress)(void *context, size_t steps, double held),
+                                     void *context, supine_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The Pitcher/Catcher iteration, (5)-(14), as the paper writes it: the reference of the fast solve.
+ */
+#include <math.h>
+#include <stdlib.h>
+
+#include "precompute/physics/network.h"
+
+/* Nodes 0 to N - 1 are the masses, N + e the spring of edge e. A binary heap keeps the node that
+ * holds most on top. */
+typedef struct iteration {
+  size_t node_count;
+  size_t *clique_begin; /* neighbours of node j without j itself */
+  size_t *clique;
+  double *te;     /* Te[j->i] to each neighbour */
+  double *own;    /* Te[j->j] */
+  double *held;   /* the Pitcher, may be negative */
+  double *caught; /* the Catcher */
+  size_t *heap;   /* nodes, by falling |held| */
+  size_t *place;  /* where each node stands in the heap */
+} iteration;
+
+static void iteration_free(iteration *it) {
+  free(it->clique_begin);
+  free(it->clique);
+  free(it->te);
+  free(it->own);
+  free(it->held);
+  free(it->caught);
+  free(it->heap);
+  free(it->place);
+}
+
+static void heap_swap(iteration *it, size_t a, size_t b) {
+  const size_t node = it->heap[a];
+  it->heap[a] = it->heap[b];
+  it->heap[b] = node;
+  it->place[it->heap[a]] = a;
+  it->place[it->heap[b]] = b;
+}
+
+static double heap_key(const iteration *it, size_t at) {
+  return fabs(it->held[it->heap[at]]);
+}
+
+static void heap_up(iteration *it, size_t at) {
+  while (at > 0 && heap_key(it, at) > heap_key(it, (at - 1) / 2)) {
+    heap_swap(it, at, (at - 1) / 2);
+    at = (at - 1) / 2;
+  }
+}
+
+static void heap_down(iteration *it, size_t at) {
+  for (;;) {
+    size_t largest = at;
+    for (size_t child = 2 * at + 1; child <= 2 * at + 2 && child < it->node_count; ++child) {
+      if (heap_key(it, child) > heap_key(it, largest)) {
+        largest = child;
+      }
+    }
+    if (largest == at) {
+      return;
+    }
+    heap_swap(it, at, largest);
+    at = largest;
+  }
+}
+
+/* Cliques and local transfers Te, straight from (8). */
+static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
+                             const double *stiffness, iteration *it) {
+  const size_t n = mesh->vertex_count;
+  const size_t nodes = n + topology->edge_count;
+  *it = (iteration){.node_count = nodes};
+  it->clique_begin = calloc(nodes + 2, sizeof *it->clique_begin);
+  it->clique = malloc((4 * topology->edge_count + 1) * sizeof *it->clique);
+  it->te = malloc((4 * topology->edge_count + 1) * sizeof *it->te);
+  it->own = malloc(nodes * sizeof *it->own);
+  it->held = calloc(nodes, sizeof *it->held);
+  it->caught = calloc(nodes, sizeof *it->caught);
+  it->heap = calloc(nodes, sizeof *it->heap);
+  it->place = calloc(nodes, sizeof *it->place);
+  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->own == NULL ||
+      it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
+    return false;
+  }
+  size_t *begin = it->clique_begin + 1; /* one ahead, so that filling leaves the beginnings */
+  for (size_t e = 0; e < topology->edge_count; ++e) {
+    ++begin[topology->edges[2 * e] + 1];
+    ++begin[topology->edges[2 * e + 1] + 1];
+    begin[n + e + 1] += 2;
+  }
+  for (size_t j = 1; j <= nodes; ++j) {
+    begin[j] += begin[j - 1];
+  }
+  for (size_t e = 0; e < topology->edge_count; ++e) {
+    const uint32_t *edge = topology->edges + 2 * e;
+    const double d = supine_link_distance(mesh->vertices + 3 * (size_t)edge[0],
+                                          mesh->vertices + 3 * (size_t)edge[1]);
+    const double spring = 0.5 * (stiffness[edge[0]] + stiffness[edge[1]]);
+    for (size_t k = 0; k < 2; ++k) {
+      it->clique[begin[edge[k]]] = n + e;
+      it->te[begin[edge[k]]++] = spring / d;
+      it->clique[begin[n + e]] = edge[k];
+      it->te[begin[n + e]++] = 1.0 / stiffness[edge[k]] / d;
+    }
+  }
+  for (size_t j = 0; j < nodes; ++j) {
+    const uint32_t *edge = j < n ? NULL : topology->edges + 2 * (j - n);
+    const double s = j < n ? 1.0 / stiffness[j] : 0.5 * (stiffness[edge[0]] + stiffness[edge[1]]);
+    double z = s;
+    for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
+      z += it->te[c];
+    }
+    for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
+      it->te[c] /= z;
+    }
+    it->own[j] = s / z;
+  }
+  return true;
+}
+
+/* Node j gives away all that it holds, (5)-(7). */
+static void distribute(iteration *it, size_t j) {
+  const double held = it->held[j];
+  it->caught[j] += it->own[j] * held;
+  it->held[j] = 0.0;
+  heap_down(it, it->place[j]);
+  for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
+    const size_t i = it->clique[c];
+    const double before = fabs(it->held[i]);
+    it->held[i] += it->te[c] * held;
+    if (fabs(it->held[i]) > before) {
+      heap_up(it, it->place[i]);
+    } else {
+      heap_down(it, it->place[i]);
+    }
+  }
+}
+
+supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
+                                     const double *stiffness, const double *force, double tolerance,
+                                     double *masses, double *springs,
+                                     void (*progress)(void *context, size_t steps, double held),
+                                     void *context, supine_error *error) {
+  const size_t n = mesh->vertex_count;
+  if (n == 0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices");
+  }
+  iteration it = {0};
+  supine_status status = SUPINE_OK;
+  double *scaled = malloc(n * sizeof *scaled);
+  if (scaled == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes", n);
+  }
+  if (!(tolerance > 0.0)) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the tolerance must be positive");
+    goto cleanup;
+  }
+  status = supine_stiffness_normalise(n, stiffness, scaled, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  if (!iteration_create(mesh, topology, scaled, &it)) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes",
+                              n + topology->edge_count);
+    goto cleanup;
+  }
+  double largest = 0.0;
+  double sum = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    it.held[i] = force[i];
+    largest = fmax(largest, fabs(force[i]));
+    sum += fabs(force[i]);
+  }
+  for (size_t j = 0; j < it.node_count; ++j) {
+    it.heap[j] = it.place[j] = j;
+  }
+  for (size_t at = it.node_count; at-- > 0;) {
+    heap_down(&it, at);
+  }
+  for (size_t steps = 0; heap_key(&it, 0) > tolerance * largest; ++steps) {
+    if (progress != NULL && steps % n == 0) {
+      double held = 0.0;
+      for (size_t j = 0; j < it.node_count; ++j) {
+        held += fabs(it.held[j]);
+      }
+      progress(context, steps, held / sum);
+    }
+    distribute(&it, it.heap[0]);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    masses[i] = it.caught[i];
+  }
+  for (size_t e = 0; springs != NULL && e < topology->edge_count; ++e) {
+    springs[e] = it.caught[n + e];
+  }
+cleanup:
+  iteration_free(&it);
+  free(scaled);
+  return status;
+}

@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Links whose spreading has a length in mm: what supine_lungs_network makes of the reach. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "precompute/physics/network.h"
+
+/* Slot of the link from internal vertex i to j. */
+static size_t find_link(const supine_network *network, size_t i, size_t j) {
+  size_t s = network->row_begin[i];
+  while (network->neighbour[s] != j) {
+    ++s;
+  }
+  return s;
+}
+
+static double squared_length(const supine_mesh *mesh, uint32_t a, uint32_t b) {
+  double sum = 0.0;
+  for (size_t k = 0; k < 3; ++k) {
+    const double step = mesh->vertices[3 * (size_t)a + k] - mesh->vertices[3 * (size_t)b + k];
+    sum += step * step;
+  }
+  return sum;
+}
+
+static double triangle_area(const supine_mesh *mesh, size_t t) {
+  const double *p[3];
+  for (size_t k = 0; k < 3; ++k) {
+    p[k] = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k];
+  }
+  double square = 0.0;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t a = (k + 1) % 3;
+    const size_t b = (k + 2) % 3;
+    const double x =
+        (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) - (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
+    square += x * x;
+  }
+  return 0.5 * sqrt(square);
+}
+
+/* With springs that catch nothing and E = 1 the reduced system is (equilibrium.h)
+ *
+ *     own_i F_i + sum over links of (w / 2) (F_i - F_j) = own_i f_i
+ *
+ * which is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where own_i is the vertex's
+ * area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that make
+ * sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third of
+ * its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions alike;
+ * unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within a
+ * tenth or so. It is kept as 1 / w in place of
+ * the distance. */
+supine_status supine_network_set_reach(supine_network *network, const supine_mesh *mesh,
+                                       const supine_topology *topology, double reach) {
+  const size_t n = network->vertex_count;
+  double *area = malloc(n * sizeof *area);
+  double *link = calloc(network->row_begin[n] + 1, sizeof *link);
+  network->own = malloc(n * sizeof *network->own);
+  if (area == NULL || link == NULL || network->own == NULL) {
+    free(area);
+    free(link);
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_mesh_vertex_area(mesh, area);
+  double mean = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    mean += area[i] / (double)n;
+  }
+  /* A vertex or link of no area must still hold on to something. */
+  const double least = 1e-6 * mean;
+  for (size_t i = 0; i < n; ++i) {
+    const double own = area[network->order[i]];
+    network->own[i] = (own > least ? own : least) / mean;
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    const double third = triangle_area(mesh, t) / 3.0;
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t i = network->rank[corner[k]];
+      const size_t j = network->rank[corner[(k + 1) % 3]];
+      link[find_link(network, i, j)] += third;
+      link[find_link(network, j, i)] += third;
+    }
+  }
+  for (size_t e = 0; e < topology->edge_count; ++e) {
+    const uint32_t *edge = topology->edges + 2 * e;
+    const size_t i = network->rank[edge[0]];
+    const size_t j = network->rank[edge[1]];
+    const size_t s = find_link(network, i, j);
+    const double a = link[s] > least ? link[s] : least;
+    const double h2 = squared_length(mesh, edge[0], edge[1]);
+    const double weight = 2.0 * reach * reach / mean * 2.0 * a / (h2 > least ? h2 : least);
+    network->distance[s] = network->distance[find_link(network, j, i)] = 1.0 / weight;
+  }
+  network->spring_own = 0.0;
+  network->reach = reach;
+  free(area);
+  free(link);
+  return SUPINE_OK;
+}
+
+supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **network) {
+  supine_network *made = NULL;
+  *network = NULL;
+  supine_status status = supine_network_create(&lungs->mesh, &lungs->topology, &made);
+  if (status == SUPINE_OK && lungs->reach > 0.0) {
+    status = supine_network_set_reach(made, &lungs->mesh, &lungs->topology, lungs->reach);
+  }
+  if (status == SUPINE_OK && lungs->lesions != NULL) {
+    made->lesions = malloc(made->vertex_count * sizeof *made->lesions);
+    status = made->lesions == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+    for (size_t i = 0; i < made->vertex_count && status == SUPINE_OK; ++i) {
+      made->lesions[i] = lungs->lesions[i];
+    }
+  }
+  if (status != SUPINE_OK) {
+    supine_network_destroy(made);
+    return status;
+  }
+  *network = made;
+  return SUPINE_OK;
+}

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The full physics for one orientation: the reference that every basis is measured against. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "precompute/tissue/disease.h"
+#include "precompute/physics/solve.h"
+#include "precompute/physics/volume_forms.h"
+
+supine_model supine_model_default(void) {
+  return (supine_model){supine_force_law_default(), supine_direction_law_default(), NULL};
+}
+
+void supine_solution_free(supine_solution *solution) {
+  free(solution->catch_);
+  free(solution->directions);
+  *solution = (supine_solution){0};
+}
+
+supine_status supine_solve(const supine_lungs *lungs, const supine_model *model, const double g[3],
+                           supine_solution *solution, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  supine_network *network = NULL;
+  supine_equilibrium *equilibrium = NULL;
+  supine_volume_forms forms = {0};
+  supine_solution made = {.vertex_count = n, .has_volume = lungs->topology.closed};
+  double minimum;
+  double maximum;
+  double *work = malloc(n * sizeof *work);
+  made.catch_ = malloc(n * sizeof *made.catch_);
+  made.directions = malloc(3 * n * sizeof *made.directions);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
+      supine_lungs_network(lungs, &network) != SUPINE_OK ||
+      supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
+      supine_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
+    goto cleanup;
+  }
+  status = supine_directions(lungs, &model->direction, made.directions, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  supine_force_stiffness(lungs, &model->force, model->stiffness, g, minimum, maximum, work);
+  status = supine_equilibrium_set_stiffness(equilibrium, work, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  supine_force(lungs, &model->force, g, minimum, maximum, work);
+  status =
+      supine_equilibrium_solve(equilibrium, 1, work, 0.0, false, made.catch_, &made.report, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  if (made.has_volume) {
+    const double one = 1.0;
+    status = supine_volume_forms_create(lungs, made.directions, made.catch_, 1, &forms, error);
+    if (status != SUPINE_OK) {
+      goto cleanup;
+    }
+    supine_volume_forms_contract(&forms, &one, made.cubic);
+  }
+  supine_lungs_rest_directions(lungs, made.directions);
+  *solution = made;
+  made = (supine_solution){0};
+cleanup:
+  supine_volume_forms_free(&forms);
+  supine_solution_free(&made);
+  free(work);
+  supine_equilibrium_destroy(equilibrium);
+  supine_network_destroy(network);
+  return status;
+}
+
+double supine_solution_largest(const supine_solution *solution) {
+  double largest = 0.0;
+  for (size_t i = 0; i < solution->vertex_count; ++i) {
+    const double *d = solution->directions + 3 * i;
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    largest = fmax(largest, fabs(solution->catch_[i]) * length);
+  }
+  return largest;
+}
+
+void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
+                           double *positions) {
+  for (size_t i = 0; i < solution->vertex_count; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      positions[3 * i + k] =
+          rest->vertices[3 * i + k] + scale * solution->catch_[i] * solution->directions[3 * i + k];
+    }
+  }
+}

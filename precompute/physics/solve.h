@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The full physics for one orientation: the reference that every basis is measured against. */
+#ifndef SUPINE_SOLVE_H
+#define SUPINE_SOLVE_H
+
+#include "precompute/physics/equilibrium.h"
+#include "precompute/physics/model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Full physics for one orientation, no harmonics: u_i = s F_i d_i. */
+typedef struct supine_solution {
+  size_t vertex_count;
+  double *catch_;     /**< [N] F */
+  double *directions; /**< [N, 3] d, mm */
+  bool has_volume;    /**< the surface is closed, and cubic is set */
+  double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
+  supine_solve_report report;
+} supine_solution;
+
+/** Solves for gravity along the unit vector `g`.
+ * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+supine_status supine_solve(const supine_lungs *lungs, const supine_model *model, const double g[3],
+                           supine_solution *solution, supine_error *error);
+void supine_solution_free(supine_solution *solution);
+
+/** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
+double supine_solution_largest(const supine_solution *solution);
+
+/** Positions p + s F d, [N, 3], mm, from the surface at rest (disease.h: that of healthy lungs is
+ * their mesh). */
+void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
+                           double *positions);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

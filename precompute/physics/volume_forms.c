@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Linear, quadratic and cubic forms of the volume that closed lungs gain. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/parallel.h"
+#include "precompute/projection/projection.h"
+#include <supine/volume.h>
+#include "precompute/physics/volume_forms.h"
+
+#include "precompute/physics/network.h"
+
+static const double millilitres = 1e-3; /* in a cubic millimetre */
+
+void supine_volume_forms_free(supine_volume_forms *forms) {
+  free(forms->linear);
+  free(forms->quadratic);
+  free(forms->cubic);
+  *forms = (supine_volume_forms){0};
+}
+
+static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_forms *forms) {
+  *forms = (supine_volume_forms){.lung_count = lungs, .column_count = count};
+  forms->linear = calloc(lungs * count, sizeof(double));
+  forms->quadratic = calloc(lungs * count * count, sizeof(double));
+  forms->cubic = calloc(lungs * count * count * count, sizeof(double));
+  if (forms->linear == NULL || forms->quadratic == NULL || forms->cubic == NULL) {
+    supine_volume_forms_free(forms);
+    return SUPINE_ERROR_MEMORY;
+  }
+  return SUPINE_OK;
+}
+
+static double determinant(const double *a, const double *b, const double *c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+typedef struct forms_work {
+  const supine_lungs *lungs;
+  const double *directions, *columns;
+  size_t count, first; /* columns; first triangle of this lung */
+  double centre[3];
+  double *linear, *quadratic, *cubic; /* one set a thread */
+} forms_work;
+
+/* Adds a range of one lung's triangles: (1/6) det(p0 + F0 d0, p1 + F1 d1, p2 + F2 d2), by powers of
+ * F. */
+SUPINE_CLONES static void forms_range(void *context, size_t begin, size_t end, size_t thread) {
+  const forms_work *work = context;
+  const size_t count = work->count;
+  double *linear = work->linear + thread * count;
+  double *quadratic = work->quadratic + thread * count * count;
+  double *cubic = work->cubic + thread * count * count * count;
+  for (size_t t = begin; t < end; ++t) {
+    const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
+    double p[3][3];
+    const double *d[3];
+    const double *c[3];
+    for (size_t v = 0; v < 3; ++v) {
+      for (size_t k = 0; k < 3; ++k) {
+        p[v][k] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + k] - work->centre[k];
+      }
+      d[v] = work->directions + 3 * (size_t)corner[v];
+      c[v] = work->columns + count * (size_t)corner[v];
+    }
+    const double l0 = determinant(d[0], p[1], p[2]);
+    const double l1 = determinant(p[0], d[1], p[2]);
+    const double l2 = determinant(p[0], p[1], d[2]);
+    const double q01 = determinant(d[0], d[1], p[2]);
+    const double q02 = determinant(d[0], p[1], d[2]);
+    const double q12 = determinant(p[0], d[1], d[2]);
+    const double q012 = determinant(d[0], d[1], d[2]);
+    for (size_t k = 0; k < count; ++k) {
+      linear[k] += l0 * c[0][k] + l1 * c[1][k] + l2 * c[2][k];
+      const double first = q01 * c[0][k];
+      const double second = q02 * c[0][k] + q12 * c[1][k];
+      for (size_t l = 0; l < count; ++l) {
+        quadratic[k * count + l] += first * c[1][l] + second * c[2][l];
+        const double third = q012 * c[0][k] * c[1][l];
+        double *row = cubic + (k * count + l) * count;
+        for (size_t m = 0; m < count; ++m) {
+          row[m] += third * c[2][m];
+        }
+      }
+    }
+  }
+}
+
+/* The same for columns of three components: a determinant for each choice of columns. */
+static void forms_range_vector(void *context, size_t begin, size_t end, size_t thread) {
+  const forms_work *work = context;
+  const size_t count = work->count;
+  double *linear = work->linear + thread * count;
+  double *quadratic = work->quadratic + thread * count * count;
+  double *cubic = work->cubic + thread * count * count * count;
+  for (size_t t = begin; t < end; ++t) {
+    const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
+    double p[3][3];
+    double c[3][SUPINE_MODES_MADE_MAX][3]; /* columns at the corners */
+    for (size_t v = 0; v < 3; ++v) {
+      for (size_t a = 0; a < 3; ++a) {
+        p[v][a] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + a] - work->centre[a];
+        for (size_t k = 0; k < count; ++k) {
+          c[v][k][a] = work->columns[(3 * (size_t)corner[v] + a) * count + k];
+        }
+      }
+    }
+    for (size_t k = 0; k < count; ++k) {
+      linear[k] += determinant(c[0][k], p[1], p[2]) + determinant(p[0], c[1][k], p[2]) +
+                   determinant(p[0], p[1], c[2][k]);
+      for (size_t l = 0; l < count; ++l) {
+        quadratic[k * count + l] += determinant(c[0][k], c[1][l], p[2]) +
+                                    determinant(c[0][k], p[1], c[2][l]) +
+                                    determinant(p[0], c[1][k], c[2][l]);
+        const double *a = c[0][k];
+        const double *b = c[1][l];
+        const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                                 a[0] * b[1] - a[1] * b[0]};
+        double *row = cubic + (k * count + l) * count;
+        for (size_t m = 0; m < count; ++m) {
+          row[m] += cross[0] * c[2][m][0] + cross[1] * c[2][m][1] + cross[2] * c[2][m][2];
+        }
+      }
+    }
+  }
+}
+
+/* Sums the threads' parts and makes the forms symmetric. */
+static void forms_collect(const forms_work *work, size_t threads, size_t lung,
+                          supine_volume_forms *forms) {
+  const size_t n = work->count;
+  const double unit = millilitres / 6.0 * work->lungs->share[lung];
+  double *linear = forms->linear + lung * n;
+  double *quadratic = forms->quadratic + lung * n * n;
+  double *cubic = forms->cubic + lung * n * n * n;
+  for (size_t t = 0; t < threads; ++t) {
+    const double *l = work->linear + t * n;
+    const double *q = work->quadratic + t * n * n;
+    const double *c = work->cubic + t * n * n * n;
+    for (size_t i = 0; i < n; ++i) {
+      linear[i] += unit * l[i];
+      for (size_t j = 0; j < n; ++j) {
+        quadratic[i * n + j] += unit / 2.0 * (q[i * n + j] + q[j * n + i]);
+        for (size_t k = 0; k < n; ++k) {
+          cubic[(i * n + j) * n + k] +=
+              unit / 6.0 *
+              (c[(i * n + j) * n + k] + c[(i * n + k) * n + j] + c[(j * n + i) * n + k] +
+               c[(j * n + k) * n + i] + c[(k * n + i) * n + j] + c[(k * n + j) * n + i]);
+        }
+      }
+    }
+  }
+}
+
+static supine_status create(const supine_lungs *lungs, const double *directions,
+                            const double *columns, size_t count, supine_volume_forms *forms,
+                            supine_error *error) {
+  const size_t threads = supine_thread_count();
+  forms_work work = {.lungs = lungs, .directions = directions, .columns = columns, .count = count};
+  supine_volume_forms made = {0};
+  supine_status status = SUPINE_OK;
+  if (!lungs->topology.closed) {
+    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                            "the surface is not closed: %zu boundary, %zu non-manifold and %zu "
+                            "inconsistently oriented edges",
+                            lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
+                            lungs->topology.inconsistent_edges);
+  }
+  status = forms_allocate(lungs->lung_count, count, &made);
+  work.linear = malloc(threads * count * sizeof(double));
+  work.quadratic = malloc(threads * count * count * sizeof(double));
+  work.cubic = malloc(threads * count * count * count * sizeof(double));
+  if (status != SUPINE_OK || work.linear == NULL || work.quadratic == NULL || work.cubic == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
+                              "no memory for volume forms of %zu columns", count);
+    goto cleanup;
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    work.centre[k] = 0.5 * (lungs->minimum[k] + lungs->maximum[k]);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    memset(work.linear, 0, threads * count * sizeof(double));
+    memset(work.quadratic, 0, threads * count * count * sizeof(double));
+    memset(work.cubic, 0, threads * count * count * count * sizeof(double));
+    work.first = lungs->triangle_begin[lung];
+    supine_parallel_for(lungs->triangle_begin[lung + 1] - work.first, 1024, threads,
+                        directions != NULL ? forms_range : forms_range_vector, &work);
+    forms_collect(&work, threads, lung, &made);
+  }
+  *forms = made;
+  made = (supine_volume_forms){0};
+cleanup:
+  supine_volume_forms_free(&made);
+  free(work.linear);
+  free(work.quadratic);
+  free(work.cubic);
+  return status;
+}
+
+supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
+                                         const double *columns, size_t count,
+                                         supine_volume_forms *forms, supine_error *error) {
+  return create(lungs, directions, columns, count, forms, error);
+}
+
+supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
+                                                size_t count, supine_volume_forms *forms,
+                                                supine_error *error) {
+  return create(lungs, NULL, columns, count, forms, error);
+}
+
+/* out[a, j, b] = sum over i of in[a, i, b] mix[i, j]. */
+static void mix_middle(const double *in, size_t outer, size_t n, size_t inner, const double *mix,
+                       size_t count, double *out) {
+  memset(out, 0, outer * count * inner * sizeof *out);
+  for (size_t a = 0; a < outer; ++a) {
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = 0; j < count; ++j) {
+        for (size_t b = 0; b < inner; ++b) {
+          out[(a * count + j) * inner + b] += in[(a * n + i) * inner + b] * mix[i * count + j];
+        }
+      }
+    }
+  }
+}
+
+supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
+                                      size_t count, supine_volume_forms *mixed) {
+  const size_t g = forms->lung_count;
+  const size_t n = forms->column_count;
+  const size_t larger = n > count ? n : count;
+  double *first = malloc(g * larger * larger * larger * sizeof *first);
+  double *second = malloc(g * larger * larger * larger * sizeof *second);
+  supine_volume_forms made = {0};
+  if (first == NULL || second == NULL || forms_allocate(g, count, &made) != SUPINE_OK) {
+    free(first);
+    free(second);
+    return SUPINE_ERROR_MEMORY;
+  }
+  mix_middle(forms->linear, g, n, 1, mix, count, made.linear);
+  mix_middle(forms->quadratic, g, n, n, mix, count, first);
+  mix_middle(first, g * count, n, 1, mix, count, made.quadratic);
+  mix_middle(forms->cubic, g, n, n * n, mix, count, first);
+  mix_middle(first, g * count, n, n, mix, count, second);
+  mix_middle(second, g * count * count, n, 1, mix, count, made.cubic);
+  free(first);
+  free(second);
+  *mixed = made;
+  return SUPINE_OK;
+}
+
+void supine_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
+                                  double cubic[3]) {
+  const size_t n = forms->column_count;
+  cubic[0] = cubic[1] = cubic[2] = 0.0;
+  for (size_t lung = 0; lung < forms->lung_count; ++lung) {
+    supine_volume_add(n, forms->linear + lung * n, forms->quadratic + lung * n * n,
+                      forms->cubic + lung * n * n * n, weights, cubic);
+  }
+}

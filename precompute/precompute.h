@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Offline basis generation: lungs in, basis file out. */
+#ifndef SUPINE_PRECOMPUTE_H
+#define SUPINE_PRECOMPUTE_H
+
+#include "precompute/accuracy/accuracy.h"
+#include "precompute/fields/fields.h"
+#include "precompute/physics/model.h"
+#include "precompute/projection/projection.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** How the field over orientation is found. */
+typedef enum supine_route {
+  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it */
+  SUPINE_ROUTE_LINEAR,   /**< needs soften = 0 */
+  SUPINE_ROUTE_SAMPLED
+} supine_route;
+
+/** What a basis is made of. */
+typedef struct supine_precompute_options {
+  supine_model model;
+  supine_route route;
+  size_t band;         /**< L */
+  size_t modes;        /**< most modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;     /**< directions that the error is measured on; 0: 100 to 1000 */
+  const char *made_by; /**< how it was made, for the file's metadata; optional */
+  supine_progress_function *progress; /**< optional */
+  void *progress_context;
+} supine_precompute_options;
+
+/** What came of it. */
+typedef struct supine_precompute_report {
+  supine_route route;
+  size_t mode_count;
+  size_t solve_count; /**< right-hand sides or directions solved for the projection */
+  size_t iterations;
+  double residual;
+  supine_accuracy accuracy;
+  /** At accuracy.volume, see supine_turned_over; 0 where the surface is open. */
+  double turned_over;
+} supine_precompute_report;
+
+/** Projects, compresses, measures, and writes the basis file, whole or not at all.
+ * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_INTERRUPTED, and those of the steps */
+supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
+                                const char *path, supine_precompute_report *report,
+                                supine_error *error);
+
+/** The same from another simulator's fields: fits, compresses, cross-validates, writes. Breath
+ * scale 1 gives the fields as they were; closed surfaces can be asked for volumes.
+ * @param made_by  how, for the file's metadata; optional */
+supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
+                                       const supine_fit_options *options, const char *made_by,
+                                       const char *path, supine_fit_report *report,
+                                       size_t *mode_count, supine_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A field compressed to functions of orientation: columns times a mix. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/parallel.h"
+#include "precompute/projection/projection.h"
+#include <supine/sh.h>
+
+#include "precompute/projection/compression.h"
+#include "precompute/physics/network.h"
+
+void supine_compression_free(supine_compression *compression) {
+  free(compression->coefficients);
+  free(compression->modes);
+  free(compression->mix);
+  *compression = (supine_compression){0};
+}
+
+typedef struct mix_work {
+  const supine_projection *projection;
+  supine_compression *compression;
+} mix_work;
+
+/* coefficients = columns x mix, row by row. */
+SUPINE_CLONES static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const mix_work *work = context;
+  const size_t rank = work->projection->rank;
+  const size_t count = work->compression->mode_count;
+  double sums[SUPINE_MODES_MADE_MAX];
+  for (size_t i = begin; i < end; ++i) {
+    const double *row = work->projection->columns + i * rank;
+    for (size_t k = 0; k < count; ++k) {
+      sums[k] = 0.0;
+    }
+    for (size_t r = 0; r < rank; ++r) {
+      const double *mix = work->compression->mix + r * count;
+      for (size_t k = 0; k < count; ++k) {
+        sums[k] += row[r] * mix[k];
+      }
+    }
+    float *out = work->compression->coefficients + i * count;
+    for (size_t k = 0; k < count; ++k) {
+      out[k] = (float)sums[k];
+    }
+  }
+}
+
+supine_status supine_compression_create(const supine_projection *projection, size_t mode_count,
+                                        supine_compression *made) {
+  *made = (supine_compression){
+      .vertex_count = projection->vertex_count, .band = projection->band, .mode_count = mode_count};
+  made->coefficients = malloc(projection->vertex_count * mode_count * sizeof(float));
+  made->modes = calloc(mode_count * supine_sh_count(projection->band), sizeof(double));
+  made->mix = calloc(projection->rank * mode_count, sizeof(double));
+  if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
+    supine_compression_free(made);
+    return SUPINE_ERROR_MEMORY;
+  }
+  return SUPINE_OK;
+}
+
+void supine_compression_mix(const supine_projection *projection, supine_compression *made) {
+  mix_work work = {projection, made};
+  supine_parallel_for(projection->vertex_count, 1024, 0, mix_range, &work);
+}
+
+/* functions[r, t], which are the identity where they are not stored. */
+static double function_at(const supine_projection *projection, size_t r, size_t t) {
+  return projection->functions != NULL
+             ? projection->functions[r * supine_sh_count(projection->band) + t]
+             : (double)(r == t);
+}
+
+supine_status supine_compress_harmonics(const supine_projection *projection,
+                                        supine_compression *compression, supine_error *error) {
+  const size_t terms = supine_sh_count(projection->band);
+  if (terms > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "band %zu has %zu harmonics, and a basis holds at most %d functions: "
+                            "ask for modes instead, or for band 7 or less",
+                            projection->band, terms, SUPINE_MODES_MADE_MAX);
+  }
+  supine_compression made;
+  if (supine_compression_create(projection, terms, &made) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu harmonics", terms);
+  }
+  for (size_t t = 0; t < terms; ++t) {
+    made.modes[t * terms + t] = 1.0;
+    for (size_t r = 0; r < projection->rank; ++r) {
+      made.mix[r * terms + t] = function_at(projection, r, t);
+    }
+  }
+  supine_compression_mix(projection, &made);
+  *compression = made;
+  return SUPINE_OK;
+}
+
+/* Packs the first `count` of each row of `width` to the front. */
+static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
+  unsigned char *bytes = data;
+  for (size_t r = 1; r < rows; ++r) {
+    memmove(bytes + r * count * size, bytes + r * width * size, count * size);
+  }
+}
+
+void supine_compression_truncate(supine_compression *compression, size_t rank, size_t count) {
+  const size_t width = compression->mode_count;
+  if (count < width) {
+    keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
+    keep_columns(compression->mix, rank, width, count, sizeof(double));
+    compression->mode_count = count; /* modes are rows: the first ones stand where they should */
+  }
+}
+
+void supine_compression_weights(const supine_compression *compression, const double *y,
+                                double *weights) {
+  const size_t terms = supine_sh_count(compression->band);
+  for (size_t k = 0; k < compression->mode_count; ++k) {
+    double sum = 0.0;
+    for (size_t t = 0; t < terms; ++t) {
+      sum += compression->modes[k * terms + t] * y[t];
+    }
+    weights[k] = sum;
+  }
+}
+
+supine_status supine_compression_volume_forms(const supine_compression *compression,
+                                              const supine_lungs *lungs, const double *directions,
+                                              supine_volume_forms *forms, supine_error *error) {
+  const size_t count = compression->mode_count;
+  const size_t values = compression->vertex_count * count;
+  double *columns = malloc(values * sizeof *columns);
+  if (columns == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for volume forms of %zu modes",
+                            count);
+  }
+  for (size_t i = 0; i < values; ++i) {
+    columns[i] = (double)compression->coefficients[i];
+  }
+  const supine_status status =
+      directions != NULL
+          ? supine_volume_forms_create(lungs, directions, columns, count, forms, error)
+          : supine_volume_forms_create_vector(lungs, columns, count, forms, error);
+  free(columns);
+  return status;
+}

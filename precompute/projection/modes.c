@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The best functions of orientation: a singular value decomposition through small Gram matrices. */
+#include <cblas.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "precompute/projection/compression.h"
+
+/* Singular values below this share of the first are rounding: the Gram matrix squares them. */
+static const double rank_tolerance = 1e-7;
+
+/* gram = columns^T diag(weight) columns, [R, R], its lower triangle as LAPACK counts. */
+static supine_status gram_matrix(const supine_projection *projection, const double *weight,
+                                 double *gram) {
+  enum { BLOCK = 1024 };
+  const size_t rank = projection->rank;
+  double *block = malloc(BLOCK * rank * sizeof *block);
+  if (block == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  memset(gram, 0, rank * rank * sizeof *gram);
+  for (size_t first = 0; first < projection->vertex_count; first += BLOCK) {
+    const size_t left = projection->vertex_count - first;
+    const size_t count = left < BLOCK ? left : BLOCK;
+    for (size_t i = 0; i < count; ++i) {
+      const double root = weight != NULL ? sqrt(weight[first + i]) : 1.0;
+      for (size_t r = 0; r < rank; ++r) {
+        block[i * rank + r] = root * projection->columns[(first + i) * rank + r];
+      }
+    }
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)rank, (int)count, 1.0, block,
+                (int)rank, 1.0, gram, (int)rank);
+  }
+  free(block);
+  return SUPINE_OK;
+}
+
+supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
+                                        double *vectors) {
+  lapack_int found = 0;
+  lapack_int *support = malloc(2 * n * sizeof *support);
+  double *rising = malloc(n * count * sizeof *rising);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (support != NULL && rising != NULL) {
+    const lapack_int size = (lapack_int)n;
+    const lapack_int result = LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix, size,
+                                             0.0, 0.0, size - (lapack_int)count + 1, size, 0.0,
+                                             &found, values, rising, size, support);
+    status = result == 0 && (size_t)found == count ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
+    for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
+      memcpy(vectors + k * n, rising + (count - 1 - k) * n, n * sizeof *vectors);
+    }
+    for (size_t k = 0; k < count / 2 && status == SUPINE_OK; ++k) {
+      const double swap = values[k];
+      values[k] = values[count - 1 - k];
+      values[count - 1 - k] = swap;
+    }
+  }
+  free(support);
+  free(rising);
+  return status;
+}
+
+/* Squares of the singular values of C = sqrt(W) columns x functions and its right singular vectors
+ * [count, P], where the functions are stored: with H^T H = columns^T W columns, C has those of
+ * A = H functions, which has R rows only. They come from the R x R eigenproblem of A A^T. */
+static supine_status factored_modes(const supine_projection *projection, double *gram, size_t count,
+                                    double *values, double *modes, double *total) {
+  const size_t rank = projection->rank;
+  const size_t terms = supine_sh_count(projection->band);
+  double *vectors = malloc(rank * rank * sizeof *vectors);
+  double *reduced = malloc(rank * terms * sizeof *reduced);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (vectors == NULL || reduced == NULL) {
+    goto cleanup;
+  }
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  for (size_t k = 0; k < rank; ++k) { /* H: eigenvectors as rows, by the roots of their values */
+    cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
+  }
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)rank, (int)terms, (int)rank, 1.0,
+              vectors, (int)rank, projection->functions, (int)terms, 0.0, reduced, (int)terms);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)rank, (int)rank, (int)terms, 1.0,
+              reduced, (int)terms, reduced, (int)terms, 0.0, gram, (int)rank);
+  *total = 0.0;
+  for (size_t r = 0; r < rank; ++r) {
+    *total += gram[r * rank + r];
+  }
+  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* A^T U_k / sigma_k */
+    const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
+    cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
+                vectors + k * rank, 1, 0.0, modes + k * terms, 1);
+  }
+cleanup:
+  free(vectors);
+  free(reduced);
+  return status;
+}
+
+/* The same where the functions are the harmonics themselves: C = sqrt(W) columns. */
+static supine_status plain_modes(const supine_projection *projection, double *gram, size_t count,
+                                 double *values, double *modes, double *total) {
+  *total = 0.0;
+  for (size_t r = 0; r < projection->rank; ++r) {
+    *total += gram[r * projection->rank + r];
+  }
+  return supine_leading_eigenpairs(projection->rank, gram, count, values, modes);
+}
+
+/* mix = functions x modes^T, [R, K]. */
+static void find_mix(const supine_projection *projection, supine_compression *made) {
+  const int rank = (int)projection->rank;
+  const int terms = (int)supine_sh_count(projection->band);
+  const int count = (int)made->mode_count;
+  if (projection->functions != NULL) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, rank, count, terms, 1.0,
+                projection->functions, terms, made->modes, terms, 0.0, made->mix, count);
+    return;
+  }
+  for (size_t r = 0; r < projection->rank; ++r) {
+    for (size_t k = 0; k < made->mode_count; ++k) {
+      made->mix[r * made->mode_count + k] = made->modes[k * projection->rank + r];
+    }
+  }
+}
+
+supine_status supine_compress_modes(const supine_projection *projection, const double *weight,
+                                    size_t mode_max, supine_compression *compression,
+                                    double *singular, double *total, supine_error *error) {
+  const size_t rank = projection->rank;
+  const size_t terms = supine_sh_count(projection->band);
+  const size_t most = mode_max < rank ? mode_max : rank;
+  const size_t kept = most < terms ? most : terms;
+  supine_compression made = {0};
+  double energy = 0.0;
+  if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to %d are possible",
+                            mode_max, SUPINE_MODES_MADE_MAX);
+  }
+  double *gram = malloc(rank * rank * sizeof *gram);
+  double *values = malloc(rank * sizeof *values);
+  double *modes = malloc(kept * terms * sizeof *modes);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (gram != NULL && values != NULL && modes != NULL) {
+    status = gram_matrix(projection, weight, gram);
+  }
+  if (status == SUPINE_OK) {
+    status = projection->functions != NULL
+                 ? factored_modes(projection, gram, kept, values, modes, &energy)
+                 : plain_modes(projection, gram, kept, values, modes, &energy);
+  }
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "modes of band %zu: %s", projection->band,
+                           supine_status_string(status));
+    goto cleanup;
+  }
+  size_t count = 0;
+  while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
+    ++count;
+  }
+  if (count == 0) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
+    goto cleanup;
+  }
+  status = supine_compression_create(projection, count, &made);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory for %zu modes", count);
+    goto cleanup;
+  }
+  memcpy(made.modes, modes, count * terms * sizeof *modes);
+  find_mix(projection, &made);
+  supine_compression_mix(projection, &made);
+  for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
+    singular[k] = k < count ? sqrt(values[k]) : 0.0;
+  }
+  if (total != NULL) {
+    *total = energy;
+  }
+  *compression = made;
+cleanup:
+  free(gram);
+  free(values);
+  free(modes);
+  return status;
+}

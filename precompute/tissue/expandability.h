@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung gives
+ * way. The stiffness of a mass node is E = 1/a.
+ *
+ * Only ratios count, as E is scaled to geometric mean 1: twice the value is twice as expandable as
+ * its surroundings. Vertices are in the model's order (lungs.h): the left lung's first, each lung's
+ * as its file first names them. */
+#ifndef SUPINE_EXPANDABILITY_H
+#define SUPINE_EXPANDABILITY_H
+
+#include "precompute/lungs/lungs.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** How expandability goes along an axis. */
+typedef enum supine_expandability_shape {
+  SUPINE_EXPANDABILITY_UNIFORM = 0, /**< a = 1 */
+  SUPINE_EXPANDABILITY_LINEAR,      /**< a = from + (to - from) t */
+  SUPINE_EXPANDABILITY_EXPONENTIAL  /**< a = from (to / from)^t */
+} supine_expandability_shape;
+
+/** A regional model. t is a box coordinate (lungs.h), 0 to 1: axis 0 from the midline outwards,
+ * 1 from the back to the front, 2 from the apex to the base. */
+typedef struct supine_expandability_law {
+  supine_expandability_shape shape;
+  int axis;
+  double from, to; /**< a at t = 0 and t = 1, > 0 */
+} supine_expandability_law;
+
+/** a [N] of a regional model.
+ * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or an end that is not positive */
+supine_status supine_expandability_regional(const supine_lungs *lungs,
+                                            const supine_expandability_law *law, double *a,
+                                            supine_error *error);
+
+/** a [N] from a CSV file: a header line, then either one value a line in the model's order, or
+ * `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin with
+ * #, are skipped.
+ * @retval SUPINE_ERROR_READ    missing or unreadable
+ * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
+ *                              or not in the model: the message names line and vertex
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_expandability_load(const char *path, size_t count, double *a,
+                                        supine_error *error);
+
+/** a of the model's vertices that a PLY file has, from a property of its vertices of any number
+ * type; vertices are recognised by their position. For a model of several files: once for each.
+ *
+ * @param property  its name in the file
+ * @param axes      of the file, LPS or RAS, as loading it reported
+ * @param millimetres_per_unit  of the file; 0: 1
+ * @param a         [N], zeroed by the caller before the first file; 0 stays where none has the
+ * vertex
+ * @retval SUPINE_ERROR_READ    missing
+ * @retval SUPINE_ERROR_FORMAT  not a PLY file, truncated, no such property, a value that is not
+ *                              positive and finite (the file's vertex is named)
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_expandability_load_ply(const char *path, const char *property,
+                                            supine_axes axes, double millimetres_per_unit,
+                                            const supine_lungs *lungs, double *a,
+                                            supine_error *error);
+
+/** E = 1/a; `stiffness` may be `a`.
+ * @retval SUPINE_ERROR_ARGUMENT  an a that is not positive and finite (vertex named) */
+supine_status supine_expandability_stiffness(size_t count, const double *a, double *stiffness,
+                                             supine_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The basis file: tensors and metadata of a compressed field. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/tissue/disease.h"
+#include <supine/safetensors.h>
+#include <supine/sh.h>
+
+#include "precompute/writer/basis_file.h"
+
+enum { ENTRIES_MAX = 48, TEXT_SIZE = 1024 };
+
+/* Metadata under construction: each value is formatted into its own space. */
+typedef struct entries {
+  size_t count;
+  supine_metadata metadata[ENTRIES_MAX];
+  char text[ENTRIES_MAX][TEXT_SIZE];
+} entries;
+
+SUPINE_PRINTF(3, 4)
+static void add(entries *list, const char *key, const char *format, ...) {
+  if (list->count < ENTRIES_MAX) {
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(list->text[list->count], TEXT_SIZE, format, arguments);
+    va_end(arguments);
+    list->metadata[list->count] = (supine_metadata){key, list->text[list->count]};
+    ++list->count;
+  }
+}
+
+static void add_accuracy(entries *list, const supine_accuracy *accuracy) {
+  add(list, "error_directions", "%zu", accuracy->direction_count);
+  add(list, "error_rms_percent", "%.6g", 100.0 * accuracy->relative_rms);
+  add(list, "error_p95_percent", "%.6g", 100.0 * accuracy->relative_p95);
+  add(list, "error_max_percent", "%.6g", 100.0 * accuracy->relative_max);
+  if (accuracy->volume > 0.0) {
+    add(list, "error_volume_ml", "%.6g", accuracy->volume);
+  }
+  if (accuracy->rms_mm > 0.0) {
+    add(list, "error_rms_mm", "%.6g", accuracy->rms_mm);
+    add(list, "error_p95_mm", "%.6g", accuracy->p95_mm);
+    add(list, "error_max_mm", "%.6g", accuracy->max_mm);
+  }
+}
+
+static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model) {
+  static const char *const models[] = {"box", "normal", "radial", "vectors"};
+  const supine_force_law *force = &model->force;
+  const double *c = model->direction.c;
+  add(list, "midline_mm", "%.9g", lungs->midline);
+  add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
+      force->gain, force->box[0], force->box[1], force->box[2], force->soften);
+  add(list, "direction", "%s", models[model->direction.model]);
+  if (model->direction.model == SUPINE_DIRECTION_BOX) {
+    add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
+        c[2], c[3], c[4], c[5]);
+  }
+  add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
+}
+
+/* How much of the lungs lesions changed, and how far. */
+static void add_lesions(entries *list, const supine_lungs *lungs) {
+  size_t changed = 0;
+  double low = 1.0;
+  double high = 1.0;
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    changed += lungs->lesions[i] != 1.0;
+    low = fmin(low, lungs->lesions[i]);
+    high = fmax(high, lungs->lesions[i]);
+  }
+  add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
+}
+
+static void add_fit(entries *list, const supine_fit_report *fit) {
+  add(list, "directions", "%s", fit->grid ? "grid" : "scattered");
+  add(list, "condition", "%.4g", fit->condition);
+  add(list, "band_determined", "%zu", fit->band_highest);
+  add(list, "scalar_loss_percent", "%.6g", 100.0 * fit->scalar_loss);
+  add(list, "error_method", "leave-one-out");
+}
+
+static void add_lungs(entries *list, const supine_lungs *lungs) {
+  if (lungs->lung_count == 2) {
+    add(list, "lungs", "left,right");
+  } else {
+    add(list, "lungs", "%s", supine_lungs_name(lungs, 0));
+  }
+  if (lungs->topology.closed) {
+    char text[64];
+    int used = 0;
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      const supine_mesh part = {lungs->mesh.vertex_count, lungs->mesh.vertices,
+                                lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
+                                lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
+      used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
+                       1e-3 * lungs->share[lung] * supine_mesh_volume(&part));
+    }
+    add(list, "rest_volume_ml", "%s", text);
+  }
+  if (lungs->share[0] != 1.0 || lungs->share[1] != 1.0) {
+    if (lungs->lung_count == 2) {
+      add(list, "lung_share", "%.9g,%.9g", lungs->share[0], lungs->share[1]);
+    } else {
+      add(list, "lung_share", "%.9g", lungs->share[0]);
+    }
+  }
+  if (lungs->lesions != NULL) {
+    add_lesions(list, lungs);
+  }
+  if (lungs->reach > 0.0) {
+    add(list, "reach_mm", "%.9g", lungs->reach);
+  }
+}
+
+/* Doubles as floats. */
+static float *to_float(const double *values, size_t count) {
+  float *out = malloc(count * sizeof *out);
+  for (size_t i = 0; out != NULL && i < count; ++i) {
+    out[i] = (float)values[i];
+  }
+  return out;
+}
+
+supine_status supine_basis_file_write(const char *path, const supine_basis_content *content,
+                                      supine_error *error) {
+  const supine_lungs *lungs = content->lungs;
+  const supine_compression *field = content->compression;
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t k = field->mode_count;
+  const size_t g = lungs->lung_count;
+  supine_status status = SUPINE_OK;
+  entries *list = calloc(1, sizeof *list);
+  const bool vector = content->directions == NULL;
+  float *vertices = NULL;
+  float *directions = NULL;
+  double *rest = malloc(3 * n * sizeof *rest);
+  unsigned char *lung = malloc(n);
+  if (rest != NULL) { /* the surface at rest, then its directions */
+    supine_lungs_rest(lungs, rest);
+    vertices = to_float(rest, 3 * n);
+  }
+  if (rest != NULL && !vector) {
+    memcpy(rest, content->directions, 3 * n * sizeof *rest);
+    supine_lungs_rest_directions(lungs, rest);
+    directions = to_float(rest, 3 * n);
+  }
+  if (list == NULL || vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
+                              path, n);
+    goto cleanup;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
+  }
+  add(list, "format", "supine-basis");
+  add(list, "version", "1");
+  add(list, "kind", "%s", vector ? "vector" : "scalar");
+  add(list, "band", "%zu", field->band);
+  add(list, "modes", "%s", content->harmonics ? "harmonics" : "best");
+  add(list, "mode_count", "%zu", k);
+  add(list, "route", "%s", content->route);
+  add(list, "units", "mm");
+  add(list, "axes", "LPS");
+  add_lungs(list, lungs);
+  if (content->model != NULL) {
+    add_model(list, lungs, content->model);
+  }
+  if (content->fit != NULL) {
+    add_fit(list, content->fit);
+  }
+  add_accuracy(list, content->accuracy);
+  if (content->turned_over != NULL) {
+    add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
+  }
+  add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  supine_tensor tensors[11] = {
+      {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
+      {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
+      {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
+      {"lung", SUPINE_U8, 1, {n}, lung},
+  };
+  size_t count = 4;
+  if (vector) {
+    tensors[count++] =
+        (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
+  } else {
+    tensors[count++] = (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
+    tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, directions};
+  }
+  if (content->forms != NULL) {
+    tensors[count++] =
+        (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, content->forms->linear};
+    tensors[count++] =
+        (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, content->forms->quadratic};
+    tensors[count++] =
+        (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
+  }
+  if (content->table != NULL) {
+    const supine_error_table *table = content->table;
+    tensors[count++] =
+        (supine_tensor){"error_harmonics", SUPINE_F64, 1, {table->band_count}, table->harmonics};
+    tensors[count++] =
+        (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
+  }
+  status = supine_safetensors_write(path, tensors, count, list->metadata, list->count, error);
+cleanup:
+  free(list);
+  free(rest);
+  free(vertices);
+  free(directions);
+  free(lung);
+  return status;
+}

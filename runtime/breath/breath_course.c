@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A breath as a series of frames: when, how much air, and where gravity points. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "runtime/breath/breath_course.h"
+
+static double dot(const double *a, const double *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double *a, const double *b, double *product) {
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t i = (k + 1) % 3;
+    const size_t j = (k + 2) % 3;
+    product[k] = a[i] * b[j] - a[j] * b[i];
+  }
+}
+
+/* The direction a quarter turn on from `from`, towards `to`. */
+static void find_quarter(const breath_turn *turn, double quarter[3]) {
+  static const double left[3] = {1.0, 0.0, 0.0};
+  static const double back[3] = {0.0, 1.0, 0.0};
+  const double *from = turn->from;
+  double axis[3];
+  cross(from, turn->to, axis);
+  const double sine = sqrt(dot(axis, axis));
+  if (sine < 1e-9) { /* opposite */
+    const double *over = fabs(from[2]) > 0.5 ? back : left;
+    cross(from, over, axis);
+    if (dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
+      cross(from, back, axis);
+    }
+  }
+  const double length = sqrt(dot(axis, axis));
+  const double unit[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
+  cross(unit, from, quarter);
+}
+
+void breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
+  const double cosine = fmax(-1.0, fmin(1.0, dot(turn->from, turn->to)));
+  if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
+    memcpy(gravity, turn->to, 3 * sizeof *gravity);
+    return;
+  }
+  double quarter[3];
+  find_quarter(turn, quarter);
+  const double angle = acos(cosine) * fmax(0.0, time / turn->seconds);
+  for (size_t k = 0; k < 3; ++k) {
+    gravity[k] = cos(angle) * turn->from[k] + sin(angle) * quarter[k];
+  }
+}
+
+void breath_course_free(breath_course *course) {
+  free(course->time);
+  free(course->volume);
+  free(course->gravity);
+  *course = (breath_course){0};
+}
+
+supine_status breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
+                                   const breath_turn *turn, double rate, size_t count, size_t lungs,
+                                   breath_course *course, supine_error *error) {
+  breath_course made = {.count = count, .lungs = lungs, .fixed = turn->seconds == 0.0};
+  made.time = malloc(count * sizeof *made.time);
+  made.volume = malloc(count * sizeof *made.volume);
+  made.gravity = malloc(3 * count * sizeof *made.gravity);
+  if (made.time == NULL || made.volume == NULL || made.gravity == NULL) {
+    breath_course_free(&made);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    made.time[i] = (double)i / rate;
+    breath_turn_gravity(turn, made.time[i], made.gravity + 3 * i);
+  }
+  const supine_status status =
+      supine_pv_breath_evaluate(pv, breath, count, made.time, made.volume, NULL, error);
+  if (status != SUPINE_OK) {
+    breath_course_free(&made);
+    return status;
+  }
+  *course = made;
+  return SUPINE_OK;
+}

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A breath: the course of pressure, and the volume that the limbs give it. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "runtime/breath/pv_internal.h"
+
+supine_pv_breath supine_pv_breath_default(void) {
+  return (supine_pv_breath){.tidal = 500.0,
+                            .rate = 12.0,
+                            .inhale_fraction = 1.0 / 3.0,
+                            .rest_pressure = 5.0,
+                            .course = SUPINE_PV_COSINE};
+}
+
+static supine_status breath_check(const supine_pv_breath *breath, supine_error *error) {
+  if (!(breath->tidal > 0.0) || !isfinite(breath->tidal)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "tidal volume %g mL is not positive",
+                            breath->tidal);
+  }
+  if (!(breath->rate > 0.0) || !isfinite(breath->rate)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "rate %g is not a positive number of breaths a minute", breath->rate);
+  }
+  if (!(breath->inhale_fraction > 0.0 && breath->inhale_fraction < 1.0)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "inhale fraction %g is not between 0 and 1", breath->inhale_fraction);
+  }
+  if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unknown pressure course");
+  }
+  return SUPINE_OK;
+}
+
+/* Where in its limb a moment is: 0 at rest, 1 at the peak; linear in time. */
+static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
+  const double turns = time * (breath->rate / 60.0);
+  const double phase = turns - floor(turns);
+  if (phase < breath->inhale_fraction) {
+    *limb = SUPINE_PV_INHALE;
+    return phase / breath->inhale_fraction;
+  }
+  *limb = SUPINE_PV_EXHALE;
+  return (1.0 - phase) / (1.0 - breath->inhale_fraction);
+}
+
+/* Each limb at rest and at the peak. */
+typedef struct loop {
+  double rest, peak;                   /* cmH2O */
+  double volume[SUPINE_PV_LIMB_COUNT]; /* mL at rest */
+  double gain[SUPINE_PV_LIMB_COUNT];   /* mL from rest to peak */
+} loop;
+
+static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
+                                supine_error *error) {
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    const supine_pv_curve *curve = &pv->limb[limb];
+    const supine_status status = supine_pv_curve_check(curve, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    if (!(pressure >= curve->pressure[0] && pressure <= curve->pressure[1])) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s pressure %g cmH2O is outside the %s limb's range, %g to %g cmH2O",
+                              what, pressure, supine_pv_limb_name((supine_pv_limb)limb),
+                              curve->pressure[0], curve->pressure[1]);
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status loop_fill(const supine_pv *pv, const supine_pv_breath *breath, loop *cycle,
+                               supine_error *error) {
+  const supine_pv_curve *inhale = &pv->limb[SUPINE_PV_INHALE];
+  double rest = 0.0;
+  cycle->rest = breath->rest_pressure;
+  supine_status status = limb_holds(pv, "rest", cycle->rest, error);
+  if (status == SUPINE_OK) {
+    status = supine_pv_evaluate(inhale, 1, &cycle->rest, &rest, NULL, error);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const double full = rest + breath->tidal;
+  if (full > inhale->volume[1]) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "tidal volume %g mL is more than the %g mL that the inhale limb holds "
+                            "above its volume at %g cmH2O",
+                            breath->tidal, inhale->volume[1] - rest, cycle->rest);
+  }
+  status = supine_pv_invert(inhale, 1, &full, &cycle->peak, error);
+  if (status == SUPINE_OK) {
+    status = limb_holds(pv, "peak", cycle->peak, error);
+  }
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+    const double pressures[2] = {cycle->rest, cycle->peak};
+    double volumes[2] = {0.0, 0.0};
+    status = supine_pv_evaluate(&pv->limb[limb], 2, pressures, volumes, NULL, error);
+    cycle->volume[limb] = volumes[0];
+    cycle->gain[limb] = volumes[1] - volumes[0];
+    if (status == SUPINE_OK && !(cycle->gain[limb] > 0.0)) {
+      status = supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL, "the %s limb is too flat between %g and %g cmH2O",
+          supine_pv_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
+    }
+  }
+  return status;
+}
+
+static double between(double value, double low, double high) {
+  return value < low ? low : value > high ? high : value;
+}
+
+/* The moments of one limb, gathered so that the limb is integrated once: pressures to volumes or,
+ * at constant flow, volumes to pressures. `scratch` [2 count]. */
+static supine_status breath_follow(const supine_pv *pv, const supine_pv_breath *breath,
+                                   const loop *cycle, supine_pv_limb limb, size_t count,
+                                   const double *times, double *volumes, double *pressures,
+                                   double *scratch, supine_error *error) {
+  const supine_pv_curve *curve = &pv->limb[limb];
+  const bool flow = breath->course == SUPINE_PV_CONSTANT_FLOW;
+  const double begin = flow ? cycle->volume[limb] : cycle->rest;
+  const double end = flow ? begin + cycle->gain[limb] : cycle->peak;
+  double *given = scratch;
+  double *found = scratch + count;
+  size_t used = 0;
+  for (size_t j = 0; j < count; ++j) {
+    supine_pv_limb of = limb;
+    double share = breath_share(breath, times[j], &of);
+    if (of == limb) {
+      if (breath->course == SUPINE_PV_COSINE) {
+        share = 0.5 - 0.5 * cos(M_PI * share);
+      }
+      given[used++] = between(begin + share * (end - begin), begin, end);
+    }
+  }
+  const supine_status status = flow ? supine_pv_invert(curve, used, given, found, error)
+                                    : supine_pv_evaluate(curve, used, given, found, NULL, error);
+  used = 0;
+  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+    supine_pv_limb of = limb;
+    (void)breath_share(breath, times[j], &of);
+    if (of == limb) {
+      const double volume = flow ? given[used] : found[used];
+      const double gained = (volume - cycle->volume[limb]) / cycle->gain[limb];
+      if (volumes != NULL) {
+        volumes[j] = breath->tidal * between(gained, 0.0, 1.0);
+      }
+      if (pressures != NULL) {
+        pressures[j] = flow ? found[used] : given[used];
+      }
+      ++used;
+    }
+  }
+  return status;
+}
+
+supine_status supine_pv_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
+                                        size_t count, const double *times, double *volumes,
+                                        double *pressures, supine_error *error) {
+  supine_status status = breath_check(breath, error);
+  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+    if (!isfinite(times[j])) {
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "time %zu is not finite", j);
+    }
+  }
+  if (status != SUPINE_OK || count == 0) {
+    return status;
+  }
+  if (breath->course == SUPINE_PV_CONSTANT_FLOW && pressures == NULL) {
+    for (size_t j = 0; j < count && volumes != NULL; ++j) {
+      supine_pv_limb limb = SUPINE_PV_INHALE;
+      volumes[j] = breath->tidal * breath_share(breath, times[j], &limb);
+    }
+    return SUPINE_OK;
+  }
+  if (pv == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "this breath needs a pressure-volume relation");
+  }
+  loop cycle = {0};
+  status = loop_fill(pv, breath, &cycle, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  double *scratch = calloc(count, 2 * sizeof *scratch);
+  if (scratch == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+    status = breath_follow(pv, breath, &cycle, (supine_pv_limb)limb, count, times, volumes,
+                           pressures, scratch, error);
+  }
+  free(scratch);
+  return status;
+}

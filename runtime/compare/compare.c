@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: MIT */
+/* Gram matrices of a basis, and the distances that they give. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <supine/sh.h>
+
+#include "runtime/compare/compare_internal.h"
+
+static const double four_pi = 12.566370614359172954;
+
+/* Twice the area of a triangle, mm^2. */
+static double twice_area(const supine_basis *basis, const uint32_t *corner) {
+  const float *a = basis->vertices + 3 * (size_t)corner[0];
+  const float *b = basis->vertices + 3 * (size_t)corner[1];
+  const float *c = basis->vertices + 3 * (size_t)corner[2];
+  double u[3];
+  double v[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    u[axis] = (double)b[axis] - (double)a[axis];
+    v[axis] = (double)c[axis] - (double)a[axis];
+  }
+  const double x = u[1] * v[2] - u[2] * v[1];
+  const double y = u[2] * v[0] - u[0] * v[2];
+  const double z = u[0] * v[1] - u[1] * v[0];
+  return sqrt(x * x + y * y + z * z);
+}
+
+/* a_i: a third of the triangles around i, over the area of all. */
+static supine_status share_area(supine_compare *compare, supine_error *error) {
+  const supine_basis *basis = compare->basis;
+  const size_t n = basis->info.vertex_count;
+  double *area = calloc(n, sizeof *area);
+  if (area == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  double total = 0;
+  for (size_t t = 0; t < basis->info.triangle_count; ++t) {
+    const uint32_t *corner = basis->triangles + 3 * t;
+    const double piece = twice_area(basis, corner) / 6;
+    for (int v = 0; v < 3; ++v) {
+      area[corner[v]] += piece;
+    }
+    total += 3 * piece;
+  }
+  compare->area = total;
+  for (size_t i = 0; i < n && total > 0; ++i) {
+    compare->share[i] = (float)(area[i] / total);
+  }
+  free(area);
+  return total > 0 && isfinite(total)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "the surface has no area: nothing to average over");
+}
+
+/* gram += weight c c^T, upper triangle. */
+static void add_row(const float *c, double weight, size_t count, double *gram) {
+  double row[SUPINE_MODES_MAX];
+  for (size_t k = 0; k < count; ++k) {
+    row[k] = (double)c[k];
+  }
+  for (size_t k = 0; k < count; ++k) {
+    const double scaled = weight * row[k];
+    double *out = gram + k * count;
+    for (size_t l = k; l < count; ++l) {
+      out[l] += scaled * row[l];
+    }
+  }
+}
+
+static void find_gram(supine_compare *compare, size_t lung) {
+  const supine_basis *basis = compare->basis;
+  const size_t count = basis->info.mode_count;
+  double *gram = compare->gram + lung * count * count;
+  for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
+    const double share = (double)compare->share[i];
+    if (basis->info.vector) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        add_row(basis->coefficients + (3 * i + axis) * count, share, count, gram);
+      }
+    } else {
+      const float *d = basis->direction + 3 * i;
+      const double square =
+          (double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2];
+      add_row(basis->coefficients + i * count, share * square, count, gram);
+    }
+  }
+  for (size_t k = 0; k < count; ++k) {
+    for (size_t l = 0; l < k; ++l) {
+      gram[k * count + l] = gram[l * count + k];
+    }
+  }
+  for (size_t k = 0; k < count * count; ++k) {
+    compare->sum[k] += gram[k];
+  }
+}
+
+supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
+                                    supine_error *error) {
+  const supine_basis_info *info = &basis->info;
+  const size_t square = info->mode_count * info->mode_count;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_compare *made = calloc(1, sizeof *made);
+  if (made == NULL) {
+    return supine_error_set(error, status, "out of memory");
+  }
+  made->basis = basis;
+  made->share = calloc(info->vertex_count, sizeof *made->share);
+  made->gram = calloc(info->lung_count * square, sizeof *made->gram);
+  made->sum = calloc(square, sizeof *made->sum);
+  if (made->share == NULL || made->gram == NULL || made->sum == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  status = share_area(made, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    find_gram(made, lung);
+  }
+  *compare = made;
+  made = NULL;
+cleanup:
+  supine_compare_destroy(made);
+  return status;
+}
+
+void supine_compare_destroy(supine_compare *compare) {
+  if (compare != NULL) {
+    free(compare->share);
+    free(compare->gram);
+    free(compare->sum);
+    free(compare);
+  }
+}
+
+double supine_compare_area(const supine_compare *compare) {
+  return compare->area;
+}
+
+double supine_compare_product(const double *gram, const double *q, const double *p, size_t count) {
+  double sum = 0;
+  for (size_t k = 0; k < count; ++k) {
+    double row = 0;
+    for (size_t l = 0; l < count; ++l) {
+      row += gram[k * count + l] * p[l];
+    }
+    sum += q[k] * row;
+  }
+  return sum;
+}
+
+supine_status supine_compare_scale(const supine_compare *compare, const supine_inflation *inflation,
+                                   const double *weights, double *scale, supine_error *error) {
+  switch (inflation->kind) {
+  case SUPINE_INFLATION_VOLUME:
+    return supine_basis_scale(compare->basis, weights, inflation->amount, scale, error);
+  case SUPINE_INFLATION_SCALE:
+    *scale = inflation->amount;
+    return SUPINE_OK;
+  case SUPINE_INFLATION_RMS:
+    break;
+  }
+  const double square =
+      supine_compare_product(compare->sum, weights, weights, compare->basis->info.mode_count);
+  if (!(square > 0)) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "nothing moves in this direction: no scale gives %g mm",
+                            inflation->amount);
+  }
+  *scale = inflation->amount / sqrt(square);
+  return SUPINE_OK;
+}
+
+double supine_compare_rms(const supine_compare *compare, const double *weights_a,
+                          const double *scales_a, const double *weights_b, const double *scales_b) {
+  const size_t count = compare->basis->info.mode_count;
+  double square = 0;
+  for (size_t lung = 0; lung < compare->basis->info.lung_count; ++lung) {
+    double q[SUPINE_MODES_MAX];
+    for (size_t k = 0; k < count; ++k) {
+      q[k] =
+          scales_a[lung] * weights_a[k] - (weights_b == NULL ? 0 : scales_b[lung] * weights_b[k]);
+    }
+    square += supine_compare_product(compare->gram + lung * count * count, q, q, count);
+  }
+  return sqrt(fmax(square, 0));
+}
+
+void supine_compare_energy(const supine_compare *compare, double *energy) {
+  const size_t count = compare->basis->info.mode_count;
+  const size_t terms = supine_sh_count(compare->basis->info.band);
+  size_t term = 0;
+  for (size_t l = 0; l <= compare->basis->info.band; ++l) {
+    energy[l] = 0;
+    for (; term < (l + 1) * (l + 1); ++term) {
+      double column[SUPINE_MODES_MAX];
+      for (size_t k = 0; k < count; ++k) {
+        column[k] = compare->basis->modes[k * terms + term];
+      }
+      energy[l] += supine_compare_product(compare->sum, column, column, count) / four_pi;
+    }
+  }
+}

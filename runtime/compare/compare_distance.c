@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: MIT */
+/* Distances vertex by vertex, and their statistics. */
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "runtime/compare/compare_internal.h"
+
+static double dot(const double *weights, const float *coefficients, size_t count) {
+  double sum = 0;
+  for (size_t k = 0; k < count; ++k) {
+    sum += weights[k] * (double)coefficients[k];
+  }
+  return sum;
+}
+
+static double length(const double *u) {
+  return sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+}
+
+/* |u_i| of the field with weights q. */
+static double displacement(const supine_basis *basis, const double *q, size_t i) {
+  const size_t count = basis->info.mode_count;
+  double u[3];
+  if (basis->info.vector) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      u[axis] = dot(q, basis->coefficients + (3 * i + axis) * count, count);
+    }
+    return length(u);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    u[axis] = (double)basis->direction[3 * i + axis];
+  }
+  return fabs(dot(q, basis->coefficients + i * count, count)) * length(u);
+}
+
+void supine_compare_distances(const supine_compare *compare, const double *weights_a,
+                              const double *scales_a, const double *weights_b,
+                              const double *scales_b, float *distance) {
+  const supine_basis *basis = compare->basis;
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    double q[SUPINE_MODES_MAX];
+    for (size_t k = 0; k < basis->info.mode_count; ++k) {
+      q[k] =
+          scales_a[lung] * weights_a[k] - (weights_b == NULL ? 0 : scales_b[lung] * weights_b[k]);
+    }
+    for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
+      distance[i] = (float)displacement(basis, q, i);
+    }
+  }
+}
+
+/* The smallest distance that `target` of the area does not exceed. Bit patterns of floats that are
+ * not negative sort as the floats do: three rounds, each sharing out the area over 2^11 patterns,
+ * settle the upper, middle and lower bits. */
+static double percentile(const supine_compare *compare, const float *distance, double target) {
+  enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
+  const size_t n = compare->basis->info.vertex_count;
+  uint32_t prefix = 0;
+  double below = 0;
+  for (int round = 0; round < ROUNDS; ++round) {
+    const unsigned shift = (unsigned)(BITS * (ROUNDS - 1 - round));
+    double bin[BINS] = {0};
+    for (size_t i = 0; i < n; ++i) {
+      uint32_t bits = 0;
+      memcpy(&bits, &distance[i], sizeof bits);
+      if (round == 0 || bits >> (shift + BITS) == prefix) {
+        bin[(bits >> shift) & (BINS - 1)] += (double)compare->share[i];
+      }
+    }
+    uint32_t at = 0;
+    uint32_t last = 0; /* where rounding leaves the target just beyond everything */
+    for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
+      below += bin[at];
+      last = bin[at] > 0 ? at : last;
+    }
+    if (at == BINS) {
+      at = last;
+      below -= bin[at];
+    }
+    prefix = prefix << BITS | at;
+  }
+  float value = 0;
+  memcpy(&value, &prefix, sizeof value);
+  return (double)value;
+}
+
+void supine_compare_statistics(const supine_compare *compare, const float *distance,
+                               supine_distance_statistics *statistics) {
+  double area = 0;
+  double sum = 0;
+  double square = 0;
+  float largest = 0;
+  for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
+    const double share = (double)compare->share[i];
+    const double d = (double)distance[i];
+    area += share; /* 1, but for rounding */
+    sum += share * d;
+    square += share * d * d;
+    largest = distance[i] > largest ? distance[i] : largest;
+  }
+  statistics->mean = sum / area;
+  statistics->rms = sqrt(square / area);
+  statistics->p95 = percentile(compare, distance, 0.95 * area);
+  statistics->max = (double)largest;
+}

@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: MIT */
+/* The directions of gravity that differ most, over the whole sphere. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "runtime/compare/compare_internal.h"
+
+static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
+static const double last_step = 1e-6;                     /* rad */
+
+enum { DIRECTIONS_MAX = 16384, MOVES_MAX = 4096 };
+
+typedef struct search {
+  const supine_compare *compare;
+  const supine_inflation *inflation;
+  size_t count;           /* K */
+  size_t reached;         /* directions that reach the inflation */
+  double (*direction)[3]; /* [reached] */
+  double *state;          /* [reached, K] q = s w */
+  double *product;        /* [reached, K] G q */
+  double *square;         /* [reached] q^T G q */
+} search;
+
+static void normalise(double v[3]) {
+  const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+  const double x = v[0] / largest;
+  const double y = v[1] / largest;
+  const double z = v[2] / largest;
+  const double length = sqrt(x * x + y * y + z * z);
+  v[0] = x / length;
+  v[1] = y / length;
+  v[2] = z / length;
+}
+
+/* q = s w of a direction. */
+static supine_status state_of(const search *s, const double direction[3], double *q,
+                              supine_error *error) {
+  double scale = 0;
+  supine_status status = supine_basis_weights(s->compare->basis, direction, q);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "gravity has no direction");
+  }
+  status = supine_compare_scale(s->compare, s->inflation, q, &scale, error);
+  for (size_t k = 0; k < s->count; ++k) {
+    q[k] *= scale;
+  }
+  return status;
+}
+
+/* Squared distance between two states, by their difference: exact where they are near. */
+static double apart(const search *s, const double *a, const double *b) {
+  double q[SUPINE_MODES_MAX];
+  for (size_t k = 0; k < s->count; ++k) {
+    q[k] = a[k] - b[k];
+  }
+  return supine_compare_product(s->compare->sum, q, q, s->count);
+}
+
+/* States of the spiral's directions, and of `from` last. */
+static supine_status sample(search *s, const double from[3], size_t directions,
+                            supine_error *error) {
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i <= directions; ++i) {
+    const double z = 1 - (2 * (double)i + 1) / (double)directions;
+    const double r = sqrt(fmax(0, 1 - z * z));
+    const double turn = golden_angle * (double)i;
+    const double spiral[3] = {r * cos(turn), r * sin(turn), z};
+    double *q = s->state + s->reached * s->count;
+    memcpy(s->direction[s->reached], i < directions ? spiral : from, sizeof spiral);
+    status = state_of(s, s->direction[s->reached], q, error);
+    if (status == SUPINE_ERROR_NUMERICAL && i < directions) {
+      continue;
+    }
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    double *product = s->product + s->reached * s->count;
+    double square = 0;
+    for (size_t k = 0; k < s->count; ++k) {
+      product[k] = 0;
+      for (size_t l = 0; l < s->count; ++l) {
+        product[k] += s->compare->sum[k * s->count + l] * q[l];
+      }
+      square += q[k] * product[k];
+    }
+    s->square[s->reached++] = square;
+  }
+  return s->reached >= 2 ? SUPINE_OK
+                         : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                            "no other direction reaches this inflation");
+}
+
+/* |q_i - q_j|^2 in the Gram metric. */
+static double sampled_apart(const search *s, size_t i, size_t j) {
+  const double *product = s->product + i * s->count;
+  const double *q = s->state + j * s->count;
+  double both = 0;
+  for (size_t k = 0; k < s->count; ++k) {
+    both += product[k] * q[k];
+  }
+  return s->square[i] - 2 * both + s->square[j];
+}
+
+/* Turns `direction` by `step` radians along axis `move` / 2 of its tangent plane. */
+static void turned(const double direction[3], int move, double step, double result[3]) {
+  const int thin = fabs(direction[0]) < 0.6 ? 0 : (fabs(direction[1]) < 0.6 ? 1 : 2);
+  double across[3] = {0, 0, 0};
+  across[thin] = 1;
+  double t[3] = {direction[1] * across[2] - direction[2] * across[1],
+                 direction[2] * across[0] - direction[0] * across[2],
+                 direction[0] * across[1] - direction[1] * across[0]};
+  normalise(t);
+  if (move / 2 == 1) {
+    const double u[3] = {direction[1] * t[2] - direction[2] * t[1],
+                         direction[2] * t[0] - direction[0] * t[2],
+                         direction[0] * t[1] - direction[1] * t[0]};
+    memcpy(t, u, sizeof u);
+  }
+  const double sign = move % 2 == 0 ? 1 : -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    result[axis] = cos(step) * direction[axis] + sign * sin(step) * t[axis];
+  }
+  normalise(result);
+}
+
+/* Moves `free` of two directions (the first, or both) while that takes their states apart. */
+static double refine(const search *s, double direction[2][3], int movable, double step) {
+  double q[2][SUPINE_MODES_MAX];
+  (void)state_of(s, direction[0], q[0], NULL); /* both reached the inflation before */
+  (void)state_of(s, direction[1], q[1], NULL);
+  double best = apart(s, q[0], q[1]);
+  for (int moves = 0; moves < MOVES_MAX && step > last_step;) {
+    bool better = false;
+    for (int which = 0; which < movable; ++which) {
+      for (int move = 0; move < 4; ++move, ++moves) {
+        double tried[3];
+        double state[SUPINE_MODES_MAX];
+        turned(direction[which], move, step, tried);
+        if (state_of(s, tried, state, NULL) != SUPINE_OK) {
+          continue;
+        }
+        const double distance = apart(s, state, q[1 - which]);
+        if (distance > best) {
+          best = distance;
+          better = true;
+          memcpy(direction[which], tried, sizeof tried);
+          memcpy(q[which], state, s->count * sizeof *state);
+        }
+      }
+    }
+    step = better ? step : step / 2;
+  }
+  return sqrt(fmax(best, 0));
+}
+
+static void find(const search *s, size_t directions, supine_extremes *extremes) {
+  const double spacing = 3.5449 / sqrt((double)directions); /* sqrt(4 pi / directions) */
+  const size_t from = s->reached - 1;
+  size_t pair[2] = {0, from};
+  size_t farthest = 0;
+  double pair_square = -1;
+  double farthest_square = -1;
+  for (size_t i = 0; i < s->reached; ++i) {
+    for (size_t j = i + 1; j < s->reached; ++j) {
+      const double square = sampled_apart(s, i, j);
+      if (square > pair_square) {
+        pair_square = square;
+        pair[0] = i;
+        pair[1] = j;
+      }
+      if (j == from && square > farthest_square) {
+        farthest_square = square;
+        farthest = i;
+      }
+    }
+  }
+  double moving[2][3];
+  memcpy(moving[0], s->direction[pair[0]], sizeof moving[0]);
+  memcpy(moving[1], s->direction[pair[1]], sizeof moving[1]);
+  extremes->pair_rms = refine(s, moving, 2, spacing);
+  memcpy(extremes->pair, moving, sizeof moving);
+  memcpy(moving[0], s->direction[farthest], sizeof moving[0]);
+  memcpy(moving[1], s->direction[from], sizeof moving[1]);
+  extremes->farthest_rms = refine(s, moving, 1, spacing);
+  memcpy(extremes->farthest, moving[0], sizeof moving[0]);
+  extremes->directions = s->reached - 1;
+}
+
+supine_status supine_compare_search(const supine_compare *compare,
+                                    const supine_inflation *inflation, const double from[3],
+                                    size_t directions, supine_extremes *extremes,
+                                    supine_error *error) {
+  if (directions < 2 || directions > DIRECTIONS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu directions: 2 to %d", directions,
+                            (int)DIRECTIONS_MAX);
+  }
+  double start[3] = {from[0], from[1], from[2]};
+  if (!isfinite(start[0]) || !isfinite(start[1]) || !isfinite(start[2]) ||
+      (start[0] == 0 && start[1] == 0 && start[2] == 0)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+  }
+  normalise(start);
+  search s = {.compare = compare, .inflation = inflation, .count = compare->basis->info.mode_count};
+  const size_t n = directions + 1;
+  s.direction = calloc(n, sizeof *s.direction);
+  s.state = calloc(n * s.count, sizeof *s.state);
+  s.product = calloc(n * s.count, sizeof *s.product);
+  s.square = calloc(n, sizeof *s.square);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (s.direction == NULL || s.state == NULL || s.product == NULL || s.square == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  status = sample(&s, start, directions, error);
+  if (status == SUPINE_OK) {
+    find(&s, directions, extremes);
+  }
+cleanup:
+  free(s.direction);
+  free(s.state);
+  free(s.product);
+  free(s.square);
+  return status;
+}

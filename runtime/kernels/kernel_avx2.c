@@ -1,0 +1,305 @@
+/* SPDX-License-Identifier: MIT */
+/* Evaluating tiles with AVX2, FMA and F16C: two registers for the 16 vertices. */
+#include "runtime/kernels/tiles.h"
+
+#if defined(__AVX2__) && defined(__FMA__) && defined(__F16C__)
+#include <immintrin.h>
+
+#define INLINE static inline __attribute__((always_inline))
+
+/* Coefficient 2 pair, or the one after it, of vertices 8 half to 8 half + 7. */
+INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
+                          supine_storage storage) {
+  const size_t k = 2 * pair + second;
+  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+    /* compact.h: pair_first, pair_second */
+    const __m256i words = _mm256_load_si256((const __m256i *)(at + 64 * pair + 32 * half));
+    return _mm256_cvtepi32_ps(second ? words : _mm256_slli_epi32(words, 16));
+  }
+  if (storage == SUPINE_STORAGE_FLOAT16) {
+    return _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)));
+  }
+  return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+}
+
+/* The coefficient of one of the three last modes whose words are `at` (compact.h). */
+INLINE __m256 third_coefficient(const unsigned char *at, size_t which, size_t half) {
+  const __m256i words = _mm256_load_si256((const __m256i *)(at + 32 * half));
+  return _mm256_cvtepi32_ps(which == 0   ? words /* shifts take constants */
+                            : which == 1 ? _mm256_slli_epi32(words, 11)
+                                         : _mm256_slli_epi32(words, 22));
+}
+
+typedef struct halves {
+  __m256 v[2];
+} halves;
+
+INLINE halves add_mode(halves sum, const unsigned char *at, const float *w, size_t pair,
+                       bool second, supine_storage storage) {
+  const __m256 weight = _mm256_broadcast_ss(w + 2 * pair + second);
+  for (size_t half = 0; half < 2; ++half) {
+    sum.v[half] =
+        _mm256_fmadd_ps(weight, coefficient(at, pair, second, half, storage), sum.v[half]);
+  }
+  return sum;
+}
+
+/* Three of the last modes. */
+INLINE halves add_thirds(halves sum, const unsigned char *words, const float *w) {
+  for (size_t which = 0; which < 3; ++which) {
+    const __m256 weight = _mm256_broadcast_ss(w + which);
+    for (size_t half = 0; half < 2; ++half) {
+      sum.v[half] = _mm256_fmadd_ps(weight, third_coefficient(words, which, half), sum.v[half]);
+    }
+  }
+  return sum;
+}
+
+/* sum over k of w_k c_k: K multiplications, K - 1 additions. */
+INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_storage storage) {
+  const __m256 first = _mm256_broadcast_ss(w);
+  halves sum = {{_mm256_mul_ps(first, coefficient(at, 0, false, 0, storage)),
+                 _mm256_mul_ps(first, coefficient(at, 0, false, 1, storage))}};
+  const size_t paired = supine_tiles_paired(storage, modes);
+  for (size_t pair = 0; pair < paired / 2; ++pair) {
+    if (pair > 0) {
+      sum = add_mode(sum, at, w, pair, false, storage);
+    }
+    sum = add_mode(sum, at, w, pair, true, storage);
+  }
+  if (paired > 1 && paired % 2 != 0) {
+    sum = add_mode(sum, at, w, paired / 2, false, storage);
+  }
+  for (size_t k = paired; k < modes; k += 3) {
+    sum = add_thirds(sum, at + supine_tiles_words_begin(paired, k), w + k);
+  }
+  return sum;
+}
+
+/* 48 numbers in order. */
+typedef struct triples {
+  __m256 v[6];
+} triples;
+
+/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+INLINE triples numbers(const unsigned char *at, bool compact) {
+  triples n;
+  if (!compact) {
+    for (size_t j = 0; j < 6; ++j) {
+      n.v[j] = _mm256_load_ps((const float *)(const void *)(at + 32 * j));
+    }
+    return n;
+  }
+  for (size_t half = 0; half < 2; ++half) {
+    const __m256i first = _mm256_load_si256((const __m256i *)(at + 32 * half));
+    const __m256i second = _mm256_load_si256((const __m256i *)(at + 64 + 32 * half));
+    const __m256i third = _mm256_or_si256(
+        _mm256_slli_epi32(first, 21),
+        _mm256_and_si256(_mm256_slli_epi32(second, 10), _mm256_set1_epi32(0x1FFC00)));
+    n.v[half] = _mm256_cvtepi32_ps(first);
+    n.v[2 + half] = _mm256_cvtepi32_ps(second);
+    n.v[4 + half] = _mm256_cvtepi32_ps(third);
+  }
+  return n;
+}
+
+/* Rest positions, mm. */
+INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
+  const __m256i unit = _mm256_set1_epi32((int)tiles->rest_unit);
+  triples p = numbers(tile + tiles->rest_begin, compact);
+  for (size_t j = 0; j < 6 && compact; ++j) {
+    p.v[j] = _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(p.v[j]), unit));
+  }
+  return p;
+}
+
+/* a's lane of vertex i at numbers 3 i, 3 i + 1, 3 i + 2. */
+INLINE triples spread_amount(halves a) {
+  const __m256i lane[3] = {_mm256_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2),
+                           _mm256_setr_epi32(2, 3, 3, 3, 4, 4, 4, 5),
+                           _mm256_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7)};
+  triples t;
+  for (size_t j = 0; j < 6; ++j) {
+    t.v[j] = _mm256_permutevar8x32_ps(a.v[j / 3], lane[j % 3]);
+  }
+  return t;
+}
+
+/* Eight of x, y, z to x y z x y z ...: each of the three is put in place, then blended. */
+INLINE void interleave8(__m256 x, __m256 y, __m256 z, __m256 *out) {
+  const __m256i lane[3] = {_mm256_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2),
+                           _mm256_setr_epi32(2, 3, 3, 3, 4, 4, 4, 5),
+                           _mm256_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7)};
+  __m256 part[3][3];
+  for (size_t j = 0; j < 3; ++j) {
+    part[j][0] = _mm256_permutevar8x32_ps(x, lane[j]);
+    part[j][1] = _mm256_permutevar8x32_ps(y, lane[j]);
+    part[j][2] = _mm256_permutevar8x32_ps(z, lane[j]);
+  }
+  /* Bit b of a mask: lane b from the second. x y z x y z x y | z x y z x y z x | y z x y z x y z */
+  out[0] = _mm256_blend_ps(_mm256_blend_ps(part[0][0], part[0][1], 0x92), part[0][2], 0x24);
+  out[1] = _mm256_blend_ps(_mm256_blend_ps(part[1][0], part[1][1], 0x24), part[1][2], 0x49);
+  out[2] = _mm256_blend_ps(_mm256_blend_ps(part[2][0], part[2][1], 0x49), part[2][2], 0x92);
+}
+
+/* Where the array is aligned to 16 bytes, as malloc gives it, a store past the cache goes in
+ * halves: the processor joins them to lines. */
+INLINE void put(float *to, __m256 v, bool stream) {
+  if (!stream || (uintptr_t)to % 16 != 0) {
+    _mm256_storeu_ps(to, v);
+  } else if ((uintptr_t)to % 32 == 0) {
+    _mm256_stream_ps(to, v);
+  } else {
+    _mm_stream_ps(to, _mm256_castps256_ps128(v));
+    _mm_stream_ps(to + 4, _mm256_extractf128_ps(v, 1));
+  }
+}
+
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
+                           bool with_rest, supine_storage storage, bool vector) {
+  const bool compact = supine_tiles_compact(storage);
+  triples result;
+  if (vector) {
+    const halves x = dot(tile, w, tiles->modes, storage);
+    const halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
+    const halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
+    interleave8(x.v[0], y.v[0], z.v[0], result.v);
+    interleave8(x.v[1], y.v[1], z.v[1], result.v + 3);
+    if (with_rest) {
+      const triples rest = rest_positions(tiles, tile, compact);
+      for (size_t j = 0; j < 6; ++j) {
+        result.v[j] = _mm256_add_ps(result.v[j], rest.v[j]);
+      }
+    }
+    return result;
+  }
+  const triples amount = spread_amount(dot(tile, w, tiles->modes, storage));
+  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  if (with_rest) {
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 6; ++j) {
+      result.v[j] = _mm256_fmadd_ps(amount.v[j], direction.v[j], rest.v[j]);
+    }
+  } else {
+    for (size_t j = 0; j < 6; ++j) {
+      result.v[j] = _mm256_mul_ps(amount.v[j], direction.v[j]);
+    }
+  }
+  return result;
+}
+
+/* Numbers of three arrays; this form is not worth shuffles of its own. */
+INLINE void put_separate(const triples *t, const supine_target *target, size_t at) {
+  float xyz[TILE_NUMBERS];
+  for (size_t j = 0; j < 6; ++j) {
+    _mm256_storeu_ps(xyz + 8 * j, t->v[j]);
+  }
+  for (size_t v = 0; v < TILE; ++v) {
+    target->x[at + v] = xyz[3 * v];
+    target->y[at + v] = xyz[3 * v + 1];
+    target->z[at + v] = xyz[3 * v + 2];
+  }
+}
+
+INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                       const supine_target *target, supine_storage storage, bool vector) {
+  const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    supine_prefetch_tile(tile, tiles->stride, target->prefetch);
+    const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
+    if (target->y != NULL) {
+      put_separate(&xyz, target, t * TILE);
+      continue;
+    }
+    for (size_t j = 0; j < 6; ++j) {
+      put(target->x + t * TILE_NUMBERS + 8 * j, xyz.v[j], target->stream);
+    }
+  }
+}
+
+INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
+                           size_t count, const supine_target *target, supine_storage storage) {
+  if (tiles->axes == 3) {
+    deform_all(tiles, weights, first, count, target, storage, true);
+  } else {
+    deform_all(tiles, weights, first, count, target, storage, false);
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                   const supine_target *target) {
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_EXACT:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
+    break;
+  case SUPINE_STORAGE_FLOAT32:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
+    break;
+  case SUPINE_STORAGE_MIXED:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
+    break;
+  default:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
+                               float *c) {
+  const size_t paired = supine_tiles_paired(storage, modes);
+  for (size_t k = 0; k < paired; ++k) {
+    _mm256_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, 0, storage));
+    _mm256_store_ps(c + 16 * k + 8, coefficient(at, k / 2, k % 2 != 0, 1, storage));
+  }
+  for (size_t k = paired; k < modes; ++k) {
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
+    _mm256_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3, 0));
+    _mm256_store_ps(c + 16 * k + 8, third_coefficient(words, (k - paired) % 3, 1));
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  const bool compact = supine_tiles_compact(tiles->storage);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    unsigned char *wide = to->bytes + t * to->stride;
+    float *d = (float *)(void *)(wide + to->direction_begin);
+    float *p = (float *)(void *)(wide + to->rest_begin);
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      const unsigned char *from = tile + axis * tiles->axis_bytes;
+      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
+      switch (tiles->storage) {
+      case SUPINE_STORAGE_INT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_MIXED:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
+        break;
+      case SUPINE_STORAGE_FLOAT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
+        break;
+      default:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
+        break;
+      }
+    }
+    if (tiles->axes == 1) {
+      const triples direction = numbers(tile + tiles->direction_begin, compact);
+      for (size_t j = 0; j < 6; ++j) {
+        _mm256_store_ps(d + 8 * j, direction.v[j]);
+      }
+    }
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 6; ++j) {
+      _mm256_store_ps(p + 8 * j, rest.v[j]);
+    }
+  }
+}
+
+const supine_kernels supine_kernels_avx2 = {deform, widen};
+#else
+const supine_kernels supine_kernels_avx2 = {NULL, NULL};
+#endif

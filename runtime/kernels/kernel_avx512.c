@@ -1,0 +1,363 @@
+/* SPDX-License-Identifier: MIT */
+/* Evaluating tiles with AVX-512 F and BW: one register for the 16 vertices. */
+#include "runtime/kernels/tiles.h"
+
+#if defined(__AVX512F__) && defined(__AVX512BW__)
+#include <immintrin.h>
+
+#define INLINE static inline __attribute__((always_inline))
+/* Where the trip count is known, all of it, so that an array of registers is one. */
+#if defined(__clang__)
+#define UNROLL _Pragma("clang loop unroll_count(16)")
+#else
+#define UNROLL _Pragma("GCC unroll 16")
+#endif
+
+enum { COMMON_MODES = 16 }; /* whose weights stay in registers */
+
+/* Weight k in every lane: from a register where the number of modes is the common one. */
+typedef struct weights16 {
+  const float *at;
+  __m512 v[COMMON_MODES];
+} weights16;
+
+INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
+  return common ? w->v[k] : _mm512_set1_ps(w->at[k]);
+}
+
+/* Coefficient 2 pair, or the one after it, of 16 vertices. */
+INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
+                          supine_storage storage) {
+  const size_t k = 2 * pair + second;
+  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+    /* compact.h: pair_first, pair_second */
+    const __m512i words = _mm512_load_si512(at + 64 * pair);
+    return _mm512_cvtepi32_ps(second ? words : _mm512_slli_epi32(words, 16));
+  }
+  if (storage == SUPINE_STORAGE_FLOAT16) {
+    return _mm512_cvtph_ps(_mm256_load_si256((const __m256i *)(at + 32 * k)));
+  }
+  return _mm512_load_ps(at + 64 * k);
+}
+
+/* The coefficient of one of the three last modes whose words are `at` (compact.h). */
+INLINE __m512 third_coefficient(const unsigned char *at, size_t which) {
+  const __m512i words = _mm512_load_si512(at);
+  return _mm512_cvtepi32_ps(which == 0   ? words /* shifts take constants */
+                            : which == 1 ? _mm512_slli_epi32(words, 11)
+                                         : _mm512_slli_epi32(words, 22));
+}
+
+/* sum over k of w_k c_k, in two chains: K multiplications, K - 1 additions. */
+INLINE __m512 dot(const unsigned char *at, const weights16 *w, size_t modes, bool common,
+                  supine_storage storage) {
+  __m512 even = _mm512_mul_ps(weight(w, 0, common), coefficient(at, 0, false, storage));
+  if (modes == 1) {
+    return even;
+  }
+  __m512 odd = _mm512_mul_ps(weight(w, 1, common), coefficient(at, 0, true, storage));
+  const size_t thirds = supine_tiles_thirds(storage, modes);
+  const size_t paired = supine_tiles_paired(storage, modes);
+  UNROLL for (size_t pair = 1; pair < paired / 2; ++pair) {
+    even =
+        _mm512_fmadd_ps(weight(w, 2 * pair, common), coefficient(at, pair, false, storage), even);
+    odd =
+        _mm512_fmadd_ps(weight(w, 2 * pair + 1, common), coefficient(at, pair, true, storage), odd);
+  }
+  if (paired % 2 != 0) {
+    even = _mm512_fmadd_ps(weight(w, paired - 1, common),
+                           coefficient(at, paired / 2, false, storage), even);
+  }
+  UNROLL for (size_t t = 0; t < thirds; ++t) {
+    const size_t k = paired + 3 * t;
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
+    odd = _mm512_fmadd_ps(weight(w, k, common), third_coefficient(words, 0), odd);
+    even = _mm512_fmadd_ps(weight(w, k + 1, common), third_coefficient(words, 1), even);
+    odd = _mm512_fmadd_ps(weight(w, k + 2, common), third_coefficient(words, 2), odd);
+  }
+  return _mm512_add_ps(even, odd);
+}
+
+/* Numbers 0 to 15, 16 to 31, 32 to 47. */
+typedef struct triples {
+  __m512 v[3];
+} triples;
+
+/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+INLINE triples numbers(const unsigned char *at, bool compact) {
+  if (!compact) {
+    return (triples){{_mm512_load_ps(at), _mm512_load_ps(at + 64), _mm512_load_ps(at + 128)}};
+  }
+  enum { A_OR_B_AND_C = 0xF8 };
+  const __m512i first = _mm512_load_si512(at);
+  const __m512i second = _mm512_load_si512(at + 64);
+  const __m512i third =
+      _mm512_ternarylogic_epi32(_mm512_slli_epi32(first, 21), _mm512_slli_epi32(second, 10),
+                                _mm512_set1_epi32(0x1FFC00), A_OR_B_AND_C);
+  return (triples){
+      {_mm512_cvtepi32_ps(first), _mm512_cvtepi32_ps(second), _mm512_cvtepi32_ps(third)}};
+}
+
+/* Rest positions, mm. */
+INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
+  const __m512i unit = _mm512_set1_epi32((int)tiles->rest_unit);
+  triples p = numbers(tile + tiles->rest_begin, compact);
+  for (size_t j = 0; j < 3 && compact; ++j) {
+    p.v[j] = _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(p.v[j]), unit));
+  }
+  return p;
+}
+
+/* The amount of each vertex at its three numbers. */
+INLINE triples spread_amount(__m512 a) {
+  const __m512i lane0 = _mm512_setr_epi32(0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5);
+  const __m512i lane1 = _mm512_setr_epi32(5, 5, 6, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10);
+  const __m512i lane2 =
+      _mm512_setr_epi32(10, 11, 11, 11, 12, 12, 12, 13, 13, 13, 14, 14, 14, 15, 15, 15);
+  return (triples){{_mm512_permutexvar_ps(lane0, a), _mm512_permutexvar_ps(lane1, a),
+                    _mm512_permutexvar_ps(lane2, a)}};
+}
+
+/* Three registers of x, y and z into x y z x y z ...; lane + 16 takes from the second of a pair. */
+INLINE triples interleave(__m512 x, __m512 y, __m512 z) {
+  const __m512i xy0 = _mm512_setr_epi32(0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5);
+  const __m512i xy1 = _mm512_setr_epi32(21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26);
+  const __m512i xy2 = _mm512_setr_epi32(0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0);
+  const __m512i z0 = _mm512_setr_epi32(0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15);
+  const __m512i z1 = _mm512_setr_epi32(0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15);
+  const __m512i z2 = _mm512_setr_epi32(26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31);
+  return (triples){{_mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy0, y), z0, z),
+                    _mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy1, y), z1, z),
+                    _mm512_permutex2var_ps(_mm512_permutex2var_ps(x, xy2, y), z2, z)}};
+}
+
+/* The reverse. */
+INLINE triples separate(triples t) {
+  const __m512i x01 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+  const __m512i y01 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+  const __m512i z01 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+  const __m512i x2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+  const __m512i y2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+  const __m512i z2 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+  return (triples){
+      {_mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], x01, t.v[1]), x2, t.v[2]),
+       _mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], y01, t.v[1]), y2, t.v[2]),
+       _mm512_permutex2var_ps(_mm512_permutex2var_ps(t.v[0], z01, t.v[1]), z2, t.v[2])}};
+}
+
+/* An array that is written in order, past the cache where `stream`. A store past the cache must
+ * fill an aligned line; where the array is not aligned, each line joins the end of one register to
+ * the beginning of the next. */
+typedef struct writer {
+  __m512 last;  /* the register before this one */
+  __m512i join; /* permutation of (last, next) that makes the line */
+  float *to;
+  size_t offset; /* numbers by which `to` is past an aligned line */
+  bool stream;
+  bool shared; /* the next store's line begins with numbers that are not ours */
+} writer;
+
+INLINE writer writer_open(float *to, const supine_target *target) {
+  const size_t offset = (uintptr_t)to / sizeof *to % 16;
+  const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const bool resume = target->held != NULL && target->continues;
+  return (writer){resume ? _mm512_loadu_ps(target->held) : _mm512_setzero_ps(),
+                  _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
+                  to,
+                  offset,
+                  target->stream,
+                  !resume && offset != 0};
+}
+
+INLINE void writer_put(writer *w, __m512 next) {
+  if (!w->stream) {
+    _mm512_storeu_ps(w->to, next);
+  } else if (w->shared) { /* the line begins with numbers that are not ours */
+    _mm512_mask_storeu_ps(w->to, (__mmask16)(0xFFFFU >> w->offset), next);
+    w->shared = false;
+  } else {
+    _mm512_stream_ps(w->to - w->offset, _mm512_permutex2var_ps(w->last, w->join, next));
+  }
+  w->last = next;
+  w->to += 16;
+}
+
+/* The end of the last register, which no full line has taken. */
+INLINE void writer_close(const writer *w, const supine_target *target) {
+  if (target->held != NULL && target->continued) {
+    _mm512_storeu_ps(target->held, w->last);
+  } else if (w->stream && w->offset != 0) {
+    _mm512_mask_storeu_ps(w->to - 16, (__mmask16)(0xFFFFU << (16 - w->offset)), w->last);
+  }
+}
+
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
+                           bool with_rest, bool common, supine_storage storage, bool vector) {
+  const size_t modes = common ? COMMON_MODES : tiles->modes;
+  const bool compact = supine_tiles_compact(storage);
+  triples result;
+  if (vector) {
+    const __m512 x = dot(tile, w, modes, common, storage);
+    const __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
+    const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
+    result = interleave(x, y, z);
+    if (with_rest) {
+      const triples rest = rest_positions(tiles, tile, compact);
+      for (size_t j = 0; j < 3; ++j) {
+        result.v[j] = _mm512_add_ps(result.v[j], rest.v[j]);
+      }
+    }
+    return result;
+  }
+  const triples amount = spread_amount(dot(tile, w, modes, common, storage));
+  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  if (with_rest) {
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 3; ++j) {
+      result.v[j] = _mm512_fmadd_ps(amount.v[j], direction.v[j], rest.v[j]);
+    }
+  } else {
+    for (size_t j = 0; j < 3; ++j) {
+      result.v[j] = _mm512_mul_ps(amount.v[j], direction.v[j]);
+    }
+  }
+  return result;
+}
+
+/* What a caller's constants make of one loop. */
+typedef struct form {
+  supine_storage storage;
+  bool vector, rest, joined;
+  bool common; /* 16 modes */
+} form;
+
+INLINE void deform_all(const supine_tiles *any, const float *weights, size_t first, size_t count,
+                       const supine_target *target, form f) {
+  supine_tiles same = *any;
+  if (f.common) { /* known to the compiler */
+    supine_tiles_layout(&same, f.storage, COMMON_MODES, f.vector, any->count);
+  }
+  const supine_tiles *tiles = &same;
+  const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
+                   writer_open(target->z, target)}; /* joined: the first alone */
+  weights16 w = {.at = weights};
+  if (f.common) {
+    UNROLL for (size_t k = 0; k < COMMON_MODES; ++k) {
+      w.v[k] = _mm512_set1_ps(weights[k]);
+    }
+  }
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    supine_prefetch_tile(tile, tiles->stride, target->prefetch);
+    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
+    if (f.joined) {
+      writer_put(&out[0], xyz.v[0]);
+      writer_put(&out[0], xyz.v[1]);
+      writer_put(&out[0], xyz.v[2]);
+    } else {
+      xyz = separate(xyz);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        writer_put(&out[axis], xyz.v[axis]);
+      }
+    }
+  }
+  for (size_t axis = 0; axis < (f.joined ? 1 : 3) && count > 0; ++axis) {
+    writer_close(&out[axis], target);
+  }
+}
+
+/* One instance for the common number of modes and form of target, one for the others. */
+INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                        const supine_target *target, supine_storage storage, bool vector) {
+  const bool joined = target->y == NULL;
+  if (target->rest && joined && tiles->modes == COMMON_MODES) {
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = true, .joined = true, .common = true});
+  } else {
+    deform_all(tiles, weights, first, count, target,
+               (form){storage, vector, .rest = target->rest, .joined = joined, .common = false});
+  }
+}
+
+INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
+                           size_t count, const supine_target *target, supine_storage storage) {
+  if (tiles->axes == 3) {
+    deform_kind(tiles, weights, first, count, target, storage, true);
+  } else {
+    deform_kind(tiles, weights, first, count, target, storage, false);
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                   const supine_target *target) {
+  switch (tiles->storage) {
+  case SUPINE_STORAGE_EXACT:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
+    break;
+  case SUPINE_STORAGE_FLOAT32:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
+    break;
+  case SUPINE_STORAGE_FLOAT16:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
+    break;
+  case SUPINE_STORAGE_MIXED:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
+    break;
+  default:
+    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
+                               float *c) {
+  const size_t paired = supine_tiles_paired(storage, modes);
+  for (size_t k = 0; k < paired; ++k) {
+    _mm512_store_ps(c + 16 * k, coefficient(at, k / 2, k % 2 != 0, storage));
+  }
+  for (size_t k = paired; k < modes; ++k) {
+    const unsigned char *words = at + supine_tiles_words_begin(paired, k);
+    _mm512_store_ps(c + 16 * k, third_coefficient(words, (k - paired) % 3));
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  const bool compact = supine_tiles_compact(tiles->storage);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    unsigned char *wide = to->bytes + t * to->stride;
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      const unsigned char *from = tile + axis * tiles->axis_bytes;
+      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
+      switch (tiles->storage) {
+      case SUPINE_STORAGE_INT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
+        break;
+      case SUPINE_STORAGE_MIXED:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
+        break;
+      case SUPINE_STORAGE_FLOAT16:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
+        break;
+      default:
+        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
+        break;
+      }
+    }
+    if (tiles->axes == 1) {
+      const triples direction = numbers(tile + tiles->direction_begin, compact);
+      for (size_t j = 0; j < 3; ++j) {
+        _mm512_store_ps(wide + to->direction_begin + 64 * j, direction.v[j]);
+      }
+    }
+    const triples rest = rest_positions(tiles, tile, compact);
+    for (size_t j = 0; j < 3; ++j) {
+      _mm512_store_ps(wide + to->rest_begin + 64 * j, rest.v[j]);
+    }
+  }
+}
+
+const supine_kernels supine_kernels_avx512 = {deform, widen};
+#else
+const supine_kernels supine_kernels_avx512 = {NULL, NULL};
+#endif

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lists of orientations on the command line: names, tilted names, gravity triples. */
+#ifndef SUPINE_POSTURE_LIST_H
+#define SUPINE_POSTURE_LIST_H
+
+#include "runtime/options/command.h"
+
+enum { SUPINE_POSTURE_LIST_MAX = 32, SUPINE_POSTURE_NAME_MAX = 48 };
+
+/* One orientation: as the user wrote it, and its unit direction of gravity. */
+typedef struct supine_posture_item {
+  char name[SUPINE_POSTURE_NAME_MAX];
+  double gravity[3];
+} supine_posture_item;
+
+typedef struct supine_posture_list {
+  size_t count;
+  supine_posture_item item[SUPINE_POSTURE_LIST_MAX];
+} supine_posture_list;
+
+/* What a list may hold, for a command's help. */
+extern const char supine_posture_list_help[];
+
+/* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
+int supine_posture_list_parse(const char *command, const char *text, supine_posture_list *list);
+
+#endif

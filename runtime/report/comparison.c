@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compares postures of a basis, pair by pair and over the whole sphere. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "runtime/report/comparison.h"
+
+static supine_status find_posture(const supine_comparison *c, const supine_posture_item *item,
+                                  float *distance, float *xyz, supine_compared_posture *posture,
+                                  supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  double scale = 0.0;
+  supine_status status = supine_basis_weights(c->basis, item->gravity, posture->weights);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "%s: gravity has no direction", item->name);
+  }
+  status = supine_compare_scale(c->compare, &c->inflation, posture->weights, &scale, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    posture->scales[lung] = scale;
+    posture->volume[lung] =
+        info->has_volume ? supine_basis_lung_volume(c->basis, lung, posture->weights, scale) : 0.0;
+  }
+  supine_compare_distances(c->compare, posture->weights, posture->scales, NULL, NULL, distance);
+  supine_compare_statistics(c->compare, distance, &posture->displacement);
+  if (info->has_volume) {
+    supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
+    supine_deform(c->basis, posture->weights, posture->scales, xyz);
+    status =
+        supine_compare_slabs(c->basis, item->gravity, xyz, SUPINE_COMPARISON_SLABS, slabs, error);
+    for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
+      posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
+      posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
+    }
+  }
+  return status;
+}
+
+static supine_status find_energy(supine_comparison *c, supine_error *error) {
+  const size_t band = supine_basis_get_info(c->basis)->band;
+  double *energy = calloc(band + 1, sizeof *energy);
+  if (energy == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  supine_compare_energy(c->compare, energy);
+  double total = 0.0;
+  c->constant = energy[0];
+  for (size_t l = 0; l <= band; ++l) {
+    total += energy[l];
+    *(l % 2 == 1 ? &c->odd : &c->even) += l == 0 ? 0.0 : energy[l];
+  }
+  if (total > 0.0) {
+    c->constant /= total;
+    c->odd /= total;
+    c->even /= total;
+  }
+  free(energy);
+  return SUPINE_OK;
+}
+
+supine_status supine_comparison_find(supine_comparison *c, supine_error *error) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
+  const size_t count = c->postures.count;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  float *distance = malloc(n * sizeof *distance);
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  c->posture = calloc(count, sizeof *c->posture);
+  c->pair = calloc(count * count, sizeof *c->pair);
+  if (distance == NULL || xyz == NULL || c->posture == NULL || c->pair == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  status = supine_compare_create(c->basis, &c->compare, error);
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], error);
+  }
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = i + 1; j < count; ++j) {
+      const supine_compared_posture *a = &c->posture[i];
+      const supine_compared_posture *b = &c->posture[j];
+      supine_compare_distances(c->compare, a->weights, a->scales, b->weights, b->scales, distance);
+      supine_compare_statistics(c->compare, distance, &c->pair[i * count + j]);
+      c->pair[j * count + i] = c->pair[i * count + j];
+    }
+  }
+  status = find_energy(c, error);
+  if (status == SUPINE_OK) {
+    status = supine_compare_search(c->compare, &c->inflation, supine, SUPINE_COMPARISON_DIRECTIONS,
+                                   &c->extremes, error);
+  }
+cleanup:
+  free(distance);
+  free(xyz);
+  return status;
+}
+
+void supine_comparison_free(supine_comparison *c) {
+  supine_compare_destroy(c->compare);
+  free(c->posture);
+  free(c->pair);
+  c->compare = NULL;
+  c->posture = NULL;
+  c->pair = NULL;
+}
+
+void supine_comparison_inflation(const supine_comparison *c, char *text, size_t size) {
+  (void)snprintf(text, size, "%g %s", c->inflation.amount,
+                 c->inflation.kind == SUPINE_INFLATION_VOLUME ? "mL" : "mm RMS displacement");
+}
+
+double supine_comparison_gain(const supine_comparison *c, size_t posture) {
+  double gain = 0.0;
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    gain += c->posture[posture].volume[lung];
+  }
+  return gain;
+}

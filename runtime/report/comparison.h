@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What 'supine compare' finds out, and the forms in which it tells. */
+#ifndef SUPINE_COMPARISON_H
+#define SUPINE_COMPARISON_H
+
+#include <stdio.h>
+
+#include <supine/compare.h>
+
+#include "runtime/options/posture_list.h"
+
+enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
+
+/* One posture at the inflation. */
+typedef struct supine_compared_posture {
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  supine_distance_statistics displacement;   /* from rest */
+  double volume[SUPINE_LUNGS_MAX];           /* mL that each lung gains; closed surfaces */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
+} supine_compared_posture;
+
+typedef struct supine_comparison {
+  const char *path; /* of the basis, for showing */
+  const supine_basis *basis;
+  supine_inflation inflation;
+  supine_posture_list postures;
+  supine_compare *compare;
+  supine_compared_posture *posture; /* [count] */
+  supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
+  double constant, odd, even;       /* shares of energy: l = 0, odd bands, even bands beyond 0 */
+  supine_extremes extremes;         /* farthest: from supine */
+} supine_comparison;
+
+/* Fills in everything after `postures`. Release with supine_comparison_free also after failure. */
+supine_status supine_comparison_find(supine_comparison *comparison, supine_error *error);
+void supine_comparison_free(supine_comparison *comparison);
+
+/* "500 mL" or "5 mm RMS displacement". */
+void supine_comparison_inflation(const supine_comparison *comparison, char *text, size_t size);
+
+/* What a posture gains over all lungs, mL. */
+double supine_comparison_gain(const supine_comparison *comparison, size_t posture);
+
+/* The forms. They leave errors of writing to be found when the file is closed. */
+void supine_comparison_text(const supine_comparison *comparison, FILE *file);
+bool supine_comparison_json(const supine_comparison *comparison, FILE *file);
+void supine_comparison_csv(const supine_comparison *comparison, FILE *file);
+void supine_comparison_html(const supine_comparison *comparison, FILE *file);
+
+#endif

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A comparison for spreadsheets: one number a row. */
+#include "runtime/options/basis_input.h"
+#include "runtime/report/comparison.h"
+
+static void row(FILE *file, const char *quantity, const char *posture, const char *other,
+                const char *part, double value, const char *unit) {
+  (void)fprintf(file, "%s,%s,%s,%s,%.9g,%s\n", quantity, posture, other, part, value, unit);
+}
+
+static void statistics(FILE *file, const char *quantity, const char *posture, const char *other,
+                       const supine_distance_statistics *d) {
+  row(file, quantity, posture, other, "mean", d->mean, "mm");
+  row(file, quantity, posture, other, "rms", d->rms, "mm");
+  row(file, quantity, posture, other, "p95", d->p95, "mm");
+  row(file, quantity, posture, other, "max", d->max, "mm");
+}
+
+static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
+  const supine_compared_posture *posture = &c->posture[i];
+  const char *name = c->postures.item[i].name;
+  statistics(file, "displacement", name, "rest", &posture->displacement);
+  if (!supine_basis_get_info(c->basis)->has_volume) {
+    return;
+  }
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    char lung_name[32];
+    supine_basis_lung_name(c->basis, lung, lung_name, sizeof lung_name);
+    row(file, "gain", name, "rest", lung_name, posture->volume[lung], "mL");
+  }
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    char part[32];
+    (void)snprintf(part, sizeof part, "height %zu-%zu %%", 100 - 10 * (s + 1), 100 - 10 * s);
+    row(file, "slab volume", name, "rest", part, posture->slab[s].volume, "mL");
+    row(file, "slab gain", name, "rest", part, posture->slab[s].gain, "mL");
+  }
+}
+
+void supine_comparison_csv(const supine_comparison *c, FILE *file) {
+  const size_t count = c->postures.count;
+  (void)fputs("quantity,posture,other,part,value,unit\n", file);
+  for (size_t i = 0; i < count; ++i) {
+    posture_rows(c, i, file);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = i + 1; j < count; ++j) {
+      statistics(file, "distance", c->postures.item[i].name, c->postures.item[j].name,
+                 &c->pair[i * count + j]);
+    }
+  }
+  row(file, "energy", "all", "", "constant", c->constant, "1");
+  row(file, "energy", "all", "", "odd", c->odd, "1");
+  row(file, "energy", "all", "", "even", c->even, "1");
+}

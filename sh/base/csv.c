@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A strict reader of small CSV files whose errors name the line. */
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/csv.h"
+
+static char *trim(char *text) {
+  while (isspace((unsigned char)*text)) {
+    ++text;
+  }
+  size_t length = strlen(text);
+  while (length > 0 && isspace((unsigned char)text[length - 1])) {
+    text[--length] = '\0';
+  }
+  return text;
+}
+
+/* The next line that holds something, trimmed; NULL at the end or on failure. */
+static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
+  *status = SUPINE_OK;
+  for (;;) {
+    errno = 0;
+    const ssize_t length = getline(&csv->text, &csv->capacity, csv->file);
+    if (length < 0) {
+      if (errno == ENOMEM) {
+        *status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", csv->path);
+      } else if (ferror(csv->file) != 0) {
+        *status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", csv->path,
+                                   strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+      }
+      return NULL;
+    }
+    ++csv->line;
+    if (strlen(csv->text) != (size_t)length) {
+      *status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                 "%s:%zu: a NUL byte: this is no CSV text", csv->path, csv->line);
+      return NULL;
+    }
+    static const char mark[] =
+        "\xEF\xBB\xBF"; /* some programs begin UTF-8 with a byte-order mark */
+    const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
+    char *text = trim(csv->text + skip);
+    if (*text != '\0' && *text != '#') {
+      return text;
+    }
+  }
+}
+
+static supine_status csv_split(supine_csv *csv, char *text, supine_error *error) {
+  csv->field_count = 0;
+  for (char *rest = text; rest != NULL;) {
+    if (csv->field_count == SUPINE_CSV_FIELDS_MAX) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: more than %d fields", csv->path,
+                              csv->line, (int)SUPINE_CSV_FIELDS_MAX);
+    }
+    char *comma = strchr(rest, ',');
+    if (comma != NULL) {
+      *comma = '\0';
+    }
+    csv->field[csv->field_count++] = trim(rest);
+    rest = comma != NULL ? comma + 1 : NULL;
+  }
+  return SUPINE_OK;
+}
+
+/* Which field holds which expected column. */
+static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
+                                size_t required, supine_error *error) {
+  for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
+    csv->column[c] = SIZE_MAX;
+  }
+  for (size_t f = 0; f < csv->field_count; ++f) {
+    size_t c = 0;
+    while (c < count && strcmp(csv->field[f], names[c]) != 0) {
+      ++c;
+    }
+    if (c == count || csv->column[c] != SIZE_MAX) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s:%zu: %s column \"%s\" in the header; expected %s,%s,...",
+                              csv->path, csv->line, c == count ? "unknown" : "repeated",
+                              csv->field[f], names[0], names[1]);
+    }
+    csv->column[c] = f;
+  }
+  for (size_t c = 0; c < required; ++c) {
+    if (csv->column[c] == SIZE_MAX) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: the header has no column \"%s\"",
+                              csv->path, csv->line, names[c]);
+    }
+  }
+  csv->column_count = csv->field_count;
+  return SUPINE_OK;
+}
+
+supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
+                              size_t required, supine_csv *csv, supine_error *error) {
+  *csv = (supine_csv){.path = path};
+  csv->file = fopen(path, "rb");
+  if (csv->file == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
+                            strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+  }
+  supine_status status = SUPINE_OK;
+  char *text = csv_line(csv, &status, error);
+  if (status == SUPINE_OK && text == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: empty; expected a header %s,%s,...",
+                              path, names[0], names[1]);
+  }
+  if (status == SUPINE_OK) {
+    status = csv_split(csv, text, error);
+  }
+  if (status == SUPINE_OK) {
+    status = csv_header(csv, names, count, required, error);
+  }
+  if (status != SUPINE_OK) {
+    supine_csv_close(csv);
+  }
+  return status;
+}
+
+supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  char *text = csv_line(csv, &status, error);
+  *more = text != NULL;
+  if (text == NULL) {
+    return status;
+  }
+  status = csv_split(csv, text, error);
+  if (status == SUPINE_OK && csv->field_count != csv->column_count) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %zu fields where the header has %zu",
+                         csv->path, csv->line, csv->field_count, csv->column_count);
+  }
+  return status;
+}
+
+const char *supine_csv_text(const supine_csv *csv, size_t column) {
+  return csv->column[column] == SIZE_MAX ? NULL : csv->field[csv->column[column]];
+}
+
+supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
+                                double *number, supine_error *error) {
+  const char *text = supine_csv_text(csv, column);
+  char *end = NULL;
+  *number = strtod(text, &end);
+  if (end == text || *end != '\0' || !isfinite(*number)) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %s \"%s\" is not a finite number",
+                            csv->path, csv->line, name, text);
+  }
+  return SUPINE_OK;
+}
+
+void supine_csv_close(supine_csv *csv) {
+  if (csv->file != NULL) {
+    (void)fclose(csv->file);
+  }
+  free(csv->text);
+  *csv = (supine_csv){0};
+}
