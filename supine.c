@@ -63,7 +63,7 @@ static int unknown_command(const char *name) {
   for (size_t i = 0; i < COMMAND_COUNT; ++i) {
     names[i] = commands[i].name;
   }
-  const char *nearest = supine_suggest(name, names, COMMAND_COUNT);
+  const char *nearest = supine_options_suggest(name, names, COMMAND_COUNT);
   if (nearest != NULL) {
     (void)fprintf(stderr, "supine: no command '%s'; did you mean '%s'?\n", name, nearest);
   } else {
@@ -83,11 +83,11 @@ int main(int argc, char **argv) {
       strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0;
   if (help && argc == 2) {
     print_help();
-    return supine_command_finish("help");
+    return supine_options_finish("help");
   }
   if (strcmp(name, "--version") == 0) {
     (void)puts("supine " SUPINE_VERSION);
-    return supine_command_finish("version");
+    return supine_options_finish("version");
   }
   const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
   const size_t index = find_command(wanted);

@@ -97,8 +97,8 @@ typedef struct supine_topology {
  * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or one that is not there (load
  *                                gives no such mesh), or more than 2^31 - 1 vertices
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_topology_create(const supine_mesh *mesh, supine_topology *topology);
-void supine_topology_free(supine_topology *topology);
+supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
+void supine_mesh_topology_free(supine_topology *topology);
 
 /** Enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed, positive where
  * the triangles face outwards; meaningful on closed surfaces alone; 0 where there is nothing. */

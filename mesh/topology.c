@@ -138,7 +138,7 @@ static bool triangles_legal(const supine_mesh *mesh) {
   return true;
 }
 
-supine_status supine_topology_create(const supine_mesh *mesh, supine_topology *topology) {
+supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology) {
   const size_t vertices = mesh->vertex_count;
   if (vertices > INT32_MAX || mesh->triangle_count > UINT32_MAX / 3 || !triangles_legal(mesh)) {
     return SUPINE_ERROR_ARGUMENT;
@@ -171,13 +171,13 @@ supine_status supine_topology_create(const supine_mesh *mesh, supine_topology *t
   status = SUPINE_OK;
 
 cleanup:
-  supine_topology_free(&result);
+  supine_mesh_topology_free(&result);
   free(table.sides);
   free(table.first);
   return status;
 }
 
-void supine_topology_free(supine_topology *topology) {
+void supine_mesh_topology_free(supine_topology *topology) {
   free(topology->edges);
   free(topology->component);
   *topology = (supine_topology){0};

@@ -4,8 +4,8 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/writer/basis_file.h"
 #include "precompute/projection/compression.h"
+#include "precompute/writer/basis_file.h"
 
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *made_by,
@@ -24,7 +24,7 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
   }
   status = supine_fields_fit(fields, options, directions, &field, report, error);
   if (status == SUPINE_OK && lungs->topology.closed) {
-    status = supine_compression_volume_forms(&field, lungs, directions, &forms, error);
+    status = supine_projection_compression_volume_forms(&field, lungs, directions, &forms, error);
   }
   if (status == SUPINE_OK) {
     const supine_basis_content content = {.lungs = lungs,
@@ -36,13 +36,13 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
                                           .route = "fields",
                                           .harmonics = options->modes == 0,
                                           .made_by = made_by};
-    status = supine_basis_file_write(path, &content, error);
+    status = supine_writer_basis_write(path, &content, error);
   }
   if (mode_count != NULL) {
     *mode_count = field.mode_count;
   }
-  supine_compression_free(&field);
-  supine_volume_forms_free(&forms);
+  supine_projection_compression_free(&field);
+  supine_physics_volume_forms_free(&forms);
   free(directions);
   return status;
 }

@@ -5,9 +5,9 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/writer/basis_file.h"
-#include "precompute/projection/compression.h"
 #include "precompute/accuracy/held_out.h"
+#include "precompute/projection/compression.h"
+#include "precompute/writer/basis_file.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
@@ -48,11 +48,11 @@ static void pipeline_free(pipeline *p) {
   free(p->directions);
   free(p->weight);
   supine_projection_free(&p->projection);
-  supine_volume_forms_free(&p->column_forms);
-  supine_compression_free(&p->compression);
-  supine_volume_forms_free(&p->forms);
-  supine_held_out_free(&p->held_out);
-  supine_error_table_free(&p->table);
+  supine_physics_volume_forms_free(&p->column_forms);
+  supine_projection_compression_free(&p->compression);
+  supine_physics_volume_forms_free(&p->forms);
+  supine_accuracy_held_out_free(&p->held_out);
+  supine_accuracy_error_table_free(&p->table);
 }
 
 /* Progress of one stage, as a part of the whole. */
@@ -77,7 +77,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   const supine_status status =
-      supine_directions(p->lungs, &p->options->model.direction, p->directions, error);
+      supine_physics_directions(p->lungs, &p->options->model.direction, p->directions, error);
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     const double *d = p->directions + 3 * i;
     p->weight[i] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -95,18 +95,18 @@ static supine_status project(pipeline *p, supine_error *error) {
   p->linear = options->route == SUPINE_ROUTE_LINEAR ||
               (options->route == SUPINE_ROUTE_AUTO && model->force.soften == 0.0);
   if (p->linear) {
-    return supine_project_linear(p->lungs, &model->force, model->stiffness, options->band,
-                                 &p->projection, error);
+    return supine_projection_linear(p->lungs, &model->force, model->stiffness, options->band,
+                                    &p->projection, error);
   }
-  return supine_project_sampled(p->lungs, &model->force, model->stiffness, options->band, 0.0,
-                                stage_progress, &part, &p->projection, error);
+  return supine_projection_sampled(p->lungs, &model->force, model->stiffness, options->band, 0.0,
+                                   stage_progress, &part, &p->projection, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
   return p->options->modes == 0
-             ? supine_compress_harmonics(&p->projection, &p->compression, error)
-             : supine_compress_modes(&p->projection, p->weight, p->options->modes, &p->compression,
-                                     p->singular, &p->energy, error);
+             ? supine_projection_compress_harmonics(&p->projection, &p->compression, error)
+             : supine_projection_compress_modes(&p->projection, p->weight, p->options->modes,
+                                                &p->compression, p->singular, &p->energy, error);
 }
 
 /* Volume forms of the coefficients: of the linear route's few columns, carried along; else
@@ -120,14 +120,16 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
     supine_status status =
         p->column_forms.linear != NULL
             ? SUPINE_OK
-            : supine_volume_forms_create(p->lungs, p->directions, p->projection.columns,
-                                         p->projection.rank, &p->column_forms, error);
+            : supine_physics_volume_forms_create(p->lungs, p->directions, p->projection.columns,
+                                                 p->projection.rank, &p->column_forms, error);
     if (status == SUPINE_OK) {
-      status = supine_volume_forms_mix(&p->column_forms, field->mix, field->mode_count, &p->forms);
+      status = supine_physics_volume_forms_mix(&p->column_forms, field->mix, field->mode_count,
+                                               &p->forms);
     }
     return status;
   }
-  return supine_compression_volume_forms(field, p->lungs, p->directions, &p->forms, error);
+  return supine_projection_compression_volume_forms(field, p->lungs, p->directions, &p->forms,
+                                                    error);
 }
 
 static size_t held_out_default(const pipeline *p) {
@@ -139,12 +141,12 @@ static size_t held_out_default(const pipeline *p) {
 static supine_status hold_out(pipeline *p, supine_error *error) {
   const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
   if (p->linear) {
-    return supine_held_out_linear(p->lungs, &p->options->model.force, &p->projection,
-                                  p->lungs->topology.closed ? &p->column_forms : NULL, count,
-                                  &p->held_out, error);
+    return supine_accuracy_held_out_linear(p->lungs, &p->options->model.force, &p->projection,
+                                           p->lungs->topology.closed ? &p->column_forms : NULL,
+                                           count, &p->held_out, error);
   }
-  return supine_held_out_sampled(p->lungs, &p->options->model, p->directions, count, &p->held_out,
-                                 error);
+  return supine_accuracy_held_out_sampled(p->lungs, &p->options->model, p->directions, count,
+                                          &p->held_out, error);
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
@@ -172,8 +174,8 @@ static size_t modes_needed(const pipeline *p) {
 
 /* Made before modes are dropped, so that it shows what more of them would bring. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
-  const supine_status status = supine_error_table_create(&p->held_out.truth, &p->projection,
-                                                         &p->compression, p->directions, &p->table);
+  const supine_status status = supine_accuracy_error_table_create(
+      &p->held_out.truth, &p->projection, &p->compression, p->directions, &p->table);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to tabulate the error");
 }
@@ -184,17 +186,18 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
   if (p->options->modes == 0 || needed == p->compression.mode_count) {
     return SUPINE_OK;
   }
-  supine_compression_truncate(&p->compression, p->projection.rank, needed);
-  supine_volume_forms_free(&p->forms);
+  supine_projection_compression_truncate(&p->compression, p->projection.rank, needed);
+  supine_physics_volume_forms_free(&p->forms);
   const supine_status status = find_forms(p, error);
   return status == SUPINE_OK ? measure(p, error) : status;
 }
 
 static supine_status find_turned_over(pipeline *p, supine_error *error) {
   const supine_status status =
-      p->forms.linear == NULL ? SUPINE_OK
-                              : supine_turned_over(p->lungs, p->directions, &p->compression,
-                                                   &p->forms, p->accuracy.volume, &p->turned_over);
+      p->forms.linear == NULL
+          ? SUPINE_OK
+          : supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms,
+                                        p->accuracy.volume, &p->turned_over);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to look for folds");
 }
@@ -216,7 +219,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
   if (!stage_progress(&part, 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
-  return supine_basis_file_write(path, &content, error);
+  return supine_writer_basis_write(path, &content, error);
 }
 
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,

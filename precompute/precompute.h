@@ -40,7 +40,7 @@ typedef struct supine_precompute_report {
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
-  /** At accuracy.volume, see supine_turned_over; 0 where the surface is open. */
+  /** At accuracy.volume, see supine_accuracy_turned_over; 0 where the surface is open. */
   double turned_over;
 } supine_precompute_report;
 

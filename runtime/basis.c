@@ -261,7 +261,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   }
   const double bytes = basis->info.bytes_per_vertex + 3 * sizeof(float);
   basis->stream = (double)basis->info.vertex_count * bytes > STREAM_BYTES;
-  basis->prefetch = basis->stream ? supine_prefetch_choose() : SUPINE_PREFETCH_NONE;
+  basis->prefetch = basis->stream ? supine_kernels_prefetch_choose() : SUPINE_PREFETCH_NONE;
   return SUPINE_OK;
 }
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <sys/mman.h>
 
-#include "runtime/kernels/compact.h"
 #include "runtime/internal.h"
+#include "runtime/kernels/compact.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "precompute/lungs/lungs.h"
 #include "mesh/mesh.h"
+#include "precompute/lungs/lungs.h"
 
 #include "precompute/phantom/geodesic.h"
 #include "sh_helpers.h"
@@ -24,11 +24,11 @@ static inline double helper_random(uint64_t *seed) {
 /* A closed surface of 10 f^2 + 2 vertices, lumpy, nowhere symmetric, about 200 mm across, centred
  * at x. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
-  supine_mesh mesh = {.vertex_count = supine_geodesic_vertex_count(frequency),
-                      .triangle_count = supine_geodesic_triangle_count(frequency)};
+  supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
   mesh.vertices = malloc(3 * mesh.vertex_count * sizeof *mesh.vertices);
   mesh.triangles = malloc(3 * mesh.triangle_count * sizeof *mesh.triangles);
-  supine_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
+  supine_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
     const double radius =

@@ -191,7 +191,8 @@ void fixture_write(const fixture *f, const char *path) {
       {"units", "mm"},
   };
   supine_error error = {0};
-  const supine_status status = supine_safetensors_write(path, tensors, count, metadata, 4, &error);
+  const supine_status status =
+      supine_writer_safetensors_write(path, tensors, count, metadata, 4, &error);
   if (status != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-#include <supine/sh.h>
 #include "sh/transform.h"
+#include <supine/sh.h>
 
 #include "sh_helpers.h"
 

@@ -24,9 +24,9 @@
 #include "precompute/precompute.h"
 #include <supine/safetensors.h>
 
+#include "lungs_helpers.h"
 #include "runtime/breath/breath_course.h"
 #include "runtime/options/command.h"
-#include "lungs_helpers.h"
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64], series_folder[64], open_basis[64];
@@ -34,7 +34,7 @@ static char text[16384]; /* what the command said, stdout and stderr */
 
 static supine_status make_basis(const supine_lungs *lungs, const char *path) {
   const supine_precompute_options options = {
-      .model = supine_model_default(), .band = 5, .modes = 16, .held_out = 5};
+      .model = supine_physics_model_default(), .band = 5, .modes = 16, .held_out = 5};
   supine_precompute_report report;
   return supine_precompute(lungs, &options, path, &report, NULL);
 }
@@ -204,7 +204,7 @@ static double *breath_of(const supine_pv_breath *course, double fps, size_t fram
     time[t] = (double)t / fps;
   }
   assert_int_equal(
-      supine_pv_breath_evaluate(supine_pv_normal(), course, frames, time, volume, NULL, NULL),
+      supine_breath_evaluate(supine_breath_normal(), course, frames, time, volume, NULL, NULL),
       SUPINE_OK);
   free(time);
   return volume;
@@ -223,7 +223,7 @@ static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **
     lungs.share[0] = ill == 1 ? 0.3 : 1.0;
     assert_int_equal(make_basis(&lungs, real), SUPINE_OK);
     assert_int_equal(RUN(real, "--turn", "supine:left:5s", "-o", breath), SUPINE_EXIT_OK);
-    const supine_pv_breath course = supine_pv_breath_default();
+    const supine_pv_breath course = supine_breath_default();
     double *wanted = breath_of(&course, 66.66, 334);
     check_volumes(real, wanted, 334);
     free(wanted);
@@ -234,7 +234,7 @@ static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **
 
 static void test_breathe_one_posture_three_additions_keep_volumes(void **state) {
   (void)state;
-  supine_pv_breath course = supine_pv_breath_default();
+  supine_pv_breath course = supine_breath_default();
   assert_int_equal(RUN(basis, "--posture", "prone", "--step", "1.5", "-o", breath), SUPINE_EXIT_OK);
   course.course = SUPINE_PV_CONSTANT_FLOW; /* 1.5 mL a frame: 5 s of inhalation */
   course.inhale_fraction = 0.5;
@@ -252,7 +252,7 @@ static void test_breathe_one_posture_three_additions_keep_volumes(void **state) 
   assert_non_null(strstr(text, "of 15 ms"));
   free(wanted);
 
-  course = supine_pv_breath_default();
+  course = supine_breath_default();
   assert_int_equal(RUN(basis, "--posture", "left", "--seconds", "6", "-o", breath), SUPINE_EXIT_OK);
   wanted = breath_of(&course, 66.66, 400);
   check_volumes(basis, wanted, 400);
@@ -412,7 +412,7 @@ static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
     double angle = -1.0;
     for (int s = 0; s <= 8; ++s) {
       double g[3];
-      breath_turn_gravity(&turn, s, g);
+      supine_breath_turn_gravity(&turn, s, g);
       assert_true(fabs(hypot(hypot(g[0], g[1]), g[2]) - 1.0) < 1e-12);
       if (s > 0) {
         const double step = hypot(hypot(g[0] - last[0], g[1] - last[1]), g[2] - last[2]);
@@ -431,7 +431,7 @@ static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
       memcpy(last, g, sizeof last);
     }
     assert_memory_equal(last, turn.to, sizeof last);
-    breath_turn_gravity(&turn, 100.0, last);
+    supine_breath_turn_gravity(&turn, 100.0, last);
     assert_memory_equal(last, turn.to, sizeof last);
   }
 }

@@ -10,11 +10,11 @@
 
 #include <cmocka.h>
 
-#include "precompute/tissue/disease.h"
 #include "precompute/physics/solve.h"
-#include "precompute/precompute.h"
-#include <supine/volume.h>
 #include "precompute/physics/volume_forms.h"
+#include "precompute/precompute.h"
+#include "precompute/tissue/disease.h"
+#include <supine/volume.h>
 
 #include "lungs_helpers.h"
 
@@ -31,10 +31,10 @@ static supine_lungs lumps(void) {
 }
 
 static supine_solution solve(const supine_lungs *lungs, const double g[3]) {
-  const supine_model model = supine_model_default();
+  const supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   supine_error error = {0};
-  if (supine_solve(lungs, &model, g, &solution, &error) != SUPINE_OK) {
+  if (supine_physics_solve(lungs, &model, g, &solution, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return solution;
@@ -68,7 +68,7 @@ static void widen(double range[2], double value) {
 static change change_by(supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   size_t reached = 0;
-  assert_int_equal(supine_lungs_add_lesion(lungs, lesion, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(lungs, lesion, &reached, NULL), SUPINE_OK);
   assert_true(reached > 10);
   supine_solution ill = solve(lungs, supine);
   double scale[2] = {1.0, 1.0};
@@ -86,8 +86,8 @@ static change change_by(supine_lungs *lungs, const supine_lesion *lesion, double
       widen(found.far, ratio);
     }
   }
-  supine_solution_free(&healthy);
-  supine_solution_free(&ill);
+  supine_physics_solution_free(&healthy);
+  supine_physics_solution_free(&ill);
   free(lungs->lesions);
   lungs->lesions = NULL;
   return found;
@@ -142,14 +142,14 @@ static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 90.0, 50.0};
   size_t reached = 0;
-  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
   assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of them */
   supine_solution ill = solve(&lungs, supine);
   for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
     assert_true(fabs(ill.catch_[i] - healthy.catch_[i]) <= 1e-12 * healthy.catch_[i] + 1e-14);
   }
-  supine_solution_free(&healthy);
-  supine_solution_free(&ill);
+  supine_physics_solution_free(&healthy);
+  supine_physics_solution_free(&ill);
   supine_lungs_free(&lungs);
 }
 
@@ -159,12 +159,12 @@ static void test_lesion_factor_one_changes_no_bit(void **state) {
   supine_solution healthy = solve(&lungs, supine);
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 40.0, 1.0};
-  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
   assert_memory_equal(same.cubic, healthy.cubic, sizeof same.cubic);
-  supine_solution_free(&healthy);
-  supine_solution_free(&same);
+  supine_physics_solution_free(&healthy);
+  supine_physics_solution_free(&same);
   supine_lungs_free(&lungs);
 }
 
@@ -173,8 +173,8 @@ static void test_lesion_profile_is_as_documented(void **state) {
   supine_lungs lungs = lumps();
   const double *centre = side_of(&lungs);
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
-  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
-  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK); /* multiply */
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK); /* multiply */
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -201,12 +201,12 @@ static void test_lesion_outside_reaches_nothing(void **state) {
   supine_solution healthy = solve(&lungs, supine);
   const supine_lesion lesion = {{900.0, 0.0, 0.0}, 40.0, 9.0};
   size_t reached = 1;
-  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
   assert_int_equal(reached, 0);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
-  supine_solution_free(&healthy);
-  supine_solution_free(&same);
+  supine_physics_solution_free(&healthy);
+  supine_physics_solution_free(&same);
   supine_lungs_free(&lungs);
 }
 
@@ -219,7 +219,8 @@ static void test_lesion_bad_numbers_refused(void **state) {
                                       {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
-    assert_int_equal(supine_lungs_add_lesion(&lungs, &bad[i], NULL, &error), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], NULL, &error),
+                     SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "lesion at"));
   }
   assert_null(lungs.lesions);
@@ -248,17 +249,17 @@ static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void 
     double gains[2][2];
     double cubic[2];
     for (int ill = 0; ill < 2; ++ill) {
-      assert_int_equal(supine_lungs_collapse(&lungs, 0, ill == 1 ? share : 1.0, NULL), SUPINE_OK);
+      assert_int_equal(supine_tissue_collapse(&lungs, 0, ill == 1 ? share : 1.0, NULL), SUPINE_OK);
       supine_solution solution = solve(&lungs, directions[d]);
-      supine_lungs_rest(&lungs, rest);
+      supine_tissue_rest(&lungs, rest);
       const supine_mesh shape = {n, rest, 0, NULL};
-      supine_solution_apply(&solution, &shape, scale, moved);
+      supine_physics_solution_apply(&solution, &shape, scale, moved);
       for (size_t lung = 0; lung < 2; ++lung) {
         rests[ill][lung] = volume_of(&lungs, lung, rest);
         gains[ill][lung] = volume_of(&lungs, lung, moved) - rests[ill][lung];
       }
       cubic[ill] = supine_volume_at(solution.cubic, scale);
-      supine_solution_free(&solution);
+      supine_physics_solution_free(&solution);
     }
     for (size_t lung = 0; lung < 2; ++lung) {
       const double wanted = lung == 0 ? share : 1.0;
@@ -279,9 +280,9 @@ static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void 
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
     skip();
   }
-  assert_int_equal(supine_lungs_collapse(&lungs, 1, 0.25, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_collapse(&lungs, 1, 0.25, NULL), SUPINE_OK);
   double *rest = malloc(3 * lungs.mesh.vertex_count * sizeof *rest);
-  supine_lungs_rest(&lungs, rest);
+  supine_tissue_rest(&lungs, rest);
   double outer[2] = {0.0, 0.0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {
@@ -303,9 +304,9 @@ static void test_collapse_bad_arguments_refused(void **state) {
   supine_lungs lungs = lumps();
   static const double bad[] = {0.0, -0.5, 1.0001, NAN, INFINITY};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_lungs_collapse(&lungs, 0, bad[i], NULL), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_tissue_collapse(&lungs, 0, bad[i], NULL), SUPINE_ERROR_ARGUMENT);
   }
-  assert_int_equal(supine_lungs_collapse(&lungs, 2, 0.5, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_tissue_collapse(&lungs, 2, 0.5, NULL), SUPINE_ERROR_ARGUMENT);
   assert_true(lungs.share[0] == 1.0 && lungs.share[1] == 1.0);
   supine_lungs_free(&lungs);
 }

@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include <gsl/gsl_linalg.h>
 #include "precompute/physics/equilibrium.h"
+#include <gsl/gsl_linalg.h>
 
 #include "full_operator.h"
 #include "lungs_helpers.h"
@@ -29,8 +29,8 @@ static int setup(void **state) {
   fixture *f = calloc(1, sizeof *f);
   uint64_t seed = 20081;
   f->mesh = helper_lump(4, 60.0, 77);
-  assert_int_equal(supine_topology_create(&f->mesh, &f->topology), SUPINE_OK);
-  assert_int_equal(supine_network_create(&f->mesh, &f->topology, &f->network), SUPINE_OK);
+  assert_int_equal(supine_mesh_topology_create(&f->mesh, &f->topology), SUPINE_OK);
+  assert_int_equal(supine_physics_network_create(&f->mesh, &f->topology, &f->network), SUPINE_OK);
   f->stiffness = malloc(f->mesh.vertex_count * sizeof(double));
   f->force = malloc(3 * f->mesh.vertex_count * sizeof(double));
   for (size_t i = 0; i < f->mesh.vertex_count; ++i) {
@@ -45,8 +45,8 @@ static int setup(void **state) {
 
 static int teardown(void **state) {
   fixture *f = *state;
-  supine_network_destroy(f->network);
-  supine_topology_free(&f->topology);
+  supine_physics_network_destroy(f->network);
+  supine_mesh_topology_free(&f->topology);
   supine_mesh_free(&f->mesh);
   free(f->stiffness);
   free(f->force);
@@ -57,17 +57,18 @@ static int teardown(void **state) {
 static supine_equilibrium *equilibrium_of(const fixture *f, const double *stiffness,
                                           size_t rhs_max) {
   supine_equilibrium *eq = NULL;
-  assert_int_equal(supine_equilibrium_create(f->network, rhs_max, 1, &eq), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_create(f->network, rhs_max, 1, &eq), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
   return eq;
 }
 
 static double *solve_of(const fixture *f, const double *stiffness, size_t count) {
   supine_equilibrium *eq = equilibrium_of(f, stiffness, count);
   double *out = malloc(count * f->mesh.vertex_count * sizeof *out);
-  assert_int_equal(supine_equilibrium_solve(eq, count, f->force, 0.0, false, out, NULL, NULL),
-                   SUPINE_OK);
-  supine_equilibrium_destroy(eq);
+  assert_int_equal(
+      supine_physics_equilibrium_solve(eq, count, f->force, 0.0, false, out, NULL, NULL),
+      SUPINE_OK);
+  supine_physics_equilibrium_destroy(eq);
   return out;
 }
 
@@ -111,14 +112,14 @@ static void test_solve_all_nodes_equals_dense_definition(void **state) {
   for (size_t i = 0; i < n; ++i) {
     force[i] = f->force[3 * i];
   }
-  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, masses, NULL, NULL),
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, masses, NULL, NULL),
                    SUPINE_OK);
-  supine_equilibrium_spring_catch(eq, &f->topology, springs);
+  supine_physics_equilibrium_spring_catch(eq, &f->topology, springs);
   for (size_t i = 0; i < op.node_count; ++i) {
     const double should = op.own[i] * gsl_vector_get(x, i);
     assert_close(i < n ? masses[i] : springs[i - n], should, 1e-12);
   }
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   full_operator_free(&op);
   gsl_matrix_free(matrix);
   gsl_vector_free(b);
@@ -136,9 +137,9 @@ static void test_solve_catch_sums_to_applied_force(void **state) {
   supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 3);
   double *masses = malloc(3 * n * sizeof *masses);
   double *springs = malloc(3 * f->topology.edge_count * sizeof *springs);
-  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, masses, NULL, NULL),
-                   SUPINE_OK);
-  supine_equilibrium_spring_catch(eq, &f->topology, springs);
+  assert_int_equal(
+      supine_physics_equilibrium_solve(eq, 3, f->force, 0.0, false, masses, NULL, NULL), SUPINE_OK);
+  supine_physics_equilibrium_spring_catch(eq, &f->topology, springs);
   for (size_t r = 0; r < 3; ++r) {
     double applied = 0.0;
     double caught = 0.0;
@@ -151,7 +152,7 @@ static void test_solve_catch_sums_to_applied_force(void **state) {
     }
     assert_close(caught, applied, 1e-12 * applied);
   }
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(masses);
   free(springs);
 }
@@ -205,16 +206,17 @@ static void test_pitcher_catcher_agrees_with_fast_solve(void **state) {
     force[i] = f->force[3 * i] - 0.4;
   }
   double last[2] = {0.0, INFINITY};
-  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, fast, NULL, NULL), SUPINE_OK);
-  supine_equilibrium_spring_catch(eq, &f->topology, springs);
-  assert_int_equal(supine_pitcher_catcher(&f->mesh, &f->topology, f->stiffness, force, 1e-13, slow,
-                                          caught, count_progress, last, NULL),
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, fast, NULL, NULL),
+                   SUPINE_OK);
+  supine_physics_equilibrium_spring_catch(eq, &f->topology, springs);
+  assert_int_equal(supine_physics_pitcher_catcher(&f->mesh, &f->topology, f->stiffness, force,
+                                                  1e-13, slow, caught, count_progress, last, NULL),
                    SUPINE_OK);
   assert_true(last[0] > (double)n);
   assert_true(helper_difference(n, fast, slow) <= 1e-9 * helper_largest(n, fast));
   assert_true(helper_difference(f->topology.edge_count, springs, caught) <=
               1e-9 * helper_largest(f->topology.edge_count, springs));
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(force);
   free(fast);
   free(slow);
@@ -231,8 +233,8 @@ static void test_transfer_column_reciprocity_and_positivity(void **state) {
   supine_equilibrium *eq = equilibrium_of(f, f->stiffness, 1);
   double *a = malloc(n * sizeof *a);
   double *b = malloc(n * sizeof *b);
-  assert_int_equal(supine_transfer_column(eq, first, a, NULL), SUPINE_OK);
-  assert_int_equal(supine_transfer_column(eq, second, b, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_transfer_column(eq, first, a, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_transfer_column(eq, second, b, NULL), SUPINE_OK);
   const double ratio = f->stiffness[first] / f->stiffness[second];
   assert_true(a[second] > 0.0);
   assert_close(a[second] / (ratio * ratio), b[first], 1e-12 * b[first]);
@@ -240,9 +242,9 @@ static void test_transfer_column_reciprocity_and_positivity(void **state) {
     assert_true(a[i] > -1e-15);
   }
   supine_error error;
-  assert_int_equal(supine_transfer_column(eq, n, a, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_transfer_column(eq, n, a, &error), SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "162"));
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(a);
   free(b);
 }
@@ -255,7 +257,7 @@ static void test_transfer_columns_superpose_to_solution(void **state) {
   double *sum = calloc(n, sizeof *sum);
   double *whole = solve_of(f, f->stiffness, 3);
   for (size_t j = 0; j < n; ++j) { /* (2): F = T f */
-    assert_int_equal(supine_transfer_column(eq, j, column, NULL), SUPINE_OK);
+    assert_int_equal(supine_physics_transfer_column(eq, j, column, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       sum[i] += column[i] * f->force[3 * j + 1];
     }
@@ -263,7 +265,7 @@ static void test_transfer_columns_superpose_to_solution(void **state) {
   for (size_t i = 0; i < n; ++i) {
     assert_close(sum[i], whole[3 * i + 1], 1e-12);
   }
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(column);
   free(sum);
   free(whole);
@@ -308,15 +310,15 @@ static void test_solve_shuffled_vertices_same_answer(void **state) {
       force[at] = mesh.vertices[3 * i + 1];
       stiffness[at] = 1.0 + fabs(mesh.vertices[3 * i]);
     }
-    assert_int_equal(supine_topology_create(meshes[m], &topology), SUPINE_OK);
-    assert_int_equal(supine_network_create(meshes[m], &topology, &network), SUPINE_OK);
-    assert_int_equal(supine_equilibrium_create(network, 1, 2, &eq), SUPINE_OK);
-    assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
-    assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out[m], NULL, NULL),
+    assert_int_equal(supine_mesh_topology_create(meshes[m], &topology), SUPINE_OK);
+    assert_int_equal(supine_physics_network_create(meshes[m], &topology, &network), SUPINE_OK);
+    assert_int_equal(supine_physics_equilibrium_create(network, 1, 2, &eq), SUPINE_OK);
+    assert_int_equal(supine_physics_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+    assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, out[m], NULL, NULL),
                      SUPINE_OK);
-    supine_equilibrium_destroy(eq);
-    supine_network_destroy(network);
-    supine_topology_free(&topology);
+    supine_physics_equilibrium_destroy(eq);
+    supine_physics_network_destroy(network);
+    supine_mesh_topology_free(&topology);
     free(force);
     free(stiffness);
   }
@@ -343,14 +345,15 @@ static void test_solve_warm_start_same_answer_fewer_steps(void **state) {
   for (size_t i = 0; i < 3 * n; ++i) {
     near[i] = f->force[i] * (1.0 + 1e-6 * sin((double)i));
   }
-  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, cold, &first, NULL),
-                   SUPINE_OK);
-  assert_int_equal(supine_equilibrium_solve(eq, 3, near, 0.0, true, warm, &second, NULL),
+  assert_int_equal(
+      supine_physics_equilibrium_solve(eq, 3, f->force, 0.0, false, cold, &first, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 3, near, 0.0, true, warm, &second, NULL),
                    SUPINE_OK);
   assert_true(second.iterations < first.iterations);
-  assert_int_equal(supine_equilibrium_solve(eq, 3, near, 0.0, false, cold, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 3, near, 0.0, false, cold, NULL, NULL),
+                   SUPINE_OK);
   assert_true(helper_difference(3 * n, cold, warm) <= 1e-13 * helper_largest(3 * n, cold));
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(cold);
   free(warm);
   free(near);
@@ -364,28 +367,28 @@ static void test_set_stiffness_bad_value_names_vertex(void **state) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error;
     f->stiffness[42] = bad[i];
-    assert_int_equal(supine_equilibrium_set_stiffness(eq, f->stiffness, &error),
+    assert_int_equal(supine_physics_equilibrium_set_stiffness(eq, f->stiffness, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "vertex 42 "));
   }
   f->stiffness[42] = good;
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
 }
 
 static void test_solve_bad_counts_refused(void **state) {
   const fixture *f = *state;
   supine_equilibrium *eq = NULL;
-  assert_int_equal(supine_equilibrium_create(f->network, 0, 1, &eq), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_equilibrium_create(f->network, SUPINE_RHS_MAX + 1, 1, &eq),
+  assert_int_equal(supine_physics_equilibrium_create(f->network, 0, 1, &eq), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_equilibrium_create(f->network, SUPINE_RHS_MAX + 1, 1, &eq),
                    SUPINE_ERROR_ARGUMENT);
   assert_null(eq);
   eq = equilibrium_of(f, NULL, 2);
   double out[1];
-  assert_int_equal(supine_equilibrium_solve(eq, 3, f->force, 0.0, false, out, NULL, NULL),
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 3, f->force, 0.0, false, out, NULL, NULL),
                    SUPINE_ERROR_ARGUMENT);
-  supine_equilibrium_destroy(eq);
-  supine_equilibrium_destroy(NULL);
-  supine_network_destroy(NULL);
+  supine_physics_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(NULL);
+  supine_physics_network_destroy(NULL);
 }
 
 static void test_solve_force_not_finite_reports_numerical(void **state) {
@@ -395,14 +398,14 @@ static void test_solve_force_not_finite_reports_numerical(void **state) {
   double *force = calloc(f->mesh.vertex_count, sizeof *force);
   supine_error error;
   force[3] = NAN;
-  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error),
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error),
                    SUPINE_ERROR_NUMERICAL);
   assert_non_null(strstr(error.message, "residual"));
   force[3] = 0.0; /* and no force at all is no error */
-  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error),
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, out, NULL, &error),
                    SUPINE_OK);
   assert_close(helper_largest(f->mesh.vertex_count, out), 0.0, 0.0);
-  supine_equilibrium_destroy(eq);
+  supine_physics_equilibrium_destroy(eq);
   free(out);
   free(force);
 }
@@ -434,17 +437,18 @@ static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_network *network = NULL;
   supine_equilibrium *eq = NULL;
   supine_solve_report report;
-  assert_int_equal(supine_network_create(&lungs.mesh, &lungs.topology, &network), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_create(network, 1, 0, &eq), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_solve(eq, 1, force, 0.0, false, fast, &report, NULL),
+  assert_int_equal(supine_physics_network_create(&lungs.mesh, &lungs.topology, &network),
+                   SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_create(network, 1, 0, &eq), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_set_stiffness(eq, stiffness, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, 0.0, false, fast, &report, NULL),
                    SUPINE_OK);
   const double difference = helper_difference(n, x, fast) / helper_largest(n, x);
   printf("%s: %zu vertices, %zu steps, %.1e from the direct solution\n", names[0], n,
          report.iterations, difference);
   assert_true(difference <= 1e-10);
-  supine_equilibrium_destroy(eq);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(eq);
+  supine_physics_network_destroy(network);
   supine_lungs_free(&lungs);
   full_operator_free(&op);
   free(stiffness);

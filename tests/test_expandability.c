@@ -12,9 +12,9 @@
 
 #include <cmocka.h>
 
-#include "precompute/tissue/expandability.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "precompute/tissue/expandability.h"
 
 #include "lungs_helpers.h"
 
@@ -51,19 +51,19 @@ static void test_regional_follows_box_coordinates(void **state) {
     const supine_expandability_law linear = {SUPINE_EXPANDABILITY_LINEAR, axis, 0.5, 1.5};
     const supine_expandability_law ratios = {SUPINE_EXPANDABILITY_EXPONENTIAL, axis, 0.25, 4.0};
     double box[3];
-    assert_int_equal(supine_expandability_regional(&lungs, &linear, a, NULL), SUPINE_OK);
+    assert_int_equal(supine_tissue_expandability_regional(&lungs, &linear, a, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       supine_lungs_box_coordinates(&lungs, i, box);
       assert_true(fabs(a[i] - 0.5 - box[axis]) <= 4.0 * DBL_EPSILON);
     }
-    assert_int_equal(supine_expandability_regional(&lungs, &ratios, a, NULL), SUPINE_OK);
+    assert_int_equal(supine_tissue_expandability_regional(&lungs, &ratios, a, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       supine_lungs_box_coordinates(&lungs, i, box);
       assert_true(fabs(log2(a[i]) + 2.0 - 4.0 * box[axis]) <= 1e-14);
     }
   }
   const supine_expandability_law uniform = {0};
-  assert_int_equal(supine_expandability_regional(&lungs, &uniform, a, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_expandability_regional(&lungs, &uniform, a, NULL), SUPINE_OK);
   for (size_t i = 0; i < n; ++i) {
     assert_true(a[i] == 1.0);
   }
@@ -78,7 +78,7 @@ static void test_regional_bad_law_refused(void **state) {
       {SUPINE_EXPANDABILITY_LINEAR, 0, 0, 2},        {SUPINE_EXPANDABILITY_EXPONENTIAL, 0, 1, -2},
       {SUPINE_EXPANDABILITY_EXPONENTIAL, 0, NAN, 2}, {SUPINE_EXPANDABILITY_LINEAR, 0, 1, INFINITY}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_expandability_regional(&lungs, &bad[i], a, NULL),
+    assert_int_equal(supine_tissue_expandability_regional(&lungs, &bad[i], a, NULL),
                      SUPINE_ERROR_ARGUMENT);
   }
   free(a);
@@ -96,7 +96,7 @@ static void test_load_both_forms_read_the_same(void **state) {
     double a[3] = {-1.0, -1.0, -1.0};
     supine_error error = {0};
     write_text(texts[t]);
-    if (supine_expandability_load(path, 3, a, &error) != SUPINE_OK) {
+    if (supine_tissue_expandability_load(path, 3, a, &error) != SUPINE_OK) {
       fail_msg("%s", error.message);
     }
     assert_memory_equal(a, wanted, sizeof a);
@@ -131,7 +131,7 @@ static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
     double a[3];
     supine_error error = {0};
     write_text(bad[i].text);
-    assert_int_equal(supine_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
+    assert_int_equal(supine_tissue_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
     if (strstr(error.message, bad[i].line) == NULL ||
         strstr(error.message, bad[i].detail) == NULL) {
       fail_msg("%s", error.message);
@@ -146,24 +146,26 @@ static void test_load_binary_or_missing_refused(void **state) {
   assert_non_null(file);
   (void)fwrite("a\n1\0\n", 1, 5, file);
   assert_int_equal(fclose(file), 0);
-  assert_int_equal(supine_expandability_load(path, 3, a, NULL), SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_tissue_expandability_load(path, 3, a, NULL), SUPINE_ERROR_FORMAT);
   supine_error error = {0};
-  assert_int_equal(supine_expandability_load("/nowhere/a.csv", 3, a, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_tissue_expandability_load("/nowhere/a.csv", 3, a, &error),
+                   SUPINE_ERROR_READ);
   assert_non_null(strstr(error.message, "/nowhere/a.csv"));
-  assert_int_equal(supine_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
+  assert_int_equal(supine_tissue_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
 }
 
 static void test_stiffness_is_reciprocal_and_names_bad_vertex(void **state) {
   (void)state;
   const double a[3] = {0.5, 4.0, 1.0};
   double e[3];
-  assert_int_equal(supine_expandability_stiffness(3, a, e, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_expandability_stiffness(3, a, e, NULL), SUPINE_OK);
   assert_true(e[0] == 2.0 && e[1] == 0.25 && e[2] == 1.0);
   static const double bad[] = {0.0, -1.0, NAN, INFINITY, 5e-324};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     const double spoiled[3] = {0.5, bad[i], 1.0};
     supine_error error = {0};
-    assert_int_equal(supine_expandability_stiffness(3, spoiled, e, &error), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_tissue_expandability_stiffness(3, spoiled, e, &error),
+                     SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "vertex 1"));
   }
 }
@@ -204,14 +206,14 @@ static void test_load_ply_bad_files_refused(void **state) {
     supine_error error = {0};
     write_text(bad[i].text);
     const supine_status status =
-        supine_expandability_load_ply(path, "a", SUPINE_AXES_LPS, 0.0, &lungs, a, &error);
+        supine_tissue_expandability_load_ply(path, "a", SUPINE_AXES_LPS, 0.0, &lungs, a, &error);
     if (status != SUPINE_ERROR_FORMAT || strstr(error.message, bad[i].detail) == NULL) {
       fail_msg("%zu: %d, %s", i, (int)status, error.message);
     }
   }
-  assert_int_equal(
-      supine_expandability_load_ply("/nowhere/a.ply", "a", SUPINE_AXES_LPS, 0.0, &lungs, a, NULL),
-      SUPINE_ERROR_READ);
+  assert_int_equal(supine_tissue_expandability_load_ply("/nowhere/a.ply", "a", SUPINE_AXES_LPS, 0.0,
+                                                        &lungs, a, NULL),
+                   SUPINE_ERROR_READ);
   free(a);
 }
 
@@ -225,11 +227,11 @@ static void test_expandability_is_relative_and_its_sign_is_as_documented(void **
   for (int i = 0; i < 3; ++i) {
     const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, i == 0 ? 1.0 : 0.5 * i,
                                           i == 0 ? 1.0 : 1.5 * i};
-    supine_model model = supine_model_default();
+    supine_model model = supine_physics_model_default();
     model.stiffness = e;
-    assert_int_equal(supine_expandability_regional(&lungs, &law, e, NULL), SUPINE_OK);
-    assert_int_equal(supine_expandability_stiffness(n, e, e, NULL), SUPINE_OK);
-    assert_int_equal(supine_solve(&lungs, &model, g, &found[i], NULL), SUPINE_OK);
+    assert_int_equal(supine_tissue_expandability_regional(&lungs, &law, e, NULL), SUPINE_OK);
+    assert_int_equal(supine_tissue_expandability_stiffness(n, e, e, NULL), SUPINE_OK);
+    assert_int_equal(supine_physics_solve(&lungs, &model, g, &found[i], NULL), SUPINE_OK);
   }
   double ends[2] = {0.0, 0.0}; /* mean ratio to uniform near the apex and the base */
   double count[2] = {0.0, 0.0};
@@ -245,7 +247,7 @@ static void test_expandability_is_relative_and_its_sign_is_as_documented(void **
   assert_true(ends[0] / count[0] < 0.8);
   assert_true(ends[1] / count[1] > 1.2);
   for (int i = 0; i < 3; ++i) {
-    supine_solution_free(&found[i]);
+    supine_physics_solution_free(&found[i]);
   }
   free(e);
 }

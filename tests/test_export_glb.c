@@ -114,7 +114,7 @@ static void check_positions(const char *path, double depth, double tolerance) {
   const json_t *node = json_array_get(json_object_get(root, "nodes"), 1);
   const double mm = 1000 * json_number_value(json_array_get(json_object_get(node, "scale"), 0));
   export_source source = {0};
-  assert_int_equal(export_source_open(path, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_source_open(path, &source, NULL), SUPINE_OK);
   double weights[SUPINE_MODES_MAX];
   double y[(BAND + 1) * (BAND + 1)];
   float xyz[3 * VERTICES];
@@ -143,7 +143,7 @@ static void check_positions(const char *path, double depth, double tolerance) {
       assert_true(fabs(x * mm - (double)xyz[3 * i + axis]) < tolerance);
     }
   }
-  export_source_close(&source);
+  supine_export_source_close(&source);
   json_decref(root);
   free(bytes);
 }
@@ -196,11 +196,11 @@ static void test_targets_reduce_states_its_loss(void **state) {
   (void)state;
   enum { LIMIT = 3, DIRECTIONS = 3000, TERMS = (BAND + 1) * (BAND + 1) };
   export_source source = {0};
-  assert_int_equal(export_source_open(scalar, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_source_open(scalar, &source, NULL), SUPINE_OK);
   double mix[MODES * MODES];
   double modes[MODES * TERMS];
   export_targets targets = {.mix = mix, .modes = modes};
-  assert_int_equal(export_targets_reduce(&source, LIMIT, &targets, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_targets_reduce(&source, LIMIT, &targets, NULL), SUPINE_OK);
   assert_int_equal(targets.count, LIMIT);
   double left = 0;
   double all = 0;
@@ -222,7 +222,7 @@ static void test_targets_reduce_states_its_loss(void **state) {
         double kept = 0;
         for (size_t k = 0; k < MODES; ++k) {
           double u[3];
-          export_field(&source, vertex, k, u);
+          supine_export_field(&source, vertex, k, u);
           whole += w[k] * u[axis];
           for (size_t j = 0; j < LIMIT; ++j) {
             kept += v[j] * mix[k * LIMIT + j] * u[axis];
@@ -235,7 +235,7 @@ static void test_targets_reduce_states_its_loss(void **state) {
   }
   assert_true(targets.loss_percent > 5 && targets.loss_percent < 95);
   assert_true(fabs(100 * sqrt(left / all) / targets.loss_percent - 1) < 1e-3);
-  export_source_close(&source);
+  supine_export_source_close(&source);
 }
 
 static void test_glb_animation_has_its_channels(void **state) {

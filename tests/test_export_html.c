@@ -48,7 +48,7 @@ static void test_base64_of_known_texts(void **state) {
     char got[16] = {0};
     FILE *file = fmemopen(got, sizeof got, "w");
     assert_non_null(file);
-    export_base64_write(pairs[i][0], strlen(pairs[i][0]), file);
+    supine_export_base64_write(pairs[i][0], strlen(pairs[i][0]), file);
     assert_int_equal(fclose(file), 0);
     assert_string_equal(got, pairs[i][1]);
   }
@@ -98,7 +98,7 @@ static void test_page_carries_the_basis(void **state) {
   assert_int_equal(EXPORT_RUN(folder, text, basis, "-o", out), 0);
   char *page = read_page();
   export_source s = {0};
-  assert_int_equal(export_source_open(basis, &s, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
   check_tensor(page, "vertices", s.vertices, 40 * 3 * sizeof(float));
   check_tensor(page, "direction", s.direction, 40 * 3 * sizeof(float));
   check_tensor(page, "coefficients", s.coefficients, 40 * 6 * sizeof(float));
@@ -111,7 +111,7 @@ static void test_page_carries_the_basis(void **state) {
   assert_null(strstr(page, "src="));
   assert_null(strstr(page, "@import"));
   assert_non_null(strstr(page, "default-src 'none'"));
-  export_source_close(&s);
+  supine_export_source_close(&s);
   free(page);
 }
 

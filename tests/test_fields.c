@@ -12,10 +12,10 @@
 #include <cmocka.h>
 
 #include "precompute/fields/fields.h"
-#include "sh/grid.h"
 #include "precompute/phantom/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "sh/grid.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -57,7 +57,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
                                     double soften) {
   const size_t n = of->mesh.vertex_count;
   supine_fields fields = {.direction_count = count, .vertex_count = n};
-  supine_model model = supine_model_default();
+  supine_model model = supine_physics_model_default();
   model.force.soften = soften;
   fields.directions = malloc(3 * count * sizeof(double));
   fields.displacement = malloc(3 * count * n * sizeof(double));
@@ -65,13 +65,13 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
     supine_solution solution;
     double *u = fields.displacement + 3 * d * n;
     random_direction(&seed, fields.directions + 3 * d);
-    assert_int_equal(supine_solve(of, &model, fields.directions + 3 * d, &solution, NULL),
+    assert_int_equal(supine_physics_solve(of, &model, fields.directions + 3 * d, &solution, NULL),
                      SUPINE_OK);
-    supine_solution_apply(&solution, &of->mesh, 1.0, u);
+    supine_physics_solution_apply(&solution, &of->mesh, 1.0, u);
     for (size_t i = 0; i < 3 * n; ++i) {
       u[i] -= of->mesh.vertices[i];
     }
-    supine_solution_free(&solution);
+    supine_physics_solution_free(&solution);
   }
   return fields;
 }
@@ -116,7 +116,7 @@ static void check_band_limited(const supine_fields *fields, size_t band, bool gr
   assert_true(report.accuracy.relative_rms < 1e-6); /* coefficients are floats */
   assert_close(report.scalar_loss, 0.0, 0.0);
   assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
-  supine_compression_free(&field);
+  supine_projection_compression_free(&field);
 }
 
 static void test_fit_band_limited_fields_come_back(void **state) {
@@ -158,7 +158,7 @@ static void test_fit_leave_one_out_equals_fitting_without(void **state) {
   supine_compression field;
   supine_fit_report report;
   assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
-  supine_compression_free(&field);
+  supine_projection_compression_free(&field);
   double error2 = 0.0;
   double field2 = 0.0;
   for (size_t out = 0; out < COUNT; ++out) {
@@ -186,7 +186,7 @@ static void test_fit_leave_one_out_equals_fitting_without(void **state) {
       error2 += (is - should) * (is - should);
       field2 += should * should;
     }
-    supine_compression_free(&field);
+    supine_projection_compression_free(&field);
     supine_fields_free(&rest);
   }
   const double direct = sqrt(error2 / field2);
@@ -266,7 +266,7 @@ static void test_fit_scalar_states_what_it_loses(void **state) {
   supine_fit_report report;
   assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
   assert_true(report.scalar_loss < 1e-6); /* these fields do keep one direction a vertex */
-  supine_compression_free(&field);
+  supine_projection_compression_free(&field);
   uint64_t seed = 8;
   for (size_t i = 0; i < 3 * 12 * fields.vertex_count; ++i) {
     fields.displacement[i] = random_signed(&seed);
@@ -274,7 +274,7 @@ static void test_fit_scalar_states_what_it_loses(void **state) {
   assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
   assert_true(report.scalar_loss > 0.4 && report.scalar_loss < 0.9); /* these do not */
   assert_true(report.accuracy.relative_rms >= report.scalar_loss);
-  supine_compression_free(&field);
+  supine_projection_compression_free(&field);
   supine_fields_free(&fields);
   free(d);
 }
@@ -331,7 +331,7 @@ static void test_fit_few_directions_say_what_they_reach(void **state) {
   assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
   assert_in_range(report.band_highest, 1, 2);
   assert_true(report.band <= report.band_highest);
-  supine_compression_free(&field);
+  supine_projection_compression_free(&field);
   options.band = 4;
   assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, &error),
                    SUPINE_ERROR_ARGUMENT);
@@ -433,18 +433,18 @@ static void test_load_tensors_checked(void **state) {
                               {"displacement", SUPINE_F32, 3, {2, n, 3}, displacement}};
   const char *path = in_folder("fields.safetensors");
   supine_fields fields = {0};
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, NULL, &fields, NULL), SUPINE_OK);
   assert_close(fields.directions[5], -1.0, 0.0);
   assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
   supine_fields_free(&fields);
   displacement[3 * n + 4] = NAN;
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
   tensors[1].shape[1] = n / 2;
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the rest surface has");
-  assert_int_equal(supine_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
   free(displacement);
 }

@@ -45,7 +45,8 @@ static void test_height_range_random_directions_equals_brute_force(void **state)
   for (size_t d = 0; d < COUNT; ++d) {
     random_direction(&seed, g + 3 * d);
   }
-  assert_int_equal(supine_height_range(&lungs->mesh, COUNT, g, minimum, maximum), SUPINE_OK);
+  assert_int_equal(supine_physics_height_range(&lungs->mesh, COUNT, g, minimum, maximum),
+                   SUPINE_OK);
   for (size_t d = 0; d < COUNT; ++d) {
     double low = INFINITY;
     double high = -INFINITY;
@@ -61,16 +62,16 @@ static void test_height_range_random_directions_equals_brute_force(void **state)
 static void test_force_default_law_is_height_zero_to_one(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  const supine_force_law law = supine_force_law_default();
+  const supine_force_law law = supine_physics_force_law_default();
   double *down = malloc(n * sizeof *down);
   double *up = malloc(n * sizeof *up);
   const double g[3] = {0.36, -0.48, 0.8};
   const double opposite[3] = {-0.36, 0.48, -0.8};
   double low;
   double high;
-  assert_int_equal(supine_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
-  supine_force(lungs, &law, g, low, high, down);
-  supine_force(lungs, &law, opposite, -high, -low, up);
+  assert_int_equal(supine_physics_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+  supine_physics_force(lungs, &law, g, low, high, down);
+  supine_physics_force(lungs, &law, opposite, -high, -low, up);
   double least = INFINITY;
   double most = -INFINITY;
   for (size_t i = 0; i < n; ++i) {
@@ -87,21 +88,21 @@ static void test_force_default_law_is_height_zero_to_one(void **state) {
 
 static void check_factors(const supine_lungs *lungs, const supine_force_law *law, size_t expected) {
   const size_t n = lungs->mesh.vertex_count;
-  const size_t rank = supine_force_column_count(law);
+  const size_t rank = supine_physics_force_column_count(law);
   double *columns = malloc(n * rank * sizeof *columns);
   double *force = malloc(n * sizeof *force);
   double functions[SUPINE_FORCE_COLUMNS_MAX];
   uint64_t seed = 9;
   assert_int_equal(rank, expected);
-  supine_force_columns(lungs, law, columns);
+  supine_physics_force_columns(lungs, law, columns);
   for (int d = 0; d < 20; ++d) {
     double g[3];
     double low;
     double high;
     random_direction(&seed, g);
-    assert_int_equal(supine_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
-    supine_force(lungs, law, g, low, high, force);
-    supine_force_functions(lungs, law, g, low, high, functions);
+    assert_int_equal(supine_physics_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+    supine_physics_force(lungs, law, g, low, high, force);
+    supine_physics_force_functions(lungs, law, g, low, high, functions);
     for (size_t i = 0; i < n; ++i) {
       double sum = 0.0;
       for (size_t r = 0; r < rank; ++r) {
@@ -115,7 +116,7 @@ static void check_factors(const supine_lungs *lungs, const supine_force_law *law
 }
 
 static void test_force_factors_reproduce_law(void **state) {
-  supine_force_law law = supine_force_law_default();
+  supine_force_law law = supine_physics_force_law_default();
   check_factors(*state, &law, 4);
   law = (supine_force_law){.base = 0.3, .gain = 1.7, .box = {0.2, -0.4, 1.1}};
   check_factors(*state, &law, 5);
@@ -126,7 +127,7 @@ static void test_force_box_part_uses_box_coordinates(void **state) {
   const supine_force_law law = {.base = 0.5, .gain = 0.0, .box = {1.0, 10.0, 100.0}};
   const double g[3] = {0.0, 1.0, 0.0};
   double *force = malloc(lungs->mesh.vertex_count * sizeof *force);
-  supine_force(lungs, &law, g, lungs->minimum[1], lungs->maximum[1], force);
+  supine_physics_force(lungs, &law, g, lungs->minimum[1], lungs->maximum[1], force);
   for (size_t i = 0; i < lungs->mesh.vertex_count; i += 13) {
     double box[3];
     supine_lungs_box_coordinates(lungs, i, box);
@@ -138,11 +139,11 @@ static void test_force_box_part_uses_box_coordinates(void **state) {
 static void test_stiffness_soften_follows_height(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  supine_force_law law = supine_force_law_default();
+  supine_force_law law = supine_physics_force_law_default();
   law.soften = 1.3;
   const double g[3] = {0.0, 1.0, 0.0};
   double *e = malloc(n * sizeof *e);
-  supine_force_stiffness(lungs, &law, NULL, g, lungs->minimum[1], lungs->maximum[1], e);
+  supine_physics_force_stiffness(lungs, &law, NULL, g, lungs->minimum[1], lungs->maximum[1], e);
   for (size_t i = 0; i < n; ++i) {
     const double h = (lungs->mesh.vertices[3 * i + 1] - lungs->minimum[1]) /
                      (lungs->maximum[1] - lungs->minimum[1]);
@@ -158,12 +159,12 @@ static void test_directions_box_model_literal_values(void **state) {
   uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
   const supine_mesh mesh = {5, vertices, 6, triangles};
   supine_lungs lungs = {0};
-  const supine_direction_law law = supine_direction_law_default();
+  const supine_direction_law law = supine_physics_direction_law_default();
   double d[15];
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
-  assert_int_equal(supine_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
   /* X = 1, Y = 1 (front), Z = 1 (base) */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
@@ -182,9 +183,9 @@ static void test_directions_box_model_literal_values(void **state) {
 static void test_directions_two_lungs_move_outwards(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  const supine_direction_law law = supine_direction_law_default();
+  const supine_direction_law law = supine_physics_direction_law_default();
   double *d = malloc(3 * n * sizeof *d);
-  assert_int_equal(supine_directions(lungs, &law, d, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(lungs, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n; ++i) {
     assert_true(i < lungs->lung_begin[1] ? d[3 * i] >= 0.0 : d[3 * i] <= 0.0);
     assert_true(d[3 * i + 1] <= 0.0 && d[3 * i + 2] <= 0.0);
@@ -201,9 +202,9 @@ static void test_directions_normal_and_radial_are_outward_units(void **state) {
   for (size_t k = 0; k < 6; ++k) {
     law.c[k] = 1.0;
   }
-  assert_int_equal(supine_directions(lungs, &law, normal, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(lungs, &law, normal, NULL), SUPINE_OK);
   law.model = SUPINE_DIRECTION_RADIAL;
-  assert_int_equal(supine_directions(lungs, &law, radial, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(lungs, &law, radial, NULL), SUPINE_OK);
   for (size_t i = 0; i < n; ++i) {
     const double *a = normal + 3 * i;
     const double *b = radial + 3 * i;
@@ -218,13 +219,13 @@ static void test_directions_normal_and_radial_are_outward_units(void **state) {
 static void test_directions_bad_constants_refused(void **state) {
   double d[3];
   supine_error error;
-  supine_direction_law law = supine_direction_law_default();
+  supine_direction_law law = supine_physics_direction_law_default();
   law.c[3] = 0.0;
-  assert_int_equal(supine_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "c4"));
-  law = supine_direction_law_default();
+  law = supine_physics_direction_law_default();
   law.c[4] = NAN;
-  assert_int_equal(supine_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "c5"));
 }
 

@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "precompute/physics/force.h"
 #include "precompute/phantom/phantom.h"
+#include "precompute/physics/force.h"
 #include "precompute/physics/volume_forms.h"
 
 #include "lungs_helpers.h"
@@ -192,8 +192,8 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   double *d = malloc(3 * n * sizeof *d);
   double mix[COLUMNS * MIXED];
   uint64_t seed = 44;
-  const supine_direction_law law = supine_direction_law_default();
-  assert_int_equal(supine_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  const supine_direction_law law = supine_physics_direction_law_default();
+  assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);
   }
@@ -210,14 +210,14 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   }
   supine_volume_forms forms = {0};
   supine_volume_forms mixed = {0};
-  assert_int_equal(supine_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL),
+  assert_int_equal(supine_physics_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL),
                    SUPINE_OK);
-  assert_int_equal(supine_volume_forms_mix(&forms, mix, MIXED, &mixed), SUPINE_OK);
+  assert_int_equal(supine_physics_volume_forms_mix(&forms, mix, MIXED, &mixed), SUPINE_OK);
   static const double weights[COLUMNS] = {0.7, -0.2, 0.9, 0.31, 0.11};
   double cubic[3];
   double mixed_cubic[3];
-  supine_volume_forms_contract(&forms, weights, cubic);
-  supine_volume_forms_contract(&mixed, weights, mixed_cubic);
+  supine_physics_volume_forms_contract(&forms, weights, cubic);
+  supine_physics_volume_forms_contract(&mixed, weights, mixed_cubic);
   static const double scales[] = {-3.0, -1.3, 0.4, 2.1, 3.8};
   for (size_t k = 0; k < sizeof scales / sizeof *scales; ++k) {
     const double s = scales[k];
@@ -235,11 +235,11 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   supine_volume_forms right = {1, COLUMNS, forms.linear + COLUMNS,
                                forms.quadratic + COLUMNS * COLUMNS,
                                forms.cubic + COLUMNS * COLUMNS * COLUMNS};
-  supine_volume_forms_contract(&right, weights, cubic);
+  supine_physics_volume_forms_contract(&right, weights, cubic);
   assert_close(2.0 * (cubic[0] + 2.0 * (cubic[1] + 2.0 * cubic[2])),
                gained(&lungs, 1, d, columns, COLUMNS, weights, 2.0), 1e-9 * 1e3);
-  supine_volume_forms_free(&forms);
-  supine_volume_forms_free(&mixed);
+  supine_physics_volume_forms_free(&forms);
+  supine_physics_volume_forms_free(&mixed);
   supine_lungs_free(&lungs);
   supine_mesh_free(&lumps[0]);
   supine_mesh_free(&lumps[1]);
@@ -256,8 +256,8 @@ static void test_volume_forms_open_surface_refused(void **state) {
   supine_volume_forms forms = {0};
   supine_error error;
   assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
-  assert_int_equal(supine_volume_forms_create(&lungs, lungs.mesh.vertices, lungs.mesh.vertices, 1,
-                                              &forms, &error),
+  assert_int_equal(supine_physics_volume_forms_create(&lungs, lungs.mesh.vertices,
+                                                      lungs.mesh.vertices, 1, &forms, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
   assert_non_null(strstr(error.message, "3 boundary"));
   supine_lungs_free(&lungs);

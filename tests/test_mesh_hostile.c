@@ -13,8 +13,8 @@ static supine_status attempt(const char *path) {
   if (status == SUPINE_OK) {
     supine_topology topology = {0};
     assert_true(mesh.triangle_count > 0);
-    assert_int_equal(supine_topology_create(&mesh, &topology), SUPINE_OK);
-    supine_topology_free(&topology);
+    assert_int_equal(supine_mesh_topology_create(&mesh, &topology), SUPINE_OK);
+    supine_mesh_topology_free(&topology);
   } else {
     assert_true(status == SUPINE_ERROR_FORMAT || status == SUPINE_ERROR_MESH);
     assert_int_equal(error.status, status);

@@ -158,10 +158,10 @@ static void test_load_nodes_transformed_mirror_keeps_sense(void **state) {
   assert_memory_equal(minimum, expected_minimum, sizeof minimum);
   assert_memory_equal(maximum, expected_maximum, sizeof maximum);
   supine_topology topology = {0};
-  assert_int_equal(supine_topology_create(&mesh, &topology), SUPINE_OK);
+  assert_int_equal(supine_mesh_topology_create(&mesh, &topology), SUPINE_OK);
   assert_true(topology.closed);
   assert_int_equal(topology.component_count, 2);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 

@@ -22,7 +22,7 @@ static supine_mesh lung_load(const char *name, supine_mesh_report *report) {
 
 static supine_topology topology_of(const supine_mesh *mesh) {
   supine_topology topology = {0};
-  assert_int_equal(supine_topology_create(mesh, &topology), SUPINE_OK);
+  assert_int_equal(supine_mesh_topology_create(mesh, &topology), SUPINE_OK);
   return topology;
 }
 
@@ -61,7 +61,7 @@ static void test_lungs_closed_known_numbers(void **state) {
     assert_int_equal(report.axes, SUPINE_AXES_LPS);
     assert_int_equal(report.degenerate_faces, 0);
     assert_null(report.likely_unit);
-    supine_topology_free(&topology);
+    supine_mesh_topology_free(&topology);
     supine_mesh_free(&mesh);
   }
 }
@@ -85,7 +85,7 @@ static void test_lungs_stl_soup_welds_closed(void **state) {
     assert_true(topology.closed);
     assert_int_equal(topology.genus, 0);
     assert_true(supine_mesh_volume(&mesh) > 2.0e6);
-    supine_topology_free(&topology);
+    supine_mesh_topology_free(&topology);
     supine_mesh_free(&mesh);
   }
 }
@@ -99,7 +99,7 @@ static void test_lungs_defect_boundary_and_non_manifold(void **state) {
   assert_int_equal(topology.inconsistent_edges, 0);
   assert_false(topology.closed);
   assert_int_equal(topology.genus, -1);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 

@@ -4,7 +4,7 @@
 
 static supine_topology topology_of(const supine_mesh *mesh) {
   supine_topology topology = {0};
-  assert_int_equal(supine_topology_create(mesh, &topology), SUPINE_OK);
+  assert_int_equal(supine_mesh_topology_create(mesh, &topology), SUPINE_OK);
   return topology;
 }
 
@@ -22,7 +22,7 @@ static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_
   assert_int_equal(topology.euler_characteristic, (long)vertices - (long)edges + (long)triangles);
   assert_int_equal(topology.genus, genus);
   assert_true(topology.closed);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -73,9 +73,9 @@ static void test_topology_edges_sorted_and_complete(void **state) {
   supine_mesh small = sample_tetrahedron();
   supine_topology of_small = topology_of(&small);
   assert_memory_equal(of_small.edges, tetrahedron, sizeof tetrahedron);
-  supine_topology_free(&of_small);
+  supine_mesh_topology_free(&of_small);
   supine_mesh_free(&small);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -90,7 +90,7 @@ static void test_topology_open_sheet_boundary_counted(void **state) {
   assert_int_equal(topology.euler_characteristic, 1);
   assert_int_equal(topology.genus, -1);
   assert_false(topology.closed);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -108,7 +108,7 @@ static void test_topology_two_tetrahedra_components_in_order(void **state) {
   assert_int_equal(topology.euler_characteristic, 4);
   assert_int_equal(topology.genus, 0);
   assert_true(topology.closed);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -123,7 +123,7 @@ static void test_topology_components_joined_late_one(void **state) {
   for (size_t i = 0; i < 9; ++i) {
     assert_int_equal(topology.component[i], 0);
   }
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -138,7 +138,7 @@ static void test_topology_fan_on_one_edge_non_manifold(void **state) {
   assert_int_equal(topology.boundary_edges, 6);
   assert_int_equal(topology.inconsistent_edges, 0);
   assert_false(topology.closed);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -155,7 +155,7 @@ static void test_topology_flipped_triangle_inconsistent(void **state) {
   assert_int_equal(topology.euler_characteristic, 2);
   assert_int_equal(topology.genus, -1);
   assert_false(topology.closed);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -179,7 +179,7 @@ static void test_topology_hub_of_many_edges_sorted(void **state) {
     assert_int_equal(topology.edges[2 * i], 0);
     assert_int_equal(topology.edges[2 * i + 1], i + 1);
   }
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -195,7 +195,7 @@ static void test_topology_touching_tetrahedra_no_genus(void **state) {
   assert_int_equal(topology.component_count, 1);
   assert_int_equal(topology.euler_characteristic, 3);
   assert_int_equal(topology.genus, -1);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
 }
 
@@ -208,7 +208,7 @@ static void test_topology_illegal_triangles_argument(void **state) {
   for (size_t i = 0; i < 2; ++i) {
     supine_mesh mesh = sample_make(3, vertices, 1, illegal[i]);
     supine_topology topology = {0};
-    assert_int_equal(supine_topology_create(&mesh, &topology), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_mesh_topology_create(&mesh, &topology), SUPINE_ERROR_ARGUMENT);
     assert_null(topology.edges);
     assert_null(topology.component);
     supine_mesh_free(&mesh);
@@ -222,8 +222,8 @@ static void test_topology_empty_mesh_not_closed(void **state) {
   assert_int_equal(topology.edge_count, 0);
   assert_int_equal(topology.component_count, 0);
   assert_false(topology.closed);
-  supine_topology_free(&topology);
-  supine_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
+  supine_mesh_topology_free(&topology);
 }
 
 int main(void) {

@@ -10,10 +10,10 @@
 
 #include <cmocka.h>
 
-#include "sh/grid.h"
 #include "precompute/phantom/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "sh/grid.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -62,7 +62,7 @@ static supine_lungs real_pair(void) {
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
   supine_precompute_options options = {
-      .model = supine_model_default(), .band = band, .modes = modes, .held_out = held_out};
+      .model = supine_physics_model_default(), .band = band, .modes = modes, .held_out = held_out};
   options.model.force.soften = soften;
   supine_precompute_report report;
   supine_error error;
@@ -107,7 +107,7 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
     double high = -INFINITY;
     supine_sh_grid_direction(grid, d / (2 * LATITUDES), d % (2 * LATITUDES), g);
     assert_int_equal(supine_sh_evaluate(BAND, g, y), SUPINE_OK);
-    assert_int_equal(supine_height_range(&lungs.mesh, 1, g, &low, &high), SUPINE_OK);
+    assert_int_equal(supine_physics_height_range(&lungs.mesh, 1, g, &low, &high), SUPINE_OK);
     const double weight = grid->weight[d / (2 * LATITUDES)] * M_PI / LATITUDES;
     for (size_t t = 0; t < TERMS; ++t) {
       moments[t][0] -= weight * y[t] * low / (high - low);
@@ -184,8 +184,8 @@ static sample_mean mean_of(size_t count, const double *values) {
 
 enum { CHECKED = 300 };
 
-/* Squared difference between the basis and supine_solve for each direction, averaged over the
- * vertices: of the field in error2 (against field2), and in mm where both breathe `volume`. */
+/* Squared difference between the basis and supine_physics_solve for each direction, averaged over
+ * the vertices: of the field in error2 (against field2), and in mm where both breathe `volume`. */
 static void true_errors(const supine_lungs *lungs, const supine_model *model,
                         const supine_basis *basis, size_t count, const double *directions,
                         double volume, double *error2, double *field2, double *error_mm2) {
@@ -198,9 +198,9 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
     double scales[2] = {1.0, 1.0};
     double scale;
     supine_solution solution;
-    assert_int_equal(supine_solve(lungs, model, g, &solution, NULL), SUPINE_OK);
+    assert_int_equal(supine_physics_solve(lungs, model, g, &solution, NULL), SUPINE_OK);
     assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
-    supine_solution_apply(&solution, &lungs->mesh, 1.0, should);
+    supine_physics_solution_apply(&solution, &lungs->mesh, 1.0, should);
     supine_deform(basis, weights, scales, is);
     error2[d] = field2[d] = error_mm2[d] = 0.0;
     for (size_t i = 0; i < 3 * n; ++i) {
@@ -210,12 +210,12 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
     assert_int_equal(supine_volume_scale(solution.cubic, volume, &scale, NULL), SUPINE_OK);
     assert_int_equal(supine_basis_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
     scales[1] = scales[0];
-    supine_solution_apply(&solution, &lungs->mesh, scale, should);
+    supine_physics_solution_apply(&solution, &lungs->mesh, scale, should);
     supine_deform(basis, weights, scales, is);
     for (size_t i = 0; i < 3 * n; ++i) {
       error_mm2[d] += pow((double)is[i] - should[i], 2.0) / (double)n;
     }
-    supine_solution_free(&solution);
+    supine_physics_solution_free(&solution);
   }
   free(is);
   free(should);
@@ -228,13 +228,13 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   enum { HELD_OUT = 40 };
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, HELD_OUT);
   supine_basis *basis = open_basis();
-  supine_model model = supine_model_default();
+  supine_model model = supine_physics_model_default();
   double g[3 * HELD_OUT];
   double error2[HELD_OUT];
   double field2[HELD_OUT];
   double error_mm2[HELD_OUT];
   model.force.soften = soften;
-  supine_held_out_directions(HELD_OUT, g);
+  supine_accuracy_held_out_directions(HELD_OUT, g);
   true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
   const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
   assert_close(report.accuracy.relative_rms, relative, 1e-4 * relative);
@@ -255,7 +255,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
   const supine_accuracy *stated = &report.accuracy;
   supine_basis *basis = open_basis();
-  supine_model model = supine_model_default();
+  supine_model model = supine_physics_model_default();
   double g[3 * CHECKED];
   double error2[CHECKED];
   double field2[CHECKED];
@@ -493,7 +493,7 @@ static void test_precompute_turned_over_is_what_the_run_time_turns(void **state)
   (void)state;
   supine_lungs lungs = phantom(3000);
   supine_precompute_options options = {
-      .model = supine_model_default(), .band = 7, .modes = 4, .held_out = 20};
+      .model = supine_physics_model_default(), .band = 7, .modes = 4, .held_out = 20};
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 3;
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
@@ -534,7 +534,7 @@ static void test_precompute_interrupted_or_unwritable_leaves_old_file(void **sta
   supine_lungs lungs = phantom(500);
   (void)make_basis(&lungs, 3, 0, 0.0, 0);
   supine_precompute_options options = {
-      .model = supine_model_default(), .band = 7, .modes = 16, .progress = stop_halfway};
+      .model = supine_physics_model_default(), .band = 7, .modes = 16, .progress = stop_halfway};
   supine_error error;
   options.model.force.soften = 0.5;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error),
@@ -554,7 +554,8 @@ static void test_precompute_interrupted_or_unwritable_leaves_old_file(void **sta
 static void test_precompute_bad_options_refused(void **state) {
   (void)state;
   supine_lungs lungs = phantom(500);
-  supine_precompute_options options = {.model = supine_model_default(), .band = 65, .modes = 16};
+  supine_precompute_options options = {
+      .model = supine_physics_model_default(), .band = 65, .modes = 16};
   supine_error error;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.band = 8;

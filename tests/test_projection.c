@@ -12,10 +12,10 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include "sh/grid.h"
 #include "precompute/phantom/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "sh/grid.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -68,11 +68,11 @@ static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
   size_t latitudes;
   size_t longitudes;
   assert_int_equal(supine_sh_grid_size(BAND, 0.0, &latitudes, &longitudes), SUPINE_OK);
-  assert_int_equal(supine_project_linear_rule(lungs, &law, stiffness, BAND, latitudes, longitudes,
-                                              &linear, NULL),
+  assert_int_equal(supine_projection_linear_rule(lungs, &law, stiffness, BAND, latitudes,
+                                                 longitudes, &linear, NULL),
                    SUPINE_OK);
   assert_int_equal(
-      supine_project_sampled(lungs, &law, stiffness, BAND, 0.0, NULL, NULL, &sampled, NULL),
+      supine_projection_sampled(lungs, &law, stiffness, BAND, 0.0, NULL, NULL, &sampled, NULL),
       SUPINE_OK);
   assert_int_equal(linear.rank, 5);
   assert_int_equal(sampled.rank, terms);
@@ -107,8 +107,9 @@ static void check_modes(const supine_projection *projection, const double *weigh
   supine_compression modes;
   double singular[SUPINE_MODES_MADE_MAX] = {0.0};
   double total;
-  assert_int_equal(supine_compress_modes(projection, weight, most, &modes, singular, &total, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_projection_compress_modes(projection, weight, most, &modes, singular, &total, NULL),
+      SUPINE_OK);
   assert_close(total, energy, 1e-12 * energy);
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
@@ -139,7 +140,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
       assert_close(dot, a == b ? 1.0 : 0.0, 1e-6);
     }
   }
-  supine_compression_free(&modes);
+  supine_projection_compression_free(&modes);
   gsl_matrix_free(u);
   gsl_matrix_free(v);
   gsl_vector_free(s);
@@ -153,15 +154,16 @@ static void test_modes_equal_dense_decomposition(void **state) {
   for (size_t i = 0; i < n; ++i) {
     weight[i] = 1.0 + fabs(lungs->mesh.vertices[3 * i]);
   }
-  supine_force_law law = supine_force_law_default();
+  supine_force_law law = supine_physics_force_law_default();
   supine_projection projection;
-  assert_int_equal(supine_project_linear(lungs, &law, NULL, 5, &projection, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_linear(lungs, &law, NULL, 5, &projection, NULL), SUPINE_OK);
   check_modes(&projection, weight, 3);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
   law.soften = 1.0;
-  assert_int_equal(supine_project_sampled(lungs, &law, NULL, 5, 0.0, NULL, NULL, &projection, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_projection_sampled(lungs, &law, NULL, 5, 0.0, NULL, NULL, &projection, NULL),
+      SUPINE_OK);
   check_modes(&projection, weight, 7);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
@@ -176,8 +178,9 @@ static void test_modes_beat_harmonics_of_the_same_number(void **state) {
   for (size_t s = 0; s < 2; ++s) {
     double error[2];
     for (int k = 0; k < 2; ++k) {
-      supine_precompute_options options = {
-          .model = supine_model_default(), .band = k == 0 ? 3 : 15, .modes = k == 0 ? 0 : 16};
+      supine_precompute_options options = {.model = supine_physics_model_default(),
+                                           .band = k == 0 ? 3 : 15,
+                                           .modes = k == 0 ? 0 : 16};
       supine_precompute_report report;
       options.model.force.soften = softens[s];
       assert_int_equal(supine_precompute(lungs, &options, path, &report, NULL), SUPINE_OK);

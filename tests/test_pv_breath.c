@@ -38,16 +38,17 @@ static void test_breath_each_course_rests_and_reaches_tidal(void **state) {
       const double times[2] = {n * period, (n + breath.inhale_fraction) * period};
       double volumes[2];
       double pressures[2];
-      assert_int_equal(supine_pv_breath_evaluate(supine_pv_normal(), &breath, 2, times, volumes,
-                                                 pressures, NULL),
+      assert_int_equal(supine_breath_evaluate(supine_breath_normal(), &breath, 2, times, volumes,
+                                              pressures, NULL),
                        SUPINE_OK);
       assert_near(volumes[0], 0.0, rounding * breath.tidal);
       assert_near(volumes[1], breath.tidal, rounding * breath.tidal);
       assert_near(pressures[0], breath.rest_pressure, 1e-9);
       double held[2]; /* the peak pressure holds the tidal volume on the inhale limb */
       const double limb[2] = {breath.rest_pressure, pressures[1]};
-      assert_int_equal(supine_pv_evaluate(&supine_pv_normal()->limb[0], 2, limb, held, NULL, NULL),
-                       SUPINE_OK);
+      assert_int_equal(
+          supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 2, limb, held, NULL, NULL),
+          SUPINE_OK);
       assert_near(held[1] - held[0], breath.tidal, 1e-6);
     }
   }
@@ -65,8 +66,8 @@ static void test_breath_each_course_rises_then_falls_and_repeats(void **state) {
       times[j] = period * ((double)j + 0.5) / FRAMES;
       times[FRAMES + j] = times[j] + 3.0 * period;
     }
-    assert_int_equal(supine_pv_breath_evaluate(supine_pv_normal(), &breath, 2 * FRAMES, times,
-                                               volumes, pressures, NULL),
+    assert_int_equal(supine_breath_evaluate(supine_breath_normal(), &breath, 2 * FRAMES, times,
+                                            volumes, pressures, NULL),
                      SUPINE_OK);
     for (size_t j = 0; j < FRAMES; ++j) {
       assert_true(volumes[j] >= 0.0 && volumes[j] <= breath.tidal);
@@ -87,7 +88,7 @@ static void test_breath_each_course_rises_then_falls_and_repeats(void **state) {
 /* Pressure follows its course, and volume the limbs. */
 static void test_breath_volume_follows_scaled_limbs(void **state) {
   (void)state;
-  const supine_pv *normal = supine_pv_normal();
+  const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
     const supine_pv_breath breath = breath_of((supine_pv_course)course);
     const double period = 60.0 / breath.rate;
@@ -96,7 +97,7 @@ static void test_breath_volume_follows_scaled_limbs(void **state) {
       const double times[2] = {period * shares[j], period * breath.inhale_fraction};
       double v[2];
       double p[2];
-      assert_int_equal(supine_pv_breath_evaluate(normal, &breath, 2, times, v, p, NULL), SUPINE_OK);
+      assert_int_equal(supine_breath_evaluate(normal, &breath, 2, times, v, p, NULL), SUPINE_OK);
       const double f = breath.inhale_fraction;
       const bool inhaling = shares[j] < f;
       const double way = inhaling ? shares[j] / f : (1.0 - shares[j]) / (1.0 - f);
@@ -110,8 +111,9 @@ static void test_breath_volume_follows_scaled_limbs(void **state) {
       }
       const double at[3] = {breath.rest_pressure, p[0], p[1]};
       double limb[3];
-      assert_int_equal(supine_pv_evaluate(&normal->limb[inhaling ? 0 : 1], 3, at, limb, NULL, NULL),
-                       SUPINE_OK);
+      assert_int_equal(
+          supine_breath_curve_evaluate(&normal->limb[inhaling ? 0 : 1], 3, at, limb, NULL, NULL),
+          SUPINE_OK);
       assert_near(v[0], breath.tidal * (limb[1] - limb[0]) / (limb[2] - limb[0]), 1e-6);
     }
   }
@@ -128,7 +130,7 @@ static void test_breath_constant_flow_is_paper_step(void **state) {
     times[j] = 0.015 * (double)j;
   }
   times[333] = 5.0;
-  assert_int_equal(supine_pv_breath_evaluate(NULL, &breath, 334, times, volumes, NULL, NULL),
+  assert_int_equal(supine_breath_evaluate(NULL, &breath, 334, times, volumes, NULL, NULL),
                    SUPINE_OK);
   for (size_t j = 1; j < 333; ++j) {
     assert_near(volumes[j] - volumes[j - 1], 1.5, rounding * 500.0);
@@ -138,13 +140,13 @@ static void test_breath_constant_flow_is_paper_step(void **state) {
 
 static void test_breath_default_is_quiet_breathing(void **state) {
   (void)state;
-  const supine_pv_breath breath = supine_pv_breath_default();
+  const supine_pv_breath breath = supine_breath_default();
   assert_true(breath.tidal == 500.0 && breath.rate == 12.0);
   const double times[2] = {0.0, 5.0 / 3.0};
   double volumes[2];
   double pressures[2];
   assert_int_equal(
-      supine_pv_breath_evaluate(supine_pv_normal(), &breath, 2, times, volumes, pressures, NULL),
+      supine_breath_evaluate(supine_breath_normal(), &breath, 2, times, volumes, pressures, NULL),
       SUPINE_OK);
   assert_near(volumes[1], 500.0, 500.0 * rounding);
   /* Compliance b s' / d of the sigmoid is 262 mL/cmH2O at 5 cmH2O, and rises to 310 at 10. */
@@ -156,7 +158,7 @@ static void expect_argument(const supine_pv *pv, const supine_pv_breath *breath,
                             const char *text) {
   supine_error error = {0};
   double volume = 0.0;
-  assert_int_equal(supine_pv_breath_evaluate(pv, breath, 1, &time, &volume, NULL, &error),
+  assert_int_equal(supine_breath_evaluate(pv, breath, 1, &time, &volume, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   if (strstr(error.message, text) == NULL) {
     fail_msg("\"%s\" has no \"%s\"", error.message, text);
@@ -165,7 +167,7 @@ static void expect_argument(const supine_pv *pv, const supine_pv_breath *breath,
 
 static void test_breath_out_of_range_refused(void **state) {
   (void)state;
-  const supine_pv *normal = supine_pv_normal();
+  const supine_pv *normal = supine_breath_normal();
   const double bad[] = {0.0, -3.0, NAN, INFINITY};
   for (size_t i = 0; i < 4; ++i) {
     for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
@@ -194,8 +196,7 @@ static void test_breath_out_of_range_refused(void **state) {
   narrow.limb[SUPINE_PV_EXHALE].pressure[1] = 6.0;
   breath = breath_of(SUPINE_PV_COSINE);
   expect_argument(&narrow, &breath, 1.0, "outside the exhale limb's range");
-  assert_int_equal(supine_pv_breath_evaluate(normal, &breath, 0, NULL, NULL, NULL, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_breath_evaluate(normal, &breath, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
 }
 
 int main(void) {

@@ -28,9 +28,9 @@ static void write_samples(const char *path, bool spoiled) {
   for (int j = 0; j <= 15; ++j) {
     const double pressure = 2.0 * j;
     double volume = 0.0;
-    assert_int_equal(
-        supine_pv_evaluate(&supine_pv_normal()->limb[0], 1, &pressure, &volume, NULL, NULL),
-        SUPINE_OK);
+    assert_int_equal(supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 1, &pressure,
+                                                  &volume, NULL, NULL),
+                     SUPINE_OK);
     (void)fprintf(file, "%.17g,%.17g\n", pressure, spoiled && j == 9 ? 0.0 : volume);
   }
   assert_int_equal(fclose(file), 0);
@@ -94,8 +94,8 @@ static void test_command_fit_writes_parameters_that_load(void **state) {
   assert_non_null(strstr(text, "exhale: no samples"));
   assert_non_null(strstr(text, "95 % confidence"));
   supine_pv pv;
-  assert_int_equal(supine_pv_load(out, &pv, NULL), SUPINE_OK);
-  const double difference = pv.limb[1].control[1] - supine_pv_normal()->limb[0].control[1];
+  assert_int_equal(supine_breath_load(out, &pv, NULL), SUPINE_OK);
+  const double difference = pv.limb[1].control[1] - supine_breath_normal()->limb[0].control[1];
   assert_true(difference < 1e-6 && difference > -1e-6);
 }
 

@@ -45,8 +45,9 @@ static void test_evaluate_constant_control_gives_salazar_knowles(void **state) {
     double volumes[COUNT];
     double compliances[COUNT];
     spread(low, high, pressures);
-    assert_int_equal(supine_pv_evaluate(&curve, COUNT, pressures, volumes, compliances, NULL),
-                     SUPINE_OK);
+    assert_int_equal(
+        supine_breath_curve_evaluate(&curve, COUNT, pressures, volumes, compliances, NULL),
+        SUPINE_OK);
     for (size_t j = 0; j < COUNT; ++j) {
       assert_near(volumes[j], -most * expm1(-k[i] * pressures[j]), integration * most);
       assert_near(compliances[j], k[i] * most * exp(-k[i] * pressures[j]), integration * most);
@@ -63,7 +64,8 @@ static void test_evaluate_second_control_gives_gaussian_compliance(void **state)
   double pressures[COUNT];
   double volumes[COUNT];
   spread(0.0, 40.0, pressures);
-  assert_int_equal(supine_pv_evaluate(&curve, COUNT, pressures, volumes, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&curve, COUNT, pressures, volumes, NULL, NULL),
+                   SUPINE_OK);
   for (size_t j = 0; j < COUNT; ++j) {
     const double x = pressures[j] / 20.0 - 1.0;
     assert_near(volumes[j], 500.0 * (1.0 + erf(root * x) / erf(root)), integration * 1000.0);
@@ -80,7 +82,7 @@ static void test_evaluate_any_controls_satisfy_equation(void **state) {
     const double middle = sigmoid.pressure[0] + half * (1.0 + x);
     const double pressures[2] = {middle - half * step, middle + half * step};
     double compliances[2];
-    assert_int_equal(supine_pv_evaluate(&sigmoid, 2, pressures, NULL, compliances, NULL),
+    assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 2, pressures, NULL, compliances, NULL),
                      SUPINE_OK);
     const double *c = sigmoid.control;
     const double u = c[0] + c[1] * x + c[2] * (3.0 * x * x - 1.0) / 2.0 +
@@ -97,13 +99,14 @@ static void test_evaluate_ends_and_order_exact(void **state) {
   const double pressures[5] = {sigmoid.pressure[1], middle, sigmoid.pressure[0], middle,
                                sigmoid.pressure[1]};
   double volumes[5];
-  assert_int_equal(supine_pv_evaluate(&sigmoid, 5, pressures, volumes, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 5, pressures, volumes, NULL, NULL),
+                   SUPINE_OK);
   assert_near(volumes[2], sigmoid.volume[0], 0.0);
   assert_near(volumes[0], sigmoid.volume[1], 4.0 * DBL_EPSILON * sigmoid.volume[1]);
   assert_true(volumes[0] == volumes[4]);
   assert_true(volumes[1] == volumes[3]);
   assert_true(volumes[1] > volumes[2] && volumes[1] < volumes[0]);
-  assert_int_equal(supine_pv_evaluate(&sigmoid, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
 }
 
 static void test_evaluate_wild_controls_still_rise(void **state) {
@@ -113,8 +116,8 @@ static void test_evaluate_wild_controls_still_rise(void **state) {
   double volumes[COUNT];
   double compliances[COUNT];
   spread(0.0, 20.0, pressures);
-  assert_int_equal(supine_pv_evaluate(&wild, COUNT, pressures, volumes, compliances, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_breath_curve_evaluate(&wild, COUNT, pressures, volumes, compliances, NULL), SUPINE_OK);
   for (size_t j = 0; j < COUNT; ++j) {
     assert_true(compliances[j] > 0.0);
     assert_true(j == 0 || volumes[j] > volumes[j - 1]);
@@ -126,16 +129,16 @@ static void test_invert_every_volume_returns_its_pressure(void **state) {
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
   enum { CURVES = 4 };
   const supine_pv_curve *curves[CURVES] = {&sigmoid, &stiff,
-                                           &supine_pv_normal()->limb[SUPINE_PV_INHALE],
-                                           &supine_pv_normal()->limb[SUPINE_PV_EXHALE]};
+                                           &supine_breath_normal()->limb[SUPINE_PV_INHALE],
+                                           &supine_breath_normal()->limb[SUPINE_PV_EXHALE]};
   for (size_t i = 0; i < CURVES; ++i) {
     const double span = curves[i]->volume[1] - curves[i]->volume[0];
     double wanted[COUNT];
     double pressures[COUNT];
     double volumes[COUNT];
     spread(curves[i]->volume[0], curves[i]->volume[1], wanted);
-    assert_int_equal(supine_pv_invert(curves[i], COUNT, wanted, pressures, NULL), SUPINE_OK);
-    assert_int_equal(supine_pv_evaluate(curves[i], COUNT, pressures, volumes, NULL, NULL),
+    assert_int_equal(supine_breath_invert(curves[i], COUNT, wanted, pressures, NULL), SUPINE_OK);
+    assert_int_equal(supine_breath_curve_evaluate(curves[i], COUNT, pressures, volumes, NULL, NULL),
                      SUPINE_OK);
     for (size_t j = 0; j < COUNT; ++j) {
       assert_near(volumes[j], wanted[j], integration * span);
@@ -146,12 +149,12 @@ static void test_invert_every_volume_returns_its_pressure(void **state) {
 
 static void test_invert_salazar_knowles_matches_logarithm(void **state) {
   (void)state;
-  const supine_pv_curve *curve = &supine_pv_normal()->limb[SUPINE_PV_EXHALE];
+  const supine_pv_curve *curve = &supine_breath_normal()->limb[SUPINE_PV_EXHALE];
   const double k = log(2.0) / 7.58;
   const double most = 6000.0 / -expm1(-30.0 * k);
   const double volumes[3] = {2353.0, 3001.0, 5113.0};
   double pressures[3];
-  assert_int_equal(supine_pv_invert(curve, 3, volumes, pressures, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_invert(curve, 3, volumes, pressures, NULL), SUPINE_OK);
   for (size_t j = 0; j < 3; ++j) {
     assert_near(pressures[j], -log1p(-volumes[j] / most) / k, 1e-7);
   }
@@ -163,13 +166,13 @@ static void test_evaluate_outside_range_or_bad_curve_refused(void **state) {
   double out = 0.0;
   const double beyond[] = {-4.4, 38.8, NAN, INFINITY};
   for (size_t j = 0; j < 4; ++j) {
-    assert_int_equal(supine_pv_evaluate(&sigmoid, 1, &beyond[j], &out, NULL, &error),
+    assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 1, &beyond[j], &out, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "-4.3 to 38.7 cmH2O"));
   }
   const double volumes[] = {129.0, 3518.0, NAN};
   for (size_t j = 0; j < 3; ++j) {
-    assert_int_equal(supine_pv_invert(&sigmoid, 1, &volumes[j], &out, &error),
+    assert_int_equal(supine_breath_invert(&sigmoid, 1, &volumes[j], &out, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "130 to 3517 mL"));
   }
@@ -182,10 +185,11 @@ static void test_evaluate_outside_range_or_bad_curve_refused(void **state) {
   bad[5].volume[1] = INFINITY;
   for (size_t j = 0; j < 6; ++j) {
     const double pressure = 5.0;
-    assert_int_equal(supine_pv_curve_check(&bad[j], &error), SUPINE_ERROR_ARGUMENT);
-    assert_int_equal(supine_pv_evaluate(&bad[j], 1, &pressure, &out, NULL, NULL),
+    assert_int_equal(supine_breath_curve_check(&bad[j], &error), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_breath_curve_evaluate(&bad[j], 1, &pressure, &out, NULL, NULL),
                      SUPINE_ERROR_ARGUMENT);
-    assert_int_equal(supine_pv_invert(&bad[j], 1, &pressure, &out, NULL), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_breath_invert(&bad[j], 1, &pressure, &out, NULL),
+                     SUPINE_ERROR_ARGUMENT);
   }
 }
 
@@ -197,11 +201,13 @@ static void test_normal_lung_is_its_stated_curves(void **state) {
   double inhale[COUNT];
   double exhale[COUNT];
   spread(0.0, 30.0, pressures);
-  const supine_pv *normal = supine_pv_normal();
-  assert_int_equal(supine_pv_evaluate(&normal->limb[0], COUNT, pressures, inhale, NULL, NULL),
-                   SUPINE_OK);
-  assert_int_equal(supine_pv_evaluate(&normal->limb[1], COUNT, pressures, exhale, NULL, NULL),
-                   SUPINE_OK);
+  const supine_pv *normal = supine_breath_normal();
+  assert_int_equal(
+      supine_breath_curve_evaluate(&normal->limb[0], COUNT, pressures, inhale, NULL, NULL),
+      SUPINE_OK);
+  assert_int_equal(
+      supine_breath_curve_evaluate(&normal->limb[1], COUNT, pressures, exhale, NULL, NULL),
+      SUPINE_OK);
   for (size_t j = 0; j < COUNT; ++j) {
     const double p = pressures[j];
     assert_near(exhale[j], 6000.0 * expm1(-k * p) / expm1(-30.0 * k), 1e-4);
@@ -214,9 +220,9 @@ static void test_normal_lung_is_its_stated_curves(void **state) {
 
 static void test_limb_name_any_value_not_null(void **state) {
   (void)state;
-  assert_string_equal(supine_pv_limb_name(SUPINE_PV_INHALE), "inhale");
-  assert_string_equal(supine_pv_limb_name(SUPINE_PV_EXHALE), "exhale");
-  assert_non_null(supine_pv_limb_name(SUPINE_PV_LIMB_COUNT));
+  assert_string_equal(supine_breath_limb_name(SUPINE_PV_INHALE), "inhale");
+  assert_string_equal(supine_breath_limb_name(SUPINE_PV_EXHALE), "exhale");
+  assert_non_null(supine_breath_limb_name(SUPINE_PV_LIMB_COUNT));
 }
 
 int main(void) {

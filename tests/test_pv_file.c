@@ -52,7 +52,7 @@ static void test_samples_load_comments_order_and_endings_read(void **state) {
   write_bytes(text, sizeof text - 1);
   supine_pv_samples samples;
   supine_error error = {0};
-  assert_int_equal(supine_pv_samples_load(path, &samples, &error), SUPINE_OK);
+  assert_int_equal(supine_breath_samples_load(path, &samples, &error), SUPINE_OK);
   assert_int_equal(samples.count[SUPINE_PV_INHALE], 3);
   assert_int_equal(samples.count[SUPINE_PV_EXHALE], 1);
   assert_true(samples.pressure[SUPINE_PV_INHALE][0] == -2.0);
@@ -63,8 +63,8 @@ static void test_samples_load_comments_order_and_endings_read(void **state) {
   assert_int_equal(samples.line[SUPINE_PV_EXHALE][0], 5);
   assert_int_equal(samples.line[SUPINE_PV_INHALE][2], 8);
   assert_string_equal(samples.name, path);
-  supine_pv_samples_clear(&samples);
-  supine_pv_samples_clear(&samples);
+  supine_breath_samples_clear(&samples);
+  supine_breath_samples_clear(&samples);
   assert_null(samples.name);
 }
 
@@ -72,7 +72,7 @@ static void expect_load(const char *text, size_t size, const char *expected) {
   write_bytes(text, size);
   supine_pv_samples samples;
   supine_error error = {0};
-  assert_int_equal(supine_pv_samples_load(path, &samples, &error), SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_breath_samples_load(path, &samples, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, expected) == NULL || strstr(error.message, path) == NULL) {
     fail_msg("\"%s\" has no \"%s\"", error.message, expected);
   }
@@ -114,11 +114,11 @@ static void test_load_missing_file_or_folder_reports_read(void **state) {
   supine_pv_samples samples;
   supine_pv pv;
   supine_error error = {0};
-  assert_int_equal(supine_pv_samples_load("/nonexistent/s.csv", &samples, &error),
+  assert_int_equal(supine_breath_samples_load("/nonexistent/s.csv", &samples, &error),
                    SUPINE_ERROR_READ);
   assert_non_null(strstr(error.message, "/nonexistent/s.csv"));
-  assert_int_equal(supine_pv_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
-  assert_int_equal(supine_pv_load(folder, &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_breath_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_breath_load(folder, &pv, &error), SUPINE_ERROR_READ);
 }
 
 static void test_save_load_same_numbers(void **state) {
@@ -127,22 +127,23 @@ static void test_save_load_same_numbers(void **state) {
       {{{-1.0 / 3.0, 29.9}, {1234.5678901234567, 5.0e3}, {0.1, -2.0 / 7.0, 1e-17, 49.9, -50.0}},
        {{0.0, 30.0}, {-0.0, 6000.1}, {0.0, 1.0, 2.0, 3.0, 4.0}}}};
   supine_pv read;
-  assert_int_equal(supine_pv_save(path, &written, NULL), SUPINE_OK);
-  assert_int_equal(supine_pv_load(path, &read, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_save(path, &written, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_load(path, &read, NULL), SUPINE_OK);
   assert_memory_equal(&read, &written, sizeof read);
-  assert_int_equal(supine_pv_save(path, supine_pv_normal(), NULL), SUPINE_OK);
-  assert_int_equal(supine_pv_load(path, &read, NULL), SUPINE_OK);
-  assert_memory_equal(&read, supine_pv_normal(), sizeof read);
+  assert_int_equal(supine_breath_save(path, supine_breath_normal(), NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_load(path, &read, NULL), SUPINE_OK);
+  assert_memory_equal(&read, supine_breath_normal(), sizeof read);
 }
 
 static void test_save_bad_target_or_curve_refused(void **state) {
   (void)state;
   supine_error error = {0};
-  assert_int_equal(supine_pv_save("/nonexistent/p.csv", supine_pv_normal(), &error),
+  assert_int_equal(supine_breath_save("/nonexistent/p.csv", supine_breath_normal(), &error),
                    SUPINE_ERROR_WRITE);
-  assert_int_equal(supine_pv_save("/dev/full", supine_pv_normal(), &error), SUPINE_ERROR_WRITE);
+  assert_int_equal(supine_breath_save("/dev/full", supine_breath_normal(), &error),
+                   SUPINE_ERROR_WRITE);
   const supine_pv empty = {0};
-  assert_int_equal(supine_pv_save(path, &empty, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_breath_save(path, &empty, &error), SUPINE_ERROR_ARGUMENT);
 }
 
 #define HEADER                                                                                     \
@@ -155,7 +156,7 @@ static void test_load_one_limb_serves_both(void **state) {
   for (size_t i = 0; i < 2; ++i) {
     write_bytes(texts[i], strlen(texts[i]));
     supine_pv pv;
-    assert_int_equal(supine_pv_load(path, &pv, NULL), SUPINE_OK);
+    assert_int_equal(supine_breath_load(path, &pv, NULL), SUPINE_OK);
     assert_memory_equal(&pv.limb[0], &pv.limb[1], sizeof pv.limb[0]);
     assert_true(pv.limb[0].pressure[1] == 30.0 && pv.limb[0].control[4] == 5.0);
   }
@@ -182,7 +183,7 @@ static void test_load_malformed_parameters_name_the_line(void **state) {
     write_bytes(bad[i].text, strlen(bad[i].text));
     supine_pv pv;
     supine_error error = {0};
-    assert_int_equal(supine_pv_load(path, &pv, &error), SUPINE_ERROR_FORMAT);
+    assert_int_equal(supine_breath_load(path, &pv, &error), SUPINE_ERROR_FORMAT);
     if (strstr(error.message, bad[i].expected) == NULL) {
       fail_msg("\"%s\" has no \"%s\"", error.message, bad[i].expected);
     }
@@ -197,11 +198,11 @@ static void write_limbs(bool inhale, bool exhale) {
     for (int j = 0; j < 12 && (limb == 0 ? inhale : exhale); ++j) {
       const double pressure = 30.0 * (limb == 0 ? j : 11 - j) / 11.0;
       double volume = 0.0;
-      assert_int_equal(
-          supine_pv_evaluate(&supine_pv_normal()->limb[limb], 1, &pressure, &volume, NULL, NULL),
-          SUPINE_OK);
+      assert_int_equal(supine_breath_curve_evaluate(&supine_breath_normal()->limb[limb], 1,
+                                                    &pressure, &volume, NULL, NULL),
+                       SUPINE_OK);
       (void)fprintf(file, "%.17g,%.17g,%s\n", pressure, volume,
-                    supine_pv_limb_name((supine_pv_limb)limb));
+                    supine_breath_limb_name((supine_pv_limb)limb));
     }
   }
   assert_int_equal(fclose(file), 0);
@@ -212,15 +213,15 @@ static void test_fit_samples_each_limb_its_own_or_the_other(void **state) {
   for (int which = 1; which <= 3; ++which) {
     write_limbs((which & 1) != 0, (which & 2) != 0);
     supine_pv_samples samples;
-    assert_int_equal(supine_pv_samples_load(path, &samples, NULL), SUPINE_OK);
+    assert_int_equal(supine_breath_samples_load(path, &samples, NULL), SUPINE_OK);
     supine_pv pv;
     supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-    assert_int_equal(supine_pv_fit_samples(&samples, 0.95, &pv, reports, NULL), SUPINE_OK);
-    supine_pv_samples_clear(&samples);
+    assert_int_equal(supine_breath_fit_samples(&samples, 0.95, &pv, reports, NULL), SUPINE_OK);
+    supine_breath_samples_clear(&samples);
     for (int limb = 0; limb < 2; ++limb) {
       const bool own = (which & (1 << limb)) != 0;
       assert_int_equal(reports[limb].samples, own ? 12 : 0);
-      const supine_pv_curve *expected = &supine_pv_normal()->limb[own ? limb : 1 - limb];
+      const supine_pv_curve *expected = &supine_breath_normal()->limb[own ? limb : 1 - limb];
       for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
         const double difference = pv.limb[limb].control[i] - expected->control[i];
         assert_true(difference < 1e-6 && difference > -1e-6);
@@ -234,12 +235,13 @@ static void test_fit_samples_header_alone_is_too_few(void **state) {
   static const char text[] = "pressure_cmH2O,volume_mL\n";
   write_bytes(text, sizeof text - 1);
   supine_pv_samples samples;
-  assert_int_equal(supine_pv_samples_load(path, &samples, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_samples_load(path, &samples, NULL), SUPINE_OK);
   supine_pv pv;
   supine_error error = {0};
-  assert_int_equal(supine_pv_fit_samples(&samples, 0.95, &pv, NULL, &error), SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_breath_fit_samples(&samples, 0.95, &pv, NULL, &error),
+                   SUPINE_ERROR_FORMAT);
   assert_non_null(strstr(error.message, "0 samples"));
-  supine_pv_samples_clear(&samples);
+  supine_breath_samples_clear(&samples);
 }
 
 int main(void) {

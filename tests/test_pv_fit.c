@@ -76,7 +76,8 @@ static double held_out_percent(const truth *lung, const supine_pv_curve *curve) 
     pressures[j] = curve->pressure[0] +
                    (curve->pressure[1] - curve->pressure[0]) * ((double)j + 0.37) / HELD_OUT;
   }
-  assert_int_equal(supine_pv_evaluate(curve, HELD_OUT, pressures, volumes, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(curve, HELD_OUT, pressures, volumes, NULL, NULL),
+                   SUPINE_OK);
   double sum = 0.0;
   for (size_t j = 0; j < HELD_OUT; ++j) {
     sum += pow(volumes[j] - truth_volume(lung, pressures[j]), 2);
@@ -93,7 +94,7 @@ static void test_fit_published_curves_under_one_percent(void **state) {
     supine_pv_curve curve;
     supine_pv_report report;
     assert_int_equal(
-        supine_pv_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
+        supine_breath_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
         SUPINE_OK);
     const double held_out = held_out_percent(&truths[i], &curve);
     print_message("%-34s RMS %.4f %%, held out %.4f %%, condition %.0f\n", truths[i].name,
@@ -130,7 +131,7 @@ static void test_fit_one_percent_noise_follows_truth(void **state) {
       }
       supine_pv_curve curve;
       supine_error error = {0};
-      if (supine_pv_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, NULL, &error) !=
+      if (supine_breath_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, NULL, &error) !=
           SUPINE_OK) {
         fail_msg("%s", error.message);
       }
@@ -152,7 +153,8 @@ static void model_sample(size_t count, double *pressures, double *volumes) {
                    (model.pressure[1] - model.pressure[0]) * (double)j / (double)(count - 1);
   }
   pressures[count - 1] = model.pressure[1];
-  assert_int_equal(supine_pv_evaluate(&model, count, pressures, volumes, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&model, count, pressures, volumes, NULL, NULL),
+                   SUPINE_OK);
 }
 
 static void test_fit_model_own_data_recovers_parameters(void **state) {
@@ -175,7 +177,7 @@ static void test_fit_model_own_data_recovers_parameters(void **state) {
       supine_pv_curve curve;
       supine_pv_report report;
       assert_int_equal(
-          supine_pv_fit(counts[n], pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
+          supine_breath_fit(counts[n], pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
           SUPINE_OK);
       assert_int_equal(report.samples, counts[n]);
       for (size_t c = 0; c < SUPINE_PV_CONTROLS; ++c) {
@@ -209,8 +211,8 @@ static void test_fit_intervals_cover_truth_at_nominal_rate(void **state) {
     for (size_t level = 0; level < 2; ++level) {
       supine_pv_curve curve;
       supine_pv_report report;
-      assert_int_equal(supine_pv_fit(COUNT, pressures, volumes, NULL, NULL, levels[level], &curve,
-                                     &report, NULL),
+      assert_int_equal(supine_breath_fit(COUNT, pressures, volumes, NULL, NULL, levels[level],
+                                         &curve, &report, NULL),
                        SUPINE_OK);
       for (size_t i = 0; i < SUPINE_PV_CONTROLS; ++i) {
         covered[level][i] +=
@@ -246,7 +248,7 @@ static void test_fit_report_covariance_consistent(void **state) {
   supine_pv_curve curve;
   supine_pv_report report;
   assert_int_equal(
-      supine_pv_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
+      supine_breath_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
       SUPINE_OK);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
     const double interval = i < SUPINE_PV_CONTROLS ? report.control_interval[i]
@@ -259,7 +261,8 @@ static void test_fit_report_covariance_consistent(void **state) {
     }
   }
   double fitted[SAMPLES];
-  assert_int_equal(supine_pv_evaluate(&curve, SAMPLES, pressures, fitted, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&curve, SAMPLES, pressures, fitted, NULL, NULL),
+                   SUPINE_OK);
   double sum = 0.0;
   for (size_t j = 0; j < SAMPLES; ++j) {
     sum += pow(fitted[j] - volumes[j], 2);
@@ -276,7 +279,7 @@ static void test_fit_result_is_a_minimum(void **state) {
   supine_pv_curve curve;
   supine_pv_report report;
   assert_int_equal(
-      supine_pv_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
+      supine_breath_fit(SAMPLES, pressures, volumes, NULL, NULL, 0.95, &curve, &report, NULL),
       SUPINE_OK);
   for (int move = 0; move < 2 * SUPINE_PV_UNKNOWNS; ++move) {
     supine_pv_curve moved = curve;
@@ -288,7 +291,8 @@ static void test_fit_result_is_a_minimum(void **state) {
       moved.volume[i - SUPINE_PV_CONTROLS] += sign * 0.5;
     }
     double fitted[SAMPLES];
-    assert_int_equal(supine_pv_evaluate(&moved, SAMPLES, pressures, fitted, NULL, NULL), SUPINE_OK);
+    assert_int_equal(supine_breath_curve_evaluate(&moved, SAMPLES, pressures, fitted, NULL, NULL),
+                     SUPINE_OK);
     double sum = 0.0;
     for (size_t j = 0; j < SAMPLES; ++j) {
       sum += pow(fitted[j] - volumes[j], 2);
@@ -306,7 +310,7 @@ static void expect_format(size_t count, const double *pressures, const double *v
   supine_pv_curve curve;
   supine_error error = {0};
   assert_int_equal(
-      supine_pv_fit(count, pressures, volumes, lines, "s.csv", 0.95, &curve, NULL, &error),
+      supine_breath_fit(count, pressures, volumes, lines, "s.csv", 0.95, &curve, NULL, &error),
       SUPINE_ERROR_FORMAT);
   if (strstr(error.message, text) == NULL || strstr(error.message, more) == NULL) {
     fail_msg("\"%s\" has no \"%s\", \"%s\"", error.message, text, more);
@@ -382,7 +386,8 @@ static void test_fit_dip_judged_against_noise(void **state) {
   }
   gsl_rng_free(random);
   supine_pv_curve curve;
-  assert_int_equal(supine_pv_fit(SAMPLES, p, v, NULL, NULL, 0.95, &curve, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_fit(SAMPLES, p, v, NULL, NULL, 0.95, &curve, NULL, NULL),
+                   SUPINE_OK);
 }
 
 static void test_fit_confidence_outside_refused(void **state) {
@@ -394,7 +399,7 @@ static void test_fit_confidence_outside_refused(void **state) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_pv_curve curve;
     supine_error error;
-    assert_int_equal(supine_pv_fit(SAMPLES, p, v, NULL, NULL, bad[i], &curve, NULL, &error),
+    assert_int_equal(supine_breath_fit(SAMPLES, p, v, NULL, NULL, bad[i], &curve, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
   }
 }

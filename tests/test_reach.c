@@ -11,8 +11,8 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include "precompute/tissue/disease.h"
 #include "precompute/physics/equilibrium.h"
+#include "precompute/tissue/disease.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -24,14 +24,16 @@ static double *solve(const supine_lungs *lungs, const double *stiffness, const d
   supine_equilibrium *equilibrium = NULL;
   double *out = calloc(n + 1, sizeof *out);
   supine_error error = {0};
-  assert_int_equal(supine_lungs_network(lungs, &network), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_create(network, 1, 0, &equilibrium), SUPINE_OK);
-  assert_int_equal(supine_equilibrium_set_stiffness(equilibrium, stiffness, NULL), SUPINE_OK);
-  if (supine_equilibrium_solve(equilibrium, 1, force, 0.0, false, out, NULL, &error) != SUPINE_OK) {
+  assert_int_equal(supine_physics_lungs_network(lungs, &network), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_create(network, 1, 0, &equilibrium), SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL),
+                   SUPINE_OK);
+  if (supine_physics_equilibrium_solve(equilibrium, 1, force, 0.0, false, out, NULL, &error) !=
+      SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   return out;
 }
 
@@ -171,12 +173,12 @@ static void test_reach_constant_force_stays_constant(void **state) {
 /* A sphere of 100 mm about the origin whose vertices, for an irregularity above 0, are shifted
  * within the surface by up to this share of a link. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
-  supine_mesh mesh = {.vertex_count = supine_geodesic_vertex_count(frequency),
-                      .triangle_count = supine_geodesic_triangle_count(frequency)};
+  supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
   uint64_t seed = 99;
   mesh.vertices = calloc(3 * mesh.vertex_count, sizeof *mesh.vertices);
   mesh.triangles = calloc(3 * mesh.triangle_count, sizeof *mesh.triangles);
-  supine_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
+  supine_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
     for (size_t k = 0; k < 3; ++k) {
@@ -272,7 +274,7 @@ static void test_reach_is_a_length_where_links_are_not(void **state) {
     with[f] = spread(frequencies[f], 12.0);
     without[f] = spread(frequencies[f], 0.0);
     printf("%zu vertices: a unit force spreads %.2f mm with a reach of 12 mm, %.2f mm without\n",
-           supine_geodesic_vertex_count(frequencies[f]), with[f], without[f]);
+           supine_phantom_geodesic_vertex_count(frequencies[f]), with[f], without[f]);
     assert_true(fabs(with[f] - 24.0) < 0.1 * 24.0);
   }
   assert_true(fabs(with[2] / with[0] - 1.0) < 0.05);

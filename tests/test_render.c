@@ -20,8 +20,8 @@ static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
   (void)state;
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     double a[3][3];
-    assert_non_null(supine_view_name(view));
-    supine_view_axes(view, a);
+    assert_non_null(supine_render_view_name(view));
+    supine_render_view_axes(view, a);
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3;
       const int k = (i + 2) % 3;
@@ -33,7 +33,7 @@ static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
       }
     }
   }
-  assert_null(supine_view_name(SUPINE_VIEW_COUNT));
+  assert_null(supine_render_view_name(SUPINE_VIEW_COUNT));
 }
 
 /* In front of the patient his left is on the right; the viewer from the left looks to the right. */
@@ -47,7 +47,7 @@ static void test_view_axes_look_where_their_names_say(void **state) {
                {SUPINE_VIEW_HEAD, {0, 0, 1}},      {SUPINE_VIEW_FEET, {0, 0, -1}}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     double axes[3][3];
-    supine_view_axes(cases[i].view, axes);
+    supine_render_view_axes(cases[i].view, axes);
     assert_memory_equal(axes[2], cases[i].towards, sizeof axes[2]);
   }
 }
@@ -68,7 +68,7 @@ static void test_colours_grow_lighter_in_even_steps(void **state) {
   double before = 0;
   for (int i = 0; i <= STEPS; ++i) {
     double rgb[3];
-    supine_colour(i / (double)STEPS, rgb);
+    supine_render_colour(i / (double)STEPS, rgb);
     const double here = lightness(rgb);
     for (int k = 0; k < 3; ++k) {
       assert_true(rgb[k] >= 0 && rgb[k] <= 1);
@@ -84,11 +84,11 @@ static void test_colours_beyond_the_ends_are_the_ends(void **state) {
   (void)state;
   double a[3];
   double b[3];
-  supine_colour(-3, a);
-  supine_colour(0, b);
+  supine_render_colour(-3, a);
+  supine_render_colour(0, b);
   assert_memory_equal(a, b, sizeof a);
-  supine_colour(7, a);
-  supine_colour(1, b);
+  supine_render_colour(7, a);
+  supine_render_colour(1, b);
   assert_memory_equal(a, b, sizeof a);
 }
 
@@ -97,8 +97,8 @@ static void test_bar_ends_at_a_round_tick(void **state) {
   static const double cases[][3] = {{31.6, 5, 35}, {18.7, 2, 20}, {20, 5, 20}, {0.043, 0.01, 0.05},
                                     {7.99, 1, 8},  {8, 2, 8},     {0, 0.2, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
-    assert_true(fabs(supine_bar_step(cases[i][0]) - cases[i][1]) < 1e-12);
-    assert_true(fabs(supine_bar_end(cases[i][0]) - cases[i][2]) < 1e-12);
+    assert_true(fabs(supine_render_bar_step(cases[i][0]) - cases[i][1]) < 1e-12);
+    assert_true(fabs(supine_render_bar_end(cases[i][0]) - cases[i][2]) < 1e-12);
   }
 }
 
@@ -117,7 +117,7 @@ static void unmake(made *m) {
   if (m->f == NULL) {
     return;
   }
-  supine_renderer_destroy(m->renderer);
+  supine_render_destroy(m->renderer);
   supine_basis_close(m->basis);
   free(m->bytes);
   free(m->value);
@@ -136,7 +136,7 @@ static made make(fixture *f) {
   for (size_t i = 0; i < f->vertices; ++i) {
     m.value[i] = f->vertex[3 * i + 2] * 0.05F + 5;
   }
-  const supine_status status = supine_renderer_create(m.basis, &m.renderer, &error);
+  const supine_status status = supine_render_create(m.basis, &m.renderer, &error);
   if (status == SUPINE_ERROR_UNSUPPORTED) {
     print_message("skipped: %s\n", error.message);
     unmake(&m);
@@ -158,7 +158,7 @@ static void draw(const made *m, supine_view view, const double *weights, double 
                               .width = WIDTH,
                               .height = HEIGHT};
   supine_error error;
-  if (supine_renderer_draw(m->renderer, &scene, pixels, &error) != SUPINE_OK) {
+  if (supine_render_draw(m->renderer, &scene, pixels, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
 }
@@ -278,12 +278,12 @@ static void test_draw_one_lung_leaves_the_other_out(void **state) {
                         .view = SUPINE_VIEW_ANTERIOR,
                         .width = WIDTH,
                         .height = HEIGHT};
-  supine_renderer_extent(m.renderer, &scene, both);
+  supine_render_extent(m.renderer, &scene, both);
   scene.one_lung = true;
   scene.lung = 1;
-  supine_renderer_extent(m.renderer, &scene, one);
+  supine_render_extent(m.renderer, &scene, one);
   assert_true(one[1] - one[0] < 0.7 * (both[1] - both[0]));
-  assert_int_equal(supine_renderer_draw(m.renderer, &scene, pixels, NULL), SUPINE_OK);
+  assert_int_equal(supine_render_draw(m.renderer, &scene, pixels, NULL), SUPINE_OK);
   assert_true(covered(pixels) > PIXELS / 8);
   unmake(&m);
 }
@@ -297,9 +297,9 @@ static void test_draw_impossible_size_is_refused(void **state) {
   supine_scene scene = {
       .weights = weights, .scales = scales, .value = m.value, .largest = 1, .height = 10};
   supine_error error;
-  assert_int_equal(supine_renderer_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   scene.width = (size_t)1 << 30;
-  assert_int_equal(supine_renderer_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   unmake(&m);
 }
 
@@ -318,7 +318,7 @@ static void test_png_is_a_png(void **state) {
                               .height = HEIGHT};
   unsigned char *png = NULL;
   size_t size = 0;
-  assert_int_equal(supine_renderer_png(m.renderer, &scene, &png, &size, NULL), SUPINE_OK);
+  assert_int_equal(supine_render_png(m.renderer, &scene, &png, &size, NULL), SUPINE_OK);
   assert_true(size > 500);
   assert_memory_equal(png, signature, sizeof signature);
   assert_memory_equal(png + size - 8, "IEND\xAE\x42\x60\x82", 8);

@@ -252,8 +252,8 @@ static supine_status open_parts(const parts *p) {
   char *folder = fixture_folder();
   char path[128];
   (void)snprintf(path, sizeof path, "%s/a", folder);
-  assert_int_equal(supine_safetensors_write(path, p->tensors, p->tensor_count, p->metadata,
-                                            p->metadata_count, NULL),
+  assert_int_equal(supine_writer_safetensors_write(path, p->tensors, p->tensor_count, p->metadata,
+                                                   p->metadata_count, NULL),
                    SUPINE_OK);
   supine_basis *basis = NULL;
   supine_error error = {0};

@@ -48,7 +48,8 @@ static void write_sample(const char *path, const char *value) {
   };
   const supine_metadata metadata[] = {{"key", value}, {"", "empty key"}};
   supine_error error = {0};
-  assert_int_equal(supine_safetensors_write(path, tensors, 5, metadata, 2, &error), SUPINE_OK);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 5, metadata, 2, &error),
+                   SUPINE_OK);
 }
 
 static void test_write_then_open_same_content(void **state) {
@@ -119,19 +120,20 @@ static void test_write_bad_arguments_refused(void **state) {
   const supine_metadata keys[] = {{"k", "1"}, {"k", "2"}};
   const char *path = "/nonexistent-folder/file";
   const supine_status bad = SUPINE_ERROR_ARGUMENT;
-  assert_int_equal(supine_safetensors_write(path, twice, 2, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &rank0, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &rank5, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &dtype, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &huge, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &null, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &reserved, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &good, 1, &checksum, 1, NULL), bad);
-  assert_int_equal(supine_safetensors_write(path, &good, 1, keys, 2, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, twice, 2, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &rank0, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &rank5, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &dtype, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &huge, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &null, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &reserved, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, &checksum, 1, NULL), bad);
+  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, keys, 2, NULL), bad);
   supine_error error;
-  assert_int_equal(supine_safetensors_write(path, &good, 1, NULL, 0, &error), SUPINE_ERROR_WRITE);
+  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, NULL, 0, &error),
+                   SUPINE_ERROR_WRITE);
   assert_non_null(strstr(error.message, path));
-  assert_int_equal(supine_safetensors_write("/dev/full", &good, 1, NULL, 0, &error),
+  assert_int_equal(supine_writer_safetensors_write("/dev/full", &good, 1, NULL, 0, &error),
                    SUPINE_ERROR_WRITE);
 }
 

@@ -144,8 +144,8 @@ static void test_convergence_conjugate_gradients_need_least_work(void **state) {
   assert_int_equal(frame_solve(&f, NULL, force, 0.0, exact, NULL), SUPINE_OK);
   assert_int_equal(frame_solve(&f, NULL, force, 1e-7, found, &report), SUPINE_OK);
   assert_true(relative_rms(n, found, exact) < 1e-6);
-  assert_int_equal(supine_pitcher_catcher(&f.mesh, &f.topology, NULL, force, 1e-7, found, NULL,
-                                          count_steps, &distributions, NULL),
+  assert_int_equal(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, 1e-7, found,
+                                                  NULL, count_steps, &distributions, NULL),
                    SUPINE_OK);
   assert_true(relative_rms(n, found, exact) < 1e-6);
   mass_spring_damper system = damper_create(&f, stiffness, force);

@@ -13,9 +13,9 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include "precompute/tissue/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "precompute/tissue/disease.h"
 #include <supine/volume.h>
 
 /* Masses and the links between them; no surface need be there. */
@@ -26,7 +26,7 @@ typedef struct frame {
 
 static inline void frame_free(frame *f) {
   supine_mesh_free(&f->mesh);
-  supine_topology_free(&f->topology);
+  supine_mesh_topology_free(&f->topology);
 }
 
 /* A flat sheet of side x side masses, `spacing` mm apart, links along rows, columns and one
@@ -48,7 +48,7 @@ static inline frame frame_plane(size_t side, double spacing) {
       t += 6;
     }
   }
-  if (supine_topology_create(&f.mesh, &f.topology) != SUPINE_OK) {
+  if (supine_mesh_topology_create(&f.mesh, &f.topology) != SUPINE_OK) {
     abort();
   }
   return f;
@@ -76,19 +76,19 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
                                         supine_solve_report *report) {
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
-  supine_status status = supine_network_create(&f->mesh, &f->topology, &network);
+  supine_status status = supine_physics_network_create(&f->mesh, &f->topology, &network);
   if (status == SUPINE_OK) {
-    status = supine_equilibrium_create(network, 1, 1, &equilibrium);
+    status = supine_physics_equilibrium_create(network, 1, 1, &equilibrium);
   }
   if (status == SUPINE_OK) {
-    status = supine_equilibrium_set_stiffness(equilibrium, stiffness, NULL);
+    status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL);
   }
   if (status == SUPINE_OK) {
-    status =
-        supine_equilibrium_solve(equilibrium, 1, force, tolerance, false, catch_, report, NULL);
+    status = supine_physics_equilibrium_solve(equilibrium, 1, force, tolerance, false, catch_,
+                                              report, NULL);
   }
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   return status;
 }
 
@@ -265,7 +265,7 @@ typedef struct ventilation {
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
-  const supine_model model = supine_model_default();
+  const supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   double low;
   double high;
@@ -274,19 +274,19 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
   double *vertices = calloc(3 * n + 1, sizeof *vertices);
   supine_status status = area == NULL || vertices == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
-    status = supine_solve(lungs, &model, g, &solution, NULL);
+    status = supine_physics_solve(lungs, &model, g, &solution, NULL);
   }
   if (status == SUPINE_OK) {
     status = supine_volume_scale(solution.cubic, volume, &scale, NULL);
   }
   if (status == SUPINE_OK) {
-    status = supine_height_range(&lungs->mesh, 1, g, &low, &high);
+    status = supine_physics_height_range(&lungs->mesh, 1, g, &low, &high);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   supine_mesh_vertex_area(&lungs->mesh, area);
-  supine_solution_apply(&solution, &lungs->mesh, scale, vertices);
+  supine_physics_solution_apply(&solution, &lungs->mesh, scale, vertices);
   double areas[ZONES] = {0.0};
   double caught[ZONES] = {0.0};
   double swept[ZONES] = {0.0};
@@ -348,7 +348,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
   found->slope = (ZONES * sum_hi - sum_h * sum_i) / (ZONES * sum_hh - sum_h * sum_h);
   found->height = high - low;
 cleanup:
-  supine_solution_free(&solution);
+  supine_physics_solution_free(&solution);
   free(area);
   free(vertices);
   return status;
@@ -434,18 +434,18 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
 /* Displacements of a breath [N, 3], mm. */
 static inline supine_status breathe_at(supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
-  const supine_model model = supine_model_default();
+  const supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   double scale = 0.0;
   lungs->reach = reach;
-  supine_status status = supine_solve(lungs, &model, g, &solution, NULL);
+  supine_status status = supine_physics_solve(lungs, &model, g, &solution, NULL);
   if (status == SUPINE_OK) {
     status = supine_volume_scale(solution.cubic, volume, &scale, NULL);
   }
   for (size_t at = 0; status == SUPINE_OK && at < 3 * lungs->mesh.vertex_count; ++at) {
     moves[at] = scale * solution.catch_[at / 3] * solution.directions[at];
   }
-  supine_solution_free(&solution);
+  supine_physics_solution_free(&solution);
   return status;
 }
 
@@ -458,15 +458,15 @@ static inline supine_status spread_of(supine_lungs *lungs, double reach, size_t 
   double *area = calloc(n + 1, sizeof *area);
   double *column = calloc(n, sizeof *column);
   lungs->reach = reach;
-  supine_status status = supine_lungs_network(lungs, &network);
+  supine_status status = supine_physics_lungs_network(lungs, &network);
   if (status == SUPINE_OK) {
-    status = supine_equilibrium_create(network, 1, 0, &equilibrium);
+    status = supine_physics_equilibrium_create(network, 1, 0, &equilibrium);
   }
   if (status == SUPINE_OK) {
-    status = supine_equilibrium_set_stiffness(equilibrium, NULL, NULL);
+    status = supine_physics_equilibrium_set_stiffness(equilibrium, NULL, NULL);
   }
   if (status == SUPINE_OK) {
-    status = supine_transfer_column(equilibrium, vertex, column, NULL);
+    status = supine_physics_transfer_column(equilibrium, vertex, column, NULL);
   }
   if (status == SUPINE_OK) {
     double sum = 0.0;
@@ -482,8 +482,8 @@ static inline supine_status spread_of(supine_lungs *lungs, double reach, size_t 
     }
     *spread = sqrt(square / sum);
   }
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   free(area);
   free(column);
   return status;

@@ -48,13 +48,13 @@ static bool format_of_ending(const char *ending, mesh_format *format) {
 static bool format_of_bytes(const unsigned char *bytes, size_t size, mesh_format *format) {
   mesh_text text = {bytes, bytes + size};
   mesh_text word;
-  if (!mesh_text_word(&text, &word)) {
+  if (!supine_mesh_text_word(&text, &word)) {
     return false;
   }
-  *format = mesh_text_is(word, "ply")     ? MESH_FORMAT_PLY
-            : mesh_text_is(word, "solid") ? MESH_FORMAT_STL
-            : mesh_text_is(word, "off")   ? MESH_FORMAT_OFF
-                                          : MESH_FORMAT_OTHER;
+  *format = supine_mesh_text_is(word, "ply")     ? MESH_FORMAT_PLY
+            : supine_mesh_text_is(word, "solid") ? MESH_FORMAT_STL
+            : supine_mesh_text_is(word, "off")   ? MESH_FORMAT_OFF
+                                                 : MESH_FORMAT_OTHER;
   return *format != MESH_FORMAT_OTHER;
 }
 
@@ -94,7 +94,7 @@ static supine_status open_regular(const char *path, FILE **stream, size_t *size,
                     : SUPINE_OK;
 }
 
-supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *error) {
+supine_status supine_mesh_file_read(const char *path, mesh_file *file, supine_error *error) {
   *file = (mesh_file){.path = path, .faces = SIZE_MAX};
   FILE *stream = NULL;
   size_t size = 0;
@@ -106,7 +106,7 @@ supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *er
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  mesh_space_note(file, file->size);
+  supine_mesh_space_note(file, file->size);
   const char *ending = ending_of(path);
   if (!format_of_ending(ending, &file->format) &&
       !format_of_bytes(file->bytes, file->size, &file->format)) {
@@ -127,12 +127,12 @@ cleanup:
     (void)fclose(stream);
   }
   if (status != SUPINE_OK) {
-    mesh_file_free(file);
+    supine_mesh_file_free(file);
   }
   return status;
 }
 
-void mesh_file_free(mesh_file *file) {
+void supine_mesh_file_free(mesh_file *file) {
   free(file->bytes);
   *file = (mesh_file){0};
 }

@@ -9,12 +9,12 @@
 
 /* The next line with a word on it, up to a comment. */
 static bool next_line(mesh_text *text, mesh_text *line) {
-  while (mesh_text_line(text, line)) {
+  while (supine_mesh_text_line(text, line)) {
     const unsigned char *comment = memchr(line->at, '#', (size_t)(line->end - line->at));
     line->end = comment == NULL ? line->end : comment;
     mesh_text rest = *line;
     mesh_text word;
-    if (mesh_text_word(&rest, &word)) {
+    if (supine_mesh_text_word(&rest, &word)) {
       return true;
     }
   }
@@ -26,7 +26,7 @@ static bool is_magic(mesh_text word) {
   static const char *const magic[] = {"OFF",   "COFF",   "NOFF",   "CNOFF",
                                       "STOFF", "STCOFF", "STNOFF", "STCNOFF"};
   for (size_t i = 0; i < sizeof magic / sizeof *magic; ++i) {
-    if (mesh_text_is(word, magic[i])) {
+    if (supine_mesh_text_is(word, magic[i])) {
       return true;
     }
   }
@@ -36,16 +36,16 @@ static bool is_magic(mesh_text word) {
 static bool read_counts(mesh_text *text, uint64_t *vertices, uint64_t *faces) {
   mesh_text line;
   mesh_text word;
-  if (!next_line(text, &line) || !mesh_text_word(&line, &word) || !is_magic(word)) {
+  if (!next_line(text, &line) || !supine_mesh_text_word(&line, &word) || !is_magic(word)) {
     return false;
   }
-  if (!mesh_text_word(&line, &word)) { /* the counts on the first line, or on the next */
-    if (!next_line(text, &line) || !mesh_text_word(&line, &word)) {
+  if (!supine_mesh_text_word(&line, &word)) { /* the counts on the first line, or on the next */
+    if (!next_line(text, &line) || !supine_mesh_text_word(&line, &word)) {
       return false;
     }
   }
-  return mesh_text_count(word, vertices) && mesh_text_word(&line, &word) &&
-         mesh_text_count(word, faces);
+  return supine_mesh_text_count(word, vertices) && supine_mesh_text_word(&line, &word) &&
+         supine_mesh_text_count(word, faces);
 }
 
 static void put(FILE *out, mesh_text word) {
@@ -55,7 +55,7 @@ static void put(FILE *out, mesh_text word) {
 static bool copy_vertex(mesh_text line, FILE *out) {
   for (int k = 0; k < 3; ++k) {
     mesh_text word;
-    if (!mesh_text_word(&line, &word) || !mesh_text_is_number(word)) {
+    if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_is_number(word)) {
       return false;
     }
     put(out, word);
@@ -67,13 +67,15 @@ static bool copy_vertex(mesh_text line, FILE *out) {
 static bool copy_face(mesh_text line, uint64_t vertices, FILE *out) {
   mesh_text word;
   uint64_t corners = 0;
-  if (!mesh_text_word(&line, &word) || !mesh_text_count(word, &corners) || corners == 0) {
+  if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &corners) ||
+      corners == 0) {
     return false;
   }
   put(out, word);
   for (; corners > 0; --corners) {
     uint64_t corner = 0;
-    if (!mesh_text_word(&line, &word) || !mesh_text_count(word, &corner) || corner >= vertices) {
+    if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &corner) ||
+        corner >= vertices) {
       return false;
     }
     (void)fputc(' ', out);
@@ -113,8 +115,8 @@ static supine_status copy(mesh_file *file, FILE *out, supine_error *error) {
   return SUPINE_OK;
 }
 
-supine_status mesh_guard_off(mesh_file *file, supine_error *error) {
-  if (!mesh_guard_text(file, error)) {
+supine_status supine_mesh_guard_off(mesh_file *file, supine_error *error) {
+  if (!supine_mesh_guard_text(file, error)) {
     return SUPINE_ERROR_FORMAT;
   }
   char *bytes = NULL;

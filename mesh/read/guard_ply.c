@@ -45,19 +45,19 @@ static bool skip_value(mesh_text *line, const ply_type *type) {
   mesh_text word;
   uint64_t value = 0;
   if (type->is_real) {
-    return mesh_text_skip_numbers(line, 1);
+    return supine_mesh_text_skip_numbers(line, 1);
   }
-  if (!mesh_text_word(line, &word)) {
+  if (!supine_mesh_text_word(line, &word)) {
     return false;
   }
   word.at += type->is_signed && *word.at == '-';
-  return mesh_text_count(word, &value);
+  return supine_mesh_text_count(word, &value);
 }
 
 /* One line an item: importers count lines. */
 static bool skip_ascii_item(mesh_text *text, const ply_header *header, const ply_element *element) {
   mesh_text line;
-  if (!mesh_text_line(text, &line)) {
+  if (!supine_mesh_text_line(text, &line)) {
     return false;
   }
   for (size_t p = 0; p < element->property_count; ++p) {
@@ -65,7 +65,7 @@ static bool skip_ascii_item(mesh_text *text, const ply_header *header, const ply
     uint64_t length = 1;
     mesh_text word;
     if (property->count != NULL &&
-        (!mesh_text_word(&line, &word) || !mesh_text_count(word, &length))) {
+        (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &length))) {
       return false;
     }
     for (; length > 0; --length) {
@@ -109,13 +109,13 @@ static bool holds_surface(const ply_header *header) {
   return roles >= 4;
 }
 
-supine_status mesh_guard_ply(mesh_file *file, supine_error *error) {
+supine_status supine_mesh_guard_ply(mesh_file *file, supine_error *error) {
   ply_header header;
-  const supine_status status = ply_header_read(file, &header, error);
+  const supine_status status = supine_mesh_ply_header_read(file, &header, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  mesh_space_note(file, header.size);
+  supine_mesh_space_note(file, header.size);
   mesh_text text = {file->bytes + header.size, file->bytes + file->size};
   for (size_t e = 0; e < header.element_count; ++e) {
     ply_element *element = &header.elements[e];
@@ -142,7 +142,7 @@ supine_status mesh_guard_ply(mesh_file *file, supine_error *error) {
                             file->path);
   }
   file->whole = header.encoding != PLY_ASCII;
-  return header.encoding == PLY_ASCII && !mesh_guard_text(file, error)
+  return header.encoding == PLY_ASCII && !supine_mesh_guard_text(file, error)
              ? SUPINE_ERROR_FORMAT
-             : ply_rewrite(file, &header, error);
+             : supine_mesh_ply_rewrite(file, &header, error);
 }

@@ -15,7 +15,7 @@ static size_t binary_facets(const mesh_file *file) {
 static bool is_text(const mesh_file *file) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text word;
-  if (!mesh_text_word(&text, &word) || !mesh_text_is(word, "solid")) {
+  if (!supine_mesh_text_word(&text, &word) || !supine_mesh_text_is(word, "solid")) {
     return false;
   }
   const size_t head = file->size < 1024 ? file->size : 1024;
@@ -28,14 +28,14 @@ static supine_status check_text(mesh_file *file, supine_error *error) {
   mesh_text word;
   size_t corners = 0;
   bool open = true;
-  for (size_t number = 1; mesh_text_line(&text, &line); ++number) {
-    if (!mesh_text_word(&line, &word)) {
+  for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
+    if (!supine_mesh_text_word(&line, &word)) {
       continue;
     }
-    open = !mesh_text_is(word, "endsolid") && (open || mesh_text_is(word, "solid"));
-    if (mesh_text_is(word, "vertex")) {
+    open = !supine_mesh_text_is(word, "endsolid") && (open || supine_mesh_text_is(word, "solid"));
+    if (supine_mesh_text_is(word, "vertex")) {
       ++corners;
-      if (!mesh_text_skip_numbers(&line, 3)) {
+      if (!supine_mesh_text_skip_numbers(&line, 3)) {
         return supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: line %zu: a vertex wants three numbers", file->path, number);
       }
@@ -50,11 +50,11 @@ static supine_status check_text(mesh_file *file, supine_error *error) {
   return SUPINE_OK;
 }
 
-supine_status mesh_guard_stl(mesh_file *file, supine_error *error) {
+supine_status supine_mesh_guard_stl(mesh_file *file, supine_error *error) {
   const bool has_count = file->size >= STL_HEADER + 4;
   const size_t promised = has_count ? STL_HEADER + 4 + STL_FACET * binary_facets(file) : 0;
   if (has_count && promised == file->size) {
-    mesh_space_note(file, STL_HEADER);
+    supine_mesh_space_note(file, STL_HEADER);
     file->faces = binary_facets(file);
     file->whole = true;
     return file->faces > 0
@@ -63,7 +63,7 @@ supine_status mesh_guard_stl(mesh_file *file, supine_error *error) {
                                   "%s: no triangles: the STL file has 0 facets", file->path);
   }
   if (is_text(file)) {
-    return mesh_guard_text(file, error) ? check_text(file, error) : SUPINE_ERROR_FORMAT;
+    return supine_mesh_guard_text(file, error) ? check_text(file, error) : SUPINE_ERROR_FORMAT;
   }
   if (!has_count) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,

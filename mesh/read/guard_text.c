@@ -5,7 +5,7 @@
 
 #include "mesh/read/read.h"
 
-bool mesh_guard_text(const mesh_file *file, supine_error *error) {
+bool supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
   const unsigned char *end = file->bytes + file->size;
   const unsigned char *nul = memchr(file->bytes, '\0', file->size);
   if (nul != NULL) {

@@ -186,8 +186,8 @@ static void add_node(const struct aiScene *scene, const struct aiNode *node,
   }
 }
 
-supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                          supine_error *error) {
+supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   supine_mesh joined = {0};
   const struct aiScene *scene = NULL;
   supine_status status = read_scene(file, &scene, error);

@@ -8,13 +8,13 @@
 static supine_status guard(mesh_file *file, supine_error *error) {
   switch (file->format) {
   case MESH_FORMAT_PLY:
-    return mesh_guard_ply(file, error);
+    return supine_mesh_guard_ply(file, error);
   case MESH_FORMAT_STL:
-    return mesh_guard_stl(file, error);
+    return supine_mesh_guard_stl(file, error);
   case MESH_FORMAT_OBJ:
-    return mesh_guard_obj(file, error);
+    return supine_mesh_guard_obj(file, error);
   case MESH_FORMAT_OFF:
-    return mesh_guard_off(file, error);
+    return supine_mesh_guard_off(file, error);
   case MESH_FORMAT_OTHER:
     break;
   }
@@ -67,7 +67,7 @@ static const char *likely_unit(const supine_mesh *mesh) {
   for (int axis = 0; axis < 3; ++axis) {
     side = fmax(side, maximum[axis] - minimum[axis]);
   }
-  return mesh_unit_likely(side);
+  return supine_mesh_unit_likely(side);
 }
 
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
@@ -82,19 +82,19 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   supine_mesh loaded = {0};
   supine_mesh_report found = {0};
   mesh_file file;
-  supine_status status = mesh_file_read(path, &file, error);
+  supine_status status = supine_mesh_file_read(path, &file, error);
   if (status != SUPINE_OK) {
     return status;
   }
   if ((status = guard(&file, error)) != SUPINE_OK ||
       (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
-      (status = mesh_import(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
+      (status = supine_mesh_import(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
       (status = convert(path, scale, found.axes == SUPINE_AXES_RAS, &loaded, error)) != SUPINE_OK) {
     goto cleanup;
   }
   found.file_vertices = loaded.vertex_count;
   found.file_faces = loaded.triangle_count + found.degenerate_faces;
-  status = mesh_weld(&loaded, &found);
+  status = supine_mesh_weld(&loaded, &found);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "%s: out of memory", path);
     goto cleanup;
@@ -115,6 +115,6 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
 
 cleanup:
   supine_mesh_free(&loaded);
-  mesh_file_free(&file);
+  supine_mesh_file_free(&file);
   return status;
 }

@@ -41,10 +41,12 @@ typedef struct ply_header {
 } ply_header;
 
 /** Reads the header at the start of `file`. @retval SUPINE_ERROR_FORMAT */
-supine_status ply_header_read(const mesh_file *file, ply_header *header, supine_error *error);
+supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
+                                          supine_error *error);
 
 /** Rewrites `file` so that importers cannot stumble over it: the elements that make a surface and
  * no others, under a header without comments and names of no concern. */
-supine_status ply_rewrite(mesh_file *file, const ply_header *header, supine_error *error);
+supine_status supine_mesh_ply_rewrite(mesh_file *file, const ply_header *header,
+                                      supine_error *error);
 
 #endif

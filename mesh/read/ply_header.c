@@ -15,7 +15,7 @@ static const ply_type *find_type(mesh_text word) {
       {"float", 4, true, true},    {"float32", 4, true, true},  {"double", 8, true, true},
       {"float64", 8, true, true}};
   for (size_t i = 0; i < sizeof types / sizeof *types; ++i) {
-    if (mesh_text_is(word, types[i].name)) {
+    if (supine_mesh_text_is(word, types[i].name)) {
       return &types[i];
     }
   }
@@ -24,7 +24,7 @@ static const ply_type *find_type(mesh_text word) {
 
 static const char *find_role(mesh_text word, const char *const *roles) {
   for (; *roles != NULL; ++roles) {
-    if (mesh_text_is(word, *roles)) {
+    if (supine_mesh_text_is(word, *roles)) {
       return *roles;
     }
   }
@@ -45,21 +45,21 @@ static const char *property_role(mesh_text name, const char *element, bool is_li
 
 static bool read_format(mesh_text line, ply_header *header) {
   mesh_text word;
-  if (!mesh_text_word(&line, &word)) {
+  if (!supine_mesh_text_word(&line, &word)) {
     return false;
   }
-  header->encoding = mesh_text_is(word, "ascii")                  ? PLY_ASCII
-                     : mesh_text_is(word, "binary_little_endian") ? PLY_LITTLE
-                                                                  : PLY_BIG;
-  return header->encoding != PLY_BIG || mesh_text_is(word, "binary_big_endian");
+  header->encoding = supine_mesh_text_is(word, "ascii")                  ? PLY_ASCII
+                     : supine_mesh_text_is(word, "binary_little_endian") ? PLY_LITTLE
+                                                                         : PLY_BIG;
+  return header->encoding != PLY_BIG || supine_mesh_text_is(word, "binary_big_endian");
 }
 
 static bool read_element(mesh_text line, ply_header *header) {
   static const char *const roles[] = {"vertex", "face", "tristrips", NULL};
   mesh_text name;
   mesh_text count;
-  if (header->element_count == PLY_ELEMENTS_MAX || !mesh_text_word(&line, &name) ||
-      !mesh_text_word(&line, &count)) {
+  if (header->element_count == PLY_ELEMENTS_MAX || !supine_mesh_text_word(&line, &name) ||
+      !supine_mesh_text_word(&line, &count)) {
     return false;
   }
   ply_element *element = &header->elements[header->element_count];
@@ -71,28 +71,28 @@ static bool read_element(mesh_text line, ply_header *header) {
     }
   }
   ++header->element_count;
-  return mesh_text_count(count, &element->count);
+  return supine_mesh_text_count(count, &element->count);
 }
 
 static bool read_property(mesh_text line, ply_header *header) {
   mesh_text word;
   if (header->property_count == PLY_PROPERTIES_MAX || header->element_count == 0 ||
-      !mesh_text_word(&line, &word)) {
+      !supine_mesh_text_word(&line, &word)) {
     return false;
   }
   ply_element *element = &header->elements[header->element_count - 1];
   ply_property property = {0};
-  if (mesh_text_is(word, "list")) {
-    if (!mesh_text_word(&line, &word)) {
+  if (supine_mesh_text_is(word, "list")) {
+    if (!supine_mesh_text_word(&line, &word)) {
       return false;
     }
     property.count = find_type(word);
-    if (property.count == NULL || property.count->is_real || !mesh_text_word(&line, &word)) {
+    if (property.count == NULL || property.count->is_real || !supine_mesh_text_word(&line, &word)) {
       return false;
     }
   }
   property.type = find_type(word);
-  if (property.type == NULL || !mesh_text_word(&line, &word)) {
+  if (property.type == NULL || !supine_mesh_text_word(&line, &word)) {
     return false;
   }
   property.role = property_role(word, element->role, property.count != NULL);
@@ -117,31 +117,32 @@ static bool read_line(mesh_text line, ply_header *header, bool *has_format) {
   if (!is_printable(line)) {
     return false;
   }
-  if (!mesh_text_word(&line, &word)) {
+  if (!supine_mesh_text_word(&line, &word)) {
     return true;
   }
-  if (mesh_text_is(word, "format")) {
+  if (supine_mesh_text_is(word, "format")) {
     *has_format = read_format(line, header);
     return *has_format;
   }
-  return mesh_text_is(word, "element")    ? read_element(line, header)
-         : mesh_text_is(word, "property") ? read_property(line, header)
-                                          : true;
+  return supine_mesh_text_is(word, "element")    ? read_element(line, header)
+         : supine_mesh_text_is(word, "property") ? read_property(line, header)
+                                                 : true;
 }
 
-supine_status ply_header_read(const mesh_file *file, ply_header *header, supine_error *error) {
+supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
+                                          supine_error *error) {
   *header = (ply_header){0};
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   bool has_format = false;
-  if (!mesh_text_line(&text, &line) || !mesh_text_is(line, "ply")) {
+  if (!supine_mesh_text_line(&text, &line) || !supine_mesh_text_is(line, "ply")) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: does not begin with \"ply\"",
                             file->path);
   }
-  for (size_t number = 2; mesh_text_line(&text, &line); ++number) {
+  for (size_t number = 2; supine_mesh_text_line(&text, &line); ++number) {
     mesh_text rest = line;
     mesh_text word;
-    if (mesh_text_word(&rest, &word) && mesh_text_is(word, "end_header")) {
+    if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
       header->size = (size_t)(text.at - file->bytes);
       return has_format ? SUPINE_OK
                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -186,7 +187,8 @@ static void write_header(FILE *out, const ply_header *header) {
   (void)fprintf(out, "end_header\n%s", pad ? "." : "");
 }
 
-supine_status ply_rewrite(mesh_file *file, const ply_header *header, supine_error *error) {
+supine_status supine_mesh_ply_rewrite(mesh_file *file, const ply_header *header,
+                                      supine_error *error) {
   char *head = NULL;
   size_t length = 0;
   unsigned char *bytes = NULL;

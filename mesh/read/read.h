@@ -18,17 +18,17 @@ typedef struct mesh_text {
 } mesh_text;
 
 /** Takes the next line, without its LF or CRLF, off `text`; false where nothing is left. */
-bool mesh_text_line(mesh_text *text, mesh_text *line);
+bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
 /** Takes the next word between blanks off `text`; false where there is none. */
-bool mesh_text_word(mesh_text *text, mesh_text *word);
+bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
 /** Is the word `expected`, in any case? */
-bool mesh_text_is(mesh_text word, const char *expected);
+bool supine_mesh_text_is(mesh_text word, const char *expected);
 /** Is the word a decimal number, nan or inf? */
-bool mesh_text_is_number(mesh_text word);
+bool supine_mesh_text_is_number(mesh_text word);
 /** Reads decimal digits alone; false for anything else or beyond 2^63. */
-bool mesh_text_count(mesh_text word, uint64_t *value);
+bool supine_mesh_text_count(mesh_text word, uint64_t *value);
 /** Takes the next `count` words off `text`; true where all are there and are numbers. */
-bool mesh_text_skip_numbers(mesh_text *text, uint64_t count);
+bool supine_mesh_text_skip_numbers(mesh_text *text, uint64_t count);
 
 /* ---- file.c: a file's bytes. ---- */
 
@@ -61,14 +61,14 @@ typedef struct mesh_file {
 } mesh_file;
 
 /** Opens, tells the format from the ending (or, without a known one, the first bytes), reads. */
-supine_status mesh_file_read(const char *path, mesh_file *file, supine_error *error);
-void mesh_file_free(mesh_file *file);
+supine_status supine_mesh_file_read(const char *path, mesh_file *file, supine_error *error);
+void supine_mesh_file_free(mesh_file *file);
 
 /* ---- space.c ---- */
 
 /** Looks for SPACE=LPS, SPACE=RAS and the word RAS in the first `size` bytes, and sets space and
  * mentions_ras. */
-void mesh_space_note(mesh_file *file, size_t size);
+void supine_mesh_space_note(mesh_file *file, size_t size);
 
 /* ---- guard*.c: is the file as long and as large as it says? The importers believe the counts in
  * a file: they read past the end of some, take gigabytes for others, and read words that are no
@@ -76,30 +76,31 @@ void mesh_space_note(mesh_file *file, size_t size);
  * may take out of the bytes what importers misread or what would make them open other files. ----
  */
 
-supine_status mesh_guard_ply(mesh_file *file, supine_error *error);
-supine_status mesh_guard_stl(mesh_file *file, supine_error *error);
-supine_status mesh_guard_obj(mesh_file *file, supine_error *error);
-supine_status mesh_guard_off(mesh_file *file, supine_error *error);
+supine_status supine_mesh_guard_ply(mesh_file *file, supine_error *error);
+supine_status supine_mesh_guard_stl(mesh_file *file, supine_error *error);
+supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error);
+supine_status supine_mesh_guard_off(mesh_file *file, supine_error *error);
 /** Line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
-bool mesh_guard_text(const mesh_file *file, supine_error *error);
+bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- import.c: the surface as assimp gives it: all nodes joined, polygons cut. ---- */
 
 /** @param mesh     file's units and axes, not welded; written on success alone
  *  @param dropped  points and lines
  *  Frees the file's bytes as soon as it can. */
-supine_status mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped, supine_error *error);
+supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error);
 
 /* ---- weld.c ---- */
 
 /** Welds vertices of equal bits (the caller has made every -0 a 0), drops triangles with two
  * corners at one vertex, then vertices without a triangle. Works in place; counts are added to. */
-supine_status mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
+supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
 
 /* ---- unit.c ---- */
 
 /** The unit in which a box with this longest side, taken as mm, would hold lungs; NULL where it
  * does already. */
-const char *mesh_unit_likely(double longest_side);
+const char *supine_mesh_unit_likely(double longest_side);
 
 #endif

@@ -46,7 +46,7 @@ static bool mentions_ras(const unsigned char *begin, const unsigned char *end) {
   return at != NULL;
 }
 
-void mesh_space_note(mesh_file *file, size_t size) {
+void supine_mesh_space_note(mesh_file *file, size_t size) {
   const unsigned char *end = file->bytes + (size < file->size ? size : file->size);
   file->space = find_space(file->bytes, end);
   file->mentions_ras = mentions_ras(file->bytes, end);

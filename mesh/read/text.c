@@ -13,7 +13,7 @@ static bool is_digit(unsigned char c) {
   return c >= '0' && c <= '9';
 }
 
-bool mesh_text_line(mesh_text *text, mesh_text *line) {
+bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
   if (text->at >= text->end) {
     return false;
   }
@@ -26,7 +26,7 @@ bool mesh_text_line(mesh_text *text, mesh_text *line) {
   return true;
 }
 
-bool mesh_text_word(mesh_text *text, mesh_text *word) {
+bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
   while (text->at < text->end && is_blank(*text->at)) {
     ++text->at;
   }
@@ -38,7 +38,7 @@ bool mesh_text_word(mesh_text *text, mesh_text *word) {
   return word->at < word->end;
 }
 
-bool mesh_text_is(mesh_text word, const char *expected) {
+bool supine_mesh_text_is(mesh_text word, const char *expected) {
   const size_t length = strlen(expected);
   return (size_t)(word.end - word.at) == length &&
          strncasecmp((const char *)word.at, expected, length) == 0;
@@ -58,9 +58,10 @@ static void skip_sign(mesh_text *word) {
   }
 }
 
-bool mesh_text_is_number(mesh_text word) {
+bool supine_mesh_text_is_number(mesh_text word) {
   skip_sign(&word);
-  if (mesh_text_is(word, "nan") || mesh_text_is(word, "inf") || mesh_text_is(word, "infinity")) {
+  if (supine_mesh_text_is(word, "nan") || supine_mesh_text_is(word, "inf") ||
+      supine_mesh_text_is(word, "infinity")) {
     return true;
   }
   size_t digits = skip_digits(&word);
@@ -76,7 +77,7 @@ bool mesh_text_is_number(mesh_text word) {
   return digits > 0 && word.at == word.end;
 }
 
-bool mesh_text_count(mesh_text word, uint64_t *value) {
+bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   *value = 0;
   for (const unsigned char *p = word.at; p < word.end; ++p) {
     if (!is_digit(*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
@@ -87,10 +88,10 @@ bool mesh_text_count(mesh_text word, uint64_t *value) {
   return word.at < word.end;
 }
 
-bool mesh_text_skip_numbers(mesh_text *text, uint64_t count) {
+bool supine_mesh_text_skip_numbers(mesh_text *text, uint64_t count) {
   mesh_text word;
   for (; count > 0; --count) {
-    if (!mesh_text_word(text, &word) || !mesh_text_is_number(word)) {
+    if (!supine_mesh_text_word(text, &word) || !supine_mesh_text_is_number(word)) {
       return false;
     }
   }

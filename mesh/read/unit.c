@@ -9,7 +9,7 @@ static const double side_least = 80.0;
 static const double side_most = 700.0;
 static const double side_typical = 280.0;
 
-const char *mesh_unit_likely(double longest_side) {
+const char *supine_mesh_unit_likely(double longest_side) {
   static const struct {
     const char *name;
     double millimetres;

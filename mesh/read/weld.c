@@ -82,7 +82,7 @@ static size_t drop_unreferenced(supine_mesh *mesh, uint32_t *remap) {
   return kept;
 }
 
-supine_status mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
+supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   size_t slot_count = 16;
   while (slot_count < 2 * mesh->vertex_count) {
     slot_count *= 2;

@@ -16,10 +16,10 @@ static save_function *find_function(const char *path) {
   static const struct {
     const char *ending;
     save_function *function;
-  } known[] = {{".ply", mesh_save_ply},
-               {".obj", mesh_save_obj},
-               {".stl", mesh_save_stl},
-               {".vtp", mesh_save_vtp}};
+  } known[] = {{".ply", supine_mesh_save_ply},
+               {".obj", supine_mesh_save_obj},
+               {".stl", supine_mesh_save_stl},
+               {".vtp", supine_mesh_save_vtp}};
   const size_t length = strlen(path);
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const size_t ending = strlen(known[i].ending);
@@ -96,13 +96,13 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   return supine_output_commit(&output, error);
 }
 
-void mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
+void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
   for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
     position[axis] = (float)(writer->sign[axis] * writer->mesh->vertices[3 * i + axis] + 0.0);
   }
 }
 
-void mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
+void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double d = writer->mesh->vertices[3 * i + axis] - writer->rest[3 * i + axis];
@@ -112,15 +112,15 @@ void mesh_writer_displacement(const mesh_writer *writer, size_t i, float displac
   displacement[3] = (float)sqrt(square);
 }
 
-void mesh_put_f32(unsigned char **at, const float *values, size_t count) {
+void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t bits = 0;
     memcpy(&bits, &values[i], sizeof bits);
-    mesh_put_u32(at, &bits, 1);
+    supine_mesh_put_u32(at, &bits, 1);
   }
 }
 
-void mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count) {
+void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     for (unsigned byte = 0; byte < 4; ++byte) {
       *(*at)++ = (unsigned char)(values[i] >> (8 * byte));

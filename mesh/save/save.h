@@ -18,18 +18,18 @@ typedef struct mesh_writer {
 } mesh_writer;
 
 /** Vertex i in the file's axes. */
-void mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
+void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
 /** Displacement of vertex i in the file's axes, and its length. */
-void mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
+void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
 
 /** Little-endian bytes of `count` values; at grows. */
-void mesh_put_f32(unsigned char **at, const float *values, size_t count);
-void mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
+void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
+void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
 
 /* Write errors stay in the stream, for the caller to find. */
-void mesh_save_ply(const mesh_writer *writer);
-void mesh_save_obj(const mesh_writer *writer);
-void mesh_save_stl(const mesh_writer *writer);
-void mesh_save_vtp(const mesh_writer *writer);
+void supine_mesh_save_ply(const mesh_writer *writer);
+void supine_mesh_save_obj(const mesh_writer *writer);
+void supine_mesh_save_stl(const mesh_writer *writer);
+void supine_mesh_save_vtp(const mesh_writer *writer);
 
 #endif

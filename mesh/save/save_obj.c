@@ -2,7 +2,7 @@
 /* OBJ text. */
 #include "mesh/save/save.h"
 
-void mesh_save_obj(const mesh_writer *writer) {
+void supine_mesh_save_obj(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "# SPACE=%s mm\n", writer->space);
   if (writer->comment[0] != '\0') {
@@ -10,7 +10,7 @@ void mesh_save_obj(const mesh_writer *writer) {
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     float position[3];
-    mesh_writer_position(writer, i, position);
+    supine_mesh_writer_position(writer, i, position);
     (void)fprintf(writer->out, "v %.9g %.9g %.9g\n", (double)position[0], (double)position[1],
                   (double)position[2]);
   }

@@ -2,7 +2,7 @@
 /* Binary little-endian PLY. */
 #include "mesh/save/save.h"
 
-void mesh_save_ply(const mesh_writer *writer) {
+void supine_mesh_save_ply(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s mm\n",
                 writer->space);
@@ -22,19 +22,19 @@ void mesh_save_ply(const mesh_writer *writer) {
                 mesh->triangle_count);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     float row[7];
-    mesh_writer_position(writer, i, row);
+    supine_mesh_writer_position(writer, i, row);
     if (writer->rest != NULL) {
-      mesh_writer_displacement(writer, i, row + 3);
+      supine_mesh_writer_displacement(writer, i, row + 3);
     }
     unsigned char bytes[sizeof row];
     unsigned char *at = bytes;
-    mesh_put_f32(&at, row, writer->rest != NULL ? 7 : 3);
+    supine_mesh_put_f32(&at, row, writer->rest != NULL ? 7 : 3);
     (void)fwrite(bytes, 1, (size_t)(at - bytes), writer->out);
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     unsigned char bytes[13] = {3};
     unsigned char *at = bytes + 1;
-    mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
+    supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
     (void)fwrite(bytes, 1, sizeof bytes, writer->out);
   }
 }

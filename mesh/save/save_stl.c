@@ -29,7 +29,7 @@ static void facet_normal(float corners[3][3], float normal[3]) {
   }
 }
 
-void mesh_save_stl(const mesh_writer *writer) {
+void supine_mesh_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   /* The header must not begin with "solid", by which readers know STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
@@ -38,20 +38,20 @@ void mesh_save_stl(const mesh_writer *writer) {
   memcpy(header, text, strnlen(text, HEADER));
   unsigned char *at = header + HEADER;
   const uint32_t count = (uint32_t)mesh->triangle_count;
-  mesh_put_u32(&at, &count, 1);
+  supine_mesh_put_u32(&at, &count, 1);
   (void)fwrite(header, 1, sizeof header, writer->out);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     float corners[3][3];
     float normal[3];
     for (size_t k = 0; k < 3; ++k) {
-      mesh_writer_position(writer, mesh->triangles[3 * t + k], corners[k]);
+      supine_mesh_writer_position(writer, mesh->triangles[3 * t + k], corners[k]);
     }
     facet_normal(corners, normal);
     unsigned char bytes[FACET] = {0};
     at = bytes;
-    mesh_put_f32(&at, normal, 3);
+    supine_mesh_put_f32(&at, normal, 3);
     for (size_t k = 0; k < 3; ++k) {
-      mesh_put_f32(&at, corners[k], 3);
+      supine_mesh_put_f32(&at, corners[k], 3);
     }
     (void)fwrite(bytes, 1, sizeof bytes, writer->out);
   }

@@ -24,14 +24,14 @@ static void write_size(FILE *out, size_t bytes) {
   const uint32_t halves[2] = {(uint32_t)bytes, (uint32_t)((uint64_t)bytes >> 32)};
   unsigned char size[8];
   unsigned char *at = size;
-  mesh_put_u32(&at, halves, 2);
+  supine_mesh_put_u32(&at, halves, 2);
   (void)fwrite(size, 1, sizeof size, out);
 }
 
 static void write_f32(FILE *out, const float *values, size_t count) {
   unsigned char bytes[4 * sizeof(float)];
   unsigned char *at = bytes;
-  mesh_put_f32(&at, values, count);
+  supine_mesh_put_f32(&at, values, count);
   (void)fwrite(bytes, 1, (size_t)(at - bytes), out);
 }
 
@@ -73,7 +73,7 @@ static void write_head(const mesh_writer *writer, const vtp_array *arrays, size_
   (void)fputs("</PointData>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_", out);
 }
 
-void mesh_save_vtp(const mesh_writer *writer) {
+void supine_mesh_save_vtp(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   const size_t points = mesh->vertex_count;
   const size_t triangles = mesh->triangle_count;
@@ -88,14 +88,14 @@ void mesh_save_vtp(const mesh_writer *writer) {
   write_size(out, arrays[0].bytes);
   for (size_t i = 0; i < points; ++i) {
     float position[3];
-    mesh_writer_position(writer, i, position);
+    supine_mesh_writer_position(writer, i, position);
     write_f32(out, position, 3);
   }
   write_size(out, arrays[1].bytes);
   for (size_t t = 0; t < triangles; ++t) {
     unsigned char bytes[12];
     unsigned char *at = bytes;
-    mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
+    supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
     (void)fwrite(bytes, 1, sizeof bytes, out);
   }
   write_size(out, arrays[2].bytes);
@@ -103,19 +103,19 @@ void mesh_save_vtp(const mesh_writer *writer) {
     const uint32_t stop = (uint32_t)(3 * (t + 1));
     unsigned char bytes[4];
     unsigned char *at = bytes;
-    mesh_put_u32(&at, &stop, 1);
+    supine_mesh_put_u32(&at, &stop, 1);
     (void)fwrite(bytes, 1, sizeof bytes, out);
   }
   float displacement[4];
   if (writer->rest != NULL) {
     write_size(out, arrays[3].bytes);
     for (size_t i = 0; i < points; ++i) {
-      mesh_writer_displacement(writer, i, displacement);
+      supine_mesh_writer_displacement(writer, i, displacement);
       write_f32(out, displacement, 3);
     }
     write_size(out, arrays[4].bytes);
     for (size_t i = 0; i < points; ++i) {
-      mesh_writer_displacement(writer, i, displacement);
+      supine_mesh_writer_displacement(writer, i, displacement);
       write_f32(out, displacement + 3, 1);
     }
   }

@@ -9,9 +9,9 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
-#include "precompute/projection/compression.h"
-#include "precompute/physics/network.h"
 #include "precompute/accuracy/tally.h"
+#include "precompute/physics/network.h"
+#include "precompute/projection/compression.h"
 
 enum { BLOCK = 512, VOLUME_HALVINGS = 10 };
 
@@ -110,10 +110,10 @@ static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
       sums->field2 += field * field;
     }
     miss_block(is, should, block->length, 1.0, 1.0, miss);
-    supine_tally_add(&sums->error, block->count, miss);
+    supine_accuracy_tally_add(&sums->error, block->count, miss);
     if (work->scales != NULL) {
       miss_block(is, should, block->length, work->scales[2 * d + 1], work->scales[2 * d], miss);
-      supine_tally_add(&sums->error_mm, block->count, miss);
+      supine_accuracy_tally_add(&sums->error_mm, block->count, miss);
     }
   }
 }
@@ -132,7 +132,7 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
                         const double *weights, double volume, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
     double cubic[3];
-    supine_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
+    supine_physics_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
     if (supine_volume_scale(truth->cubic + 3 * d, volume, &scales[2 * d], NULL) != SUPINE_OK ||
         supine_volume_scale(cubic, volume, &scales[2 * d + 1], NULL) != SUPINE_OK) {
       return false;
@@ -152,7 +152,7 @@ static supine_status find_weights(const supine_truth *truth, const supine_compre
   for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
     status = supine_sh_evaluate(compression->band, truth->directions + 3 * d, y);
     if (status == SUPINE_OK) {
-      supine_compression_weights(compression, y, weights + d * compression->mode_count);
+      supine_projection_compression_weights(compression, y, weights + d * compression->mode_count);
     }
   }
   free(y);
@@ -201,16 +201,16 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   tally *all = &tallies[0];
   for (size_t t = 1; t < threads; ++t) {
     all->field2 += tallies[t].field2;
-    supine_tally_merge(&all->error, &tallies[t].error);
-    supine_tally_merge(&all->error_mm, &tallies[t].error_mm);
+    supine_accuracy_tally_merge(&all->error, &tallies[t].error);
+    supine_accuracy_tally_merge(&all->error_mm, &tallies[t].error_mm);
   }
   const double samples = (double)n * (double)count;
   const double field = sqrt(all->field2 / samples);
   made.relative_rms = sqrt(all->error.square_sum / samples) / field;
-  made.relative_p95 = supine_tally_percentile(&all->error, 0.95) / field;
+  made.relative_p95 = supine_accuracy_tally_percentile(&all->error, 0.95) / field;
   made.relative_max = all->error.largest / field;
   made.rms_mm = sqrt(all->error_mm.square_sum / samples);
-  made.p95_mm = supine_tally_percentile(&all->error_mm, 0.95);
+  made.p95_mm = supine_accuracy_tally_percentile(&all->error_mm, 0.95);
   made.max_mm = all->error_mm.largest;
   *accuracy = made;
 cleanup:

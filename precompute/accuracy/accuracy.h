@@ -5,8 +5,8 @@
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
-#include "precompute/projection/projection.h"
 #include "precompute/physics/volume_forms.h"
+#include "precompute/projection/projection.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -36,7 +36,7 @@ typedef struct supine_truth {
 
 /** Spreads `count` directions [count, 3] evenly on the sphere along a spiral of golden angles; none
  * is a node of a product grid. */
-void supine_held_out_directions(size_t count, double *directions);
+void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measures. The 95th percentiles come from a histogram whose bins are 0.4 % wide.
  * @param directions  [N, 3] d
@@ -56,9 +56,10 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * @param directions  [N, 3] d
  * @param forms       of the compression's coefficients: the surface is closed
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_turned_over(const supine_lungs *lungs, const double *directions,
-                                 const supine_compression *compression,
-                                 const supine_volume_forms *forms, double volume, double *share);
+supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
+                                          const supine_compression *compression,
+                                          const supine_volume_forms *forms, double volume,
+                                          double *share);
 
 #ifdef __cplusplus
 }

@@ -7,13 +7,13 @@
 #include "sh/base/parallel.h"
 #include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
 #include "precompute/accuracy/error_table.h"
 #include "precompute/physics/network.h"
+#include "precompute/projection/compression.h"
 
 enum { VERTICES_MAX = 4096 };
 
-void supine_error_table_free(supine_error_table *table) {
+void supine_accuracy_error_table_free(supine_error_table *table) {
   free(table->harmonics);
   free(table->modes);
   *table = (supine_error_table){0};
@@ -105,16 +105,17 @@ static supine_status find_weights(const table_work *work) {
   const supine_status status =
       supine_sh_evaluate_many(work->projection->band, count, work->truth->directions, work->y);
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
-    supine_compression_weights(work->field, work->y + d * terms,
-                               work->weights + d * work->field->mode_count);
+    supine_projection_compression_weights(work->field, work->y + d * terms,
+                                          work->weights + d * work->field->mode_count);
   }
   return status;
 }
 
-supine_status supine_error_table_create(const supine_truth *truth,
-                                        const supine_projection *projection,
-                                        const supine_compression *compression,
-                                        const double *directions, supine_error_table *table) {
+supine_status supine_accuracy_error_table_create(const supine_truth *truth,
+                                                 const supine_projection *projection,
+                                                 const supine_compression *compression,
+                                                 const double *directions,
+                                                 supine_error_table *table) {
   const size_t n = compression->vertex_count;
   const size_t stride = (n + VERTICES_MAX - 1) / VERTICES_MAX;
   const size_t bands = projection->band + 1;
@@ -154,7 +155,7 @@ supine_status supine_error_table_create(const supine_truth *truth,
   *table = made;
   made = (supine_error_table){0};
 cleanup:
-  supine_error_table_free(&made);
+  supine_accuracy_error_table_free(&made);
   free(work.coefficients);
   free(work.y);
   free(work.weights);

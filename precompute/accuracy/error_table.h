@@ -14,10 +14,11 @@ typedef struct supine_error_table {
   double *modes; /* [K] of the k + 1 first modes */
 } supine_error_table;
 
-supine_status supine_error_table_create(const supine_truth *truth,
-                                        const supine_projection *projection,
-                                        const supine_compression *compression,
-                                        const double *directions, supine_error_table *table);
-void supine_error_table_free(supine_error_table *table);
+supine_status supine_accuracy_error_table_create(const supine_truth *truth,
+                                                 const supine_projection *projection,
+                                                 const supine_compression *compression,
+                                                 const double *directions,
+                                                 supine_error_table *table);
+void supine_accuracy_error_table_free(supine_error_table *table);
 
 #endif

@@ -6,7 +6,7 @@
 #include "precompute/accuracy/held_out.h"
 #include "precompute/projection/sampled.h"
 
-void supine_held_out_directions(size_t count, double *directions) {
+void supine_accuracy_held_out_directions(size_t count, double *directions) {
   const double golden = M_PI * (3.0 - sqrt(5.0));
   for (size_t i = 0; i < count; ++i) {
     const double z = 1.0 - (2.0 * (double)i + 1.0) / (double)count;
@@ -18,7 +18,7 @@ void supine_held_out_directions(size_t count, double *directions) {
   }
 }
 
-void supine_held_out_free(supine_held_out *held_out) {
+void supine_accuracy_held_out_free(supine_held_out *held_out) {
   free(held_out->directions);
   free(held_out->fields);
   free(held_out->functions);
@@ -34,17 +34,18 @@ static supine_status begin(size_t count, bool closed, supine_held_out *made) {
   if (made->directions == NULL || made->cubic == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_held_out_directions(count, made->directions);
+  supine_accuracy_held_out_directions(count, made->directions);
   made->truth.direction_count = count;
   made->truth.directions = made->directions;
   made->truth.cubic = closed ? made->cubic : NULL;
   return SUPINE_OK;
 }
 
-supine_status supine_held_out_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                     const supine_projection *projection,
-                                     const supine_volume_forms *forms, size_t count,
-                                     supine_held_out *held_out, supine_error *error) {
+supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs,
+                                              const supine_force_law *law,
+                                              const supine_projection *projection,
+                                              const supine_volume_forms *forms, size_t count,
+                                              supine_held_out *held_out, supine_error *error) {
   supine_held_out made;
   supine_status status = begin(count, forms != NULL, &made);
   double *range = malloc(2 * count * sizeof *range);
@@ -53,12 +54,13 @@ supine_status supine_held_out_linear(const supine_lungs *lungs, const supine_for
     status = SUPINE_ERROR_MEMORY;
     goto cleanup;
   }
-  status = supine_height_range(&lungs->mesh, count, made.directions, range, range + count);
+  status = supine_physics_height_range(&lungs->mesh, count, made.directions, range, range + count);
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
     double *row = made.functions + d * projection->rank;
-    supine_force_functions(lungs, law, made.directions + 3 * d, range[d], range[count + d], row);
+    supine_physics_force_functions(lungs, law, made.directions + 3 * d, range[d], range[count + d],
+                                   row);
     if (forms != NULL) {
-      supine_volume_forms_contract(forms, row, made.cubic + 3 * d);
+      supine_physics_volume_forms_contract(forms, row, made.cubic + 3 * d);
     }
   }
   made.truth.rank = projection->rank;
@@ -67,16 +69,16 @@ supine_status supine_held_out_linear(const supine_lungs *lungs, const supine_for
 cleanup:
   free(range);
   if (status != SUPINE_OK) {
-    supine_held_out_free(&made);
+    supine_accuracy_held_out_free(&made);
     return supine_error_set(error, status, "no memory for %zu held-out directions", count);
   }
   *held_out = made;
   return SUPINE_OK;
 }
 
-supine_status supine_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
-                                      const double *directions, size_t count,
-                                      supine_held_out *held_out, supine_error *error) {
+supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
+                                               const double *directions, size_t count,
+                                               supine_held_out *held_out, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const bool closed = lungs->topology.closed;
   supine_sampler *sampler = NULL;
@@ -88,24 +90,27 @@ supine_status supine_held_out_sampled(const supine_lungs *lungs, const supine_mo
                               count);
     goto cleanup;
   }
-  status = supine_sampler_create(lungs, &model->force, model->stiffness, 0.0, &sampler, error);
+  status = supine_projection_sampler_create(lungs, &model->force, model->stiffness, 0.0, &sampler,
+                                            error);
   if (status == SUPINE_OK) {
-    status = supine_sampler_solve(sampler, count, made.directions, made.fields, NULL, error);
+    status =
+        supine_projection_sampler_solve(sampler, count, made.directions, made.fields, NULL, error);
   }
   for (size_t d = 0; d < count && closed && status == SUPINE_OK; ++d) {
     supine_volume_forms forms = {0};
     const double one = 1.0;
-    status = supine_volume_forms_create(lungs, directions, made.fields + d * n, 1, &forms, error);
+    status = supine_physics_volume_forms_create(lungs, directions, made.fields + d * n, 1, &forms,
+                                                error);
     if (status == SUPINE_OK) {
-      supine_volume_forms_contract(&forms, &one, made.cubic + 3 * d);
+      supine_physics_volume_forms_contract(&forms, &one, made.cubic + 3 * d);
     }
-    supine_volume_forms_free(&forms);
+    supine_physics_volume_forms_free(&forms);
   }
   made.truth.fields = made.fields;
 cleanup:
-  supine_sampler_destroy(sampler);
+  supine_projection_sampler_destroy(sampler);
   if (status != SUPINE_OK) {
-    supine_held_out_free(&made);
+    supine_accuracy_held_out_free(&made);
     return status;
   }
   *held_out = made;

@@ -14,16 +14,17 @@ typedef struct supine_held_out {
 
 /* The linear route: by superposition of the solved columns, which is exact. `forms` are those of
  * the projection's columns; NULL: open surface. */
-supine_status supine_held_out_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                     const supine_projection *projection,
-                                     const supine_volume_forms *forms, size_t count,
-                                     supine_held_out *held_out, supine_error *error);
+supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs,
+                                              const supine_force_law *law,
+                                              const supine_projection *projection,
+                                              const supine_volume_forms *forms, size_t count,
+                                              supine_held_out *held_out, supine_error *error);
 
 /* The sampled route: solved one by one. */
-supine_status supine_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
-                                      const double *directions, size_t count,
-                                      supine_held_out *held_out, supine_error *error);
+supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
+                                               const double *directions, size_t count,
+                                               supine_held_out *held_out, supine_error *error);
 
-void supine_held_out_free(supine_held_out *held_out);
+void supine_accuracy_held_out_free(supine_held_out *held_out);
 
 #endif

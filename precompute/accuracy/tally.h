@@ -16,12 +16,12 @@ typedef struct supine_tally {
   uint32_t bins[SUPINE_TALLY_BINS];
 } supine_tally;
 
-void supine_tally_add(supine_tally *tally, size_t count, const double *values);
+void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
 
 /* Adds one tally to another. */
-void supine_tally_merge(supine_tally *tally, const supine_tally *other);
+void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
 
 /* The value that a share (0 to 1) of the numbers lies below: the upper edge of its bin. */
-double supine_tally_percentile(const supine_tally *tally, double share);
+double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
 
 #endif

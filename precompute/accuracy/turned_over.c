@@ -8,8 +8,8 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
-#include "precompute/projection/compression.h"
 #include "precompute/physics/network.h"
+#include "precompute/projection/compression.h"
 
 enum { POSTURES = 6, SAMPLES_MAX = 50000 };
 
@@ -75,10 +75,10 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
     return status;
   }
   double *w = s->weights[g];
-  supine_compression_weights(field, harmonics, w);
+  supine_projection_compression_weights(field, harmonics, w);
   double cubic[3];
   double scale = 0.0;
-  supine_volume_forms_contract(forms, w, cubic);
+  supine_physics_volume_forms_contract(forms, w, cubic);
   s->reached[g] = supine_volume_scale(cubic, volume, &scale, NULL) == SUPINE_OK;
   for (size_t k = 0; k < field->mode_count; ++k) {
     w[k] *= scale;
@@ -86,9 +86,10 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
   return SUPINE_OK;
 }
 
-supine_status supine_turned_over(const supine_lungs *lungs, const double *directions,
-                                 const supine_compression *compression,
-                                 const supine_volume_forms *forms, double volume, double *share) {
+supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
+                                          const supine_compression *compression,
+                                          const supine_volume_forms *forms, double volume,
+                                          double *share) {
   const supine_mesh *mesh = &lungs->mesh;
   const size_t threads = supine_thread_count();
   const size_t stride = (mesh->triangle_count + SAMPLES_MAX - 1) / SAMPLES_MAX;

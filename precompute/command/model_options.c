@@ -8,7 +8,7 @@
 
 #include "precompute/command/model_options.h"
 
-const char supine_model_options_help[] =
+const char supine_command_model_options_help[] =
     "Surfaces:\n"
     "  --axes LPS|RAS       axes of the files; default: their SPACE tag, else LPS (DICOM)\n"
     "  --units UNIT         mm, cm, m, um or in, or millimetres per unit; default mm\n"
@@ -62,8 +62,8 @@ const char supine_model_options_help[] =
     "that\n"
     "                       a finer mesh spreads less and may look torn: then try 10\n";
 
-supine_model_options supine_model_options_default(void) {
-  return (supine_model_options){.model = supine_model_default()};
+supine_model_options supine_command_model_options_default(void) {
+  return (supine_model_options){.model = supine_physics_model_default()};
 }
 
 static bool parse_axes(const char *text, supine_axes *axes) {
@@ -88,7 +88,7 @@ static bool parse_units(const char *text, double *millimetres) {
       return true;
     }
   }
-  return supine_parse_number(text, millimetres) && *millimetres > 0.0;
+  return supine_options_parse_number(text, millimetres) && *millimetres > 0.0;
 }
 
 /* A model's name; anything with a dot or a slash is a file of vectors. */
@@ -134,14 +134,14 @@ static bool parse_expandability(const char *text, supine_model_options *options)
     return false;
   }
   *colon = '\0';
-  return supine_parse_number(numbers, &options->law.from) &&
-         supine_parse_number(colon + 1, &options->law.to) && options->law.from > 0.0 &&
+  return supine_options_parse_number(numbers, &options->law.from) &&
+         supine_options_parse_number(colon + 1, &options->law.to) && options->law.from > 0.0 &&
          options->law.to > 0.0;
 }
 
 static bool parse_lesion(const char *text, supine_model_options *options) {
   double v[5];
-  if (options->lesion_count == MODEL_LESIONS_MAX || !supine_parse_numbers(text, 5, v) ||
+  if (options->lesion_count == MODEL_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
       !(v[3] > 0.0) || !(v[4] > 0.0)) {
     return false;
   }
@@ -155,7 +155,7 @@ static bool parse_lung(const char *text, supine_model_options *options) {
   const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
   const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
   double share;
-  if (!(left || right) || !supine_parse_number(colon + 1, &share) ||
+  if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
       !(share > 0.0 && share <= 1.0)) {
     return false;
   }
@@ -163,8 +163,8 @@ static bool parse_lung(const char *text, supine_model_options *options) {
   return true;
 }
 
-int supine_model_options_take(supine_model_options *options, const char *command, int option,
-                              const char *value) {
+int supine_command_model_options_take(supine_model_options *options, const char *command,
+                                      int option, const char *value) {
   supine_force_law *force = &options->model.force;
   const char *wanted = NULL; /* set where the value is not what it should be */
   switch (option) {
@@ -178,21 +178,22 @@ int supine_model_options_take(supine_model_options *options, const char *command
     break;
   case OPTION_MIDLINE:
     options->has_midline = true;
-    wanted = supine_parse_number(value, &options->midline) ? NULL : "--midline takes an x in mm";
+    wanted =
+        supine_options_parse_number(value, &options->midline) ? NULL : "--midline takes an x in mm";
     break;
   case OPTION_BASE:
-    wanted = supine_parse_number(value, &force->base) ? NULL : "--base takes a number";
+    wanted = supine_options_parse_number(value, &force->base) ? NULL : "--base takes a number";
     break;
   case OPTION_GAIN:
-    wanted = supine_parse_number(value, &force->gain) ? NULL : "--gain takes a number";
+    wanted = supine_options_parse_number(value, &force->gain) ? NULL : "--gain takes a number";
     break;
   case OPTION_BOX_FORCE:
-    wanted = supine_parse_numbers(value, 3, force->box)
+    wanted = supine_options_parse_numbers(value, 3, force->box)
                  ? NULL
                  : "--box-force takes three numbers, CX,CY,CZ";
     break;
   case OPTION_SOFTEN:
-    wanted = supine_parse_number(value, &force->soften) ? NULL : "--soften takes a number";
+    wanted = supine_options_parse_number(value, &force->soften) ? NULL : "--soften takes a number";
     break;
   case OPTION_DIRECTION:
     wanted = parse_direction(value, options)
@@ -200,7 +201,7 @@ int supine_model_options_take(supine_model_options *options, const char *command
                  : "--direction takes box, normal, radial or a CSV file of vectors";
     break;
   case OPTION_CONSTANTS:
-    wanted = supine_parse_numbers(value, 6, options->model.direction.c)
+    wanted = supine_options_parse_numbers(value, 6, options->model.direction.c)
                  ? NULL
                  : "--constants takes six numbers, C1,C2,C3,C4,C5,C6";
     break;
@@ -222,7 +223,7 @@ int supine_model_options_take(supine_model_options *options, const char *command
                  : "--lung takes left:SHARE or right:SHARE, above 0 and at most 1";
     break;
   case OPTION_REACH:
-    wanted = supine_parse_number(value, &options->reach) && options->reach > 0.0
+    wanted = supine_options_parse_number(value, &options->reach) && options->reach > 0.0
                  ? NULL
                  : "--reach takes a length in mm above 0";
     break;
@@ -230,7 +231,7 @@ int supine_model_options_take(supine_model_options *options, const char *command
     break;
   }
   if (wanted != NULL) {
-    return supine_command_usage(command, "%s, not '%s'", wanted, value);
+    return supine_options_usage(command, "%s, not '%s'", wanted, value);
   }
   return SUPINE_EXIT_OK;
 }
@@ -255,17 +256,17 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
 /* What a careful colleague would mention about a file. */
 static void mention(const char *command, const char *path, const supine_mesh_report *report) {
   if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
-    supine_command_say(command, "%s: dropped %zu degenerate faces and %zu unreferenced vertices",
+    supine_options_say(command, "%s: dropped %zu degenerate faces and %zu unreferenced vertices",
                        path, report->degenerate_faces, report->unreferenced_vertices);
   }
   if (report->comment_names_ras) {
-    supine_command_say(command,
+    supine_options_say(command,
                        "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
                        "the right, add --axes RAS",
                        path);
   }
   if (report->likely_unit != NULL) {
-    supine_command_say(command,
+    supine_options_say(command,
                        "%s: warning: its size cannot be a lung's in mm; the likely unit is '%s': "
                        "add --units %s",
                        path, report->likely_unit, report->likely_unit);
@@ -282,8 +283,9 @@ static supine_status load_ply(const supine_model_options *options, const load_wo
   supine_status status = SUPINE_OK;
   memset(a, 0, lungs->mesh.vertex_count * sizeof *a);
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = supine_expandability_load_ply(work->paths[i], property, work->reports[i].axes,
-                                           options->load.millimetres_per_unit, lungs, a, error);
+    status =
+        supine_tissue_expandability_load_ply(work->paths[i], property, work->reports[i].axes,
+                                             options->load.millimetres_per_unit, lungs, a, error);
   }
   return status;
 }
@@ -303,14 +305,14 @@ static supine_status set_expandability(supine_model_options *options, const load
   options->model.stiffness = a;
   supine_status status = SUPINE_OK;
   if (options->expandability == NULL) {
-    status = supine_expandability_regional(lungs, &options->law, a, error);
+    status = supine_tissue_expandability_regional(lungs, &options->law, a, error);
   } else if (strncmp(options->expandability, ply_prefix, strlen(ply_prefix)) == 0) {
     status = load_ply(options, work, count, lungs, a, error);
   } else {
-    status = supine_expandability_load(options->expandability, n, a, error);
+    status = supine_tissue_expandability_load(options->expandability, n, a, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_expandability_stiffness(n, a, a, error);
+    status = supine_tissue_expandability_stiffness(n, a, a, error);
   }
   return status;
 }
@@ -326,7 +328,7 @@ static supine_status set_directions(supine_model_options *options, const supine_
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   options->model.direction.vectors = options->vectors;
-  return supine_directions_load(options->direction, n, options->vectors, error);
+  return supine_physics_directions_load(options->direction, n, options->vectors, error);
 }
 
 static supine_status set_lesions(const supine_model_options *options, const char *command,
@@ -334,12 +336,12 @@ static supine_status set_lesions(const supine_model_options *options, const char
   for (size_t l = 0; l < options->lesion_count; ++l) {
     const supine_lesion *lesion = &options->lesions[l];
     size_t reached = 0;
-    const supine_status status = supine_lungs_add_lesion(lungs, lesion, &reached, error);
+    const supine_status status = supine_tissue_add_lesion(lungs, lesion, &reached, error);
     if (status != SUPINE_OK) {
       return status;
     }
     if (reached == 0) {
-      supine_command_say(
+      supine_options_say(
           command,
           "warning: the lesion at %g,%g,%g is outside the lungs: no vertex within its "
           "%g mm, so it changes nothing",
@@ -365,7 +367,7 @@ static supine_status set_shares(const supine_model_options *options, supine_lung
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
                               names[side], names[side]);
     }
-    const supine_status status = supine_lungs_collapse(lungs, lung, shares[side], error);
+    const supine_status status = supine_tissue_collapse(lungs, lung, shares[side], error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -373,7 +375,7 @@ static supine_status set_shares(const supine_model_options *options, supine_lung
   return SUPINE_OK;
 }
 
-void supine_model_options_free(supine_model_options *options) {
+void supine_command_model_options_free(supine_model_options *options) {
   free(options->stiffness);
   free(options->vectors);
   options->stiffness = NULL;
@@ -382,31 +384,31 @@ void supine_model_options_free(supine_model_options *options) {
   options->model.stiffness = NULL;
 }
 
-int supine_model_load(supine_model_options *options, const char *command, char **paths,
-                      size_t count, supine_lungs *lungs) {
+int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
+                              size_t count, supine_lungs *lungs) {
   int result = SUPINE_EXIT_OK;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   load_work work = {&options->load, paths, calloc(count, sizeof(supine_mesh)),
                     calloc(count, sizeof(supine_mesh_report)), calloc(count, sizeof(supine_error))};
   if (work.meshes == NULL || work.reports == NULL || work.errors == NULL) {
-    result = supine_command_fail(command, &error);
+    result = supine_options_fail(command, &error);
     goto cleanup;
   }
   supine_parallel_for(count, 1, count, load_range, &work);
   for (size_t i = 0; i < count; ++i) {
     if (work.errors[i].status != SUPINE_OK) {
-      result = supine_command_fail(command, &work.errors[i]);
+      result = supine_options_fail(command, &work.errors[i]);
       goto cleanup;
     }
     mention(command, paths[i], &work.reports[i]);
   }
   if (supine_lungs_create(work.meshes, count, options->has_midline ? &options->midline : NULL,
                           lungs, &error) != SUPINE_OK) {
-    result = supine_command_fail(command, &error);
+    result = supine_options_fail(command, &error);
     goto cleanup;
   }
   if (!lungs->topology.closed) {
-    supine_command_say(command,
+    supine_options_say(command,
                        "note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
                        "inconsistent edges): no volumes, only --scale",
                        lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
@@ -417,7 +419,7 @@ int supine_model_load(supine_model_options *options, const char *command, char *
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||
       set_shares(options, lungs, &error) != SUPINE_OK) {
-    result = supine_command_fail(command, &error);
+    result = supine_options_fail(command, &error);
   }
 cleanup:
   for (size_t i = 0; work.meshes != NULL && i < count; ++i) {

@@ -4,10 +4,10 @@
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
-#include "precompute/tissue/disease.h"
-#include "precompute/tissue/expandability.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "precompute/tissue/disease.h"
+#include "precompute/tissue/expandability.h"
 
 #include "runtime/options/command.h"
 
@@ -46,7 +46,7 @@ enum {
   }
 
 /* What they add to a command's help. */
-extern const char supine_model_options_help[];
+extern const char supine_command_model_options_help[];
 
 enum { MODEL_LESIONS_MAX = 64 };
 
@@ -66,18 +66,18 @@ typedef struct supine_model_options {
   double *stiffness;              /* what loading made of the expandability; the model's */
 } supine_model_options;
 
-supine_model_options supine_model_options_default(void);
+supine_model_options supine_command_model_options_default(void);
 
 /* Takes one option; SUPINE_EXIT_OK, or an exit code after a message. */
-int supine_model_options_take(supine_model_options *options, const char *command, int option,
-                              const char *value);
+int supine_command_model_options_take(supine_model_options *options, const char *command,
+                                      int option, const char *value);
 
 /* Loads the surfaces (all at once), says on stderr what was found that the user should know, joins
  * them, and sets the model's stiffness and the lungs' diseases; an exit code. */
-int supine_model_load(supine_model_options *options, const char *command, char **paths,
-                      size_t count, supine_lungs *lungs);
+int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
+                              size_t count, supine_lungs *lungs);
 
-/* Releases what supine_model_load allocated. */
-void supine_model_options_free(supine_model_options *options);
+/* Releases what supine_command_model_load allocated. */
+void supine_command_model_options_free(supine_model_options *options);
 
 #endif

@@ -38,30 +38,30 @@ int supine_command_phantom(int argc, char **argv) {
       path = optarg;
       break;
     case 'n':
-      if (!supine_parse_count(optarg, &vertices)) {
-        return supine_command_usage(name, "--vertices takes a whole number, not '%s'", optarg);
+      if (!supine_options_parse_count(optarg, &vertices)) {
+        return supine_options_usage(name, "--vertices takes a whole number, not '%s'", optarg);
       }
       break;
     case 'v':
-      if (!supine_parse_number(optarg, &volume)) {
-        return supine_command_usage(name, "--volume takes millilitres, not '%s'", optarg);
+      if (!supine_options_parse_number(optarg, &volume)) {
+        return supine_options_usage(name, "--volume takes millilitres, not '%s'", optarg);
       }
       break;
     case 'h':
       (void)fputs(help, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
   }
   if (optind < argc) {
-    return supine_command_usage(name, "no argument '%s' is expected", argv[optind]);
+    return supine_options_usage(name, "no argument '%s' is expected", argv[optind]);
   }
   if (path == NULL) {
-    return supine_command_usage(name, "-o FILE is missing");
+    return supine_options_usage(name, "-o FILE is missing");
   }
   if (!supine_mesh_save_supports(path)) {
-    return supine_command_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp", path);
+    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp", path);
   }
   supine_mesh mesh = {0};
   supine_error error;
@@ -71,11 +71,11 @@ int supine_command_phantom(int argc, char **argv) {
                                              "data (BSD-3-Clause, University of Oxford)"};
   if (supine_phantom_create(vertices, volume, &mesh, &error) != SUPINE_OK ||
       supine_mesh_save(path, &mesh, &save, &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+    result = supine_options_fail(name, &error);
   } else {
     (void)printf("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", path, mesh.vertex_count,
                  mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
-    result = supine_command_finish(name);
+    result = supine_options_finish(name);
   }
   supine_mesh_free(&mesh);
   return result;

@@ -117,10 +117,10 @@ static int compress_fields(const supine_lungs *lungs, const char *list,
   if (supine_fields_load(list, lungs, load, &fields, &error) != SUPINE_OK ||
       supine_precompute_fields(lungs, &fields, options, made_by, path, &report, &mode_count,
                                &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+    result = supine_options_fail(name, &error);
   } else {
     report_fit(path, &fields, &report, mode_count, options->scalar);
-    result = supine_command_finish(name);
+    result = supine_options_finish(name);
   }
   supine_fields_free(&fields);
   return result;
@@ -138,13 +138,13 @@ int supine_command_precompute(int argc, char **argv) {
                                           SUPINE_MODEL_OPTIONS,
                                           {"help", no_argument, NULL, 'h'},
                                           {NULL, 0, NULL, 0}};
-  supine_model_options model = supine_model_options_default();
+  supine_model_options model = supine_command_model_options_default();
   supine_precompute_options wanted = {.band = 23, .modes = 16};
   supine_fit_options fit = {.band = -1};
   const char *path = NULL;
   const char *fields = NULL;
   char made_by[512];
-  supine_command_describe(argc, argv, made_by, sizeof made_by);
+  supine_options_describe(argc, argv, made_by, sizeof made_by);
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
@@ -154,8 +154,8 @@ int supine_command_precompute(int argc, char **argv) {
       path = optarg;
       break;
     case BAND:
-      if (!supine_parse_count(optarg, &wanted.band) || wanted.band > SUPINE_SH_BAND_MAX) {
-        result = supine_command_usage(name, "--band takes 0 to %d, not '%s'", SUPINE_SH_BAND_MAX,
+      if (!supine_options_parse_count(optarg, &wanted.band) || wanted.band > SUPINE_SH_BAND_MAX) {
+        result = supine_options_usage(name, "--band takes 0 to %d, not '%s'", SUPINE_SH_BAND_MAX,
                                       optarg);
       }
       fit.band = (int)wanted.band;
@@ -163,9 +163,9 @@ int supine_command_precompute(int argc, char **argv) {
     case MODES:
       if (strcmp(optarg, "harmonics") == 0) {
         wanted.modes = 0;
-      } else if (!supine_parse_count(optarg, &wanted.modes) || wanted.modes < 1 ||
+      } else if (!supine_options_parse_count(optarg, &wanted.modes) || wanted.modes < 1 ||
                  wanted.modes > SUPINE_MODES_MADE_MAX) {
-        result = supine_command_usage(name, "--modes takes 1 to %d or 'harmonics', not '%s'",
+        result = supine_options_usage(name, "--modes takes 1 to %d or 'harmonics', not '%s'",
                                       SUPINE_MODES_MADE_MAX, optarg);
       }
       break;
@@ -176,67 +176,68 @@ int supine_command_precompute(int argc, char **argv) {
       if (strcmp(optarg, "vector") == 0 || strcmp(optarg, "scalar") == 0) {
         fit.scalar = optarg[0] == 's';
       } else {
-        result = supine_command_usage(name, "--kind takes vector or scalar, not '%s'", optarg);
+        result = supine_options_usage(name, "--kind takes vector or scalar, not '%s'", optarg);
       }
       break;
     case ROUTE:
       if (strcmp(optarg, "linear") == 0 || strcmp(optarg, "sampled") == 0) {
         wanted.route = optarg[0] == 'l' ? SUPINE_ROUTE_LINEAR : SUPINE_ROUTE_SAMPLED;
       } else {
-        result = supine_command_usage(name, "--route takes linear or sampled, not '%s'", optarg);
+        result = supine_options_usage(name, "--route takes linear or sampled, not '%s'", optarg);
       }
       break;
     case HELD_OUT:
-      if (!supine_parse_count(optarg, &wanted.held_out) || wanted.held_out < 1 ||
+      if (!supine_options_parse_count(optarg, &wanted.held_out) || wanted.held_out < 1 ||
           wanted.held_out > 100000) {
-        result = supine_command_usage(name, "--held-out takes 1 to 100000, not '%s'", optarg);
+        result = supine_options_usage(name, "--held-out takes 1 to 100000, not '%s'", optarg);
       }
       break;
     case 'h':
       (void)fputs(help, stdout);
-      (void)fputs(supine_model_options_help, stdout);
+      (void)fputs(supine_command_model_options_help, stdout);
       (void)fputs(examples, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     case '?':
     case ':':
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     default:
-      result = supine_model_options_take(&model, name, option, optarg);
+      result = supine_command_model_options_take(&model, name, option, optarg);
     }
     if (result != SUPINE_EXIT_OK) {
       return result;
     }
   }
   if (optind == argc) {
-    return supine_command_usage(name, "which surface? Name one or more mesh files");
+    return supine_options_usage(name, "which surface? Name one or more mesh files");
   }
   if (path == NULL) {
-    return supine_command_usage(name, "-o FILE is missing");
+    return supine_options_usage(name, "-o FILE is missing");
   }
   supine_lungs lungs = {0};
-  int result = supine_model_load(&model, name, argv + optind, (size_t)(argc - optind), &lungs);
+  int result =
+      supine_command_model_load(&model, name, argv + optind, (size_t)(argc - optind), &lungs);
   if (result == SUPINE_EXIT_OK && fields != NULL) {
     fit.modes = wanted.modes;
     result = compress_fields(&lungs, fields, &model.load, &fit, made_by, path);
   } else if (result == SUPINE_EXIT_OK) {
-    supine_progress progress = supine_progress_begin("precompute");
+    supine_progress progress = supine_options_progress_begin("precompute");
     supine_precompute_report report;
     supine_error error;
     wanted.model = model.model;
     wanted.made_by = made_by;
-    wanted.progress = supine_progress_step;
+    wanted.progress = supine_options_progress_step;
     wanted.progress_context = &progress;
-    supine_interrupts_catch();
+    supine_options_interrupts_catch();
     const supine_status status = supine_precompute(&lungs, &wanted, path, &report, &error);
-    supine_progress_end(&progress);
+    supine_options_progress_end(&progress);
     if (status != SUPINE_OK) {
-      result = supine_command_fail(name, &error);
+      result = supine_options_fail(name, &error);
     } else {
       report_result(path, &lungs, &wanted, &report);
-      result = supine_command_finish(name);
+      result = supine_options_finish(name);
     }
   }
   supine_lungs_free(&lungs);
-  supine_model_options_free(&model);
+  supine_command_model_options_free(&model);
   return result;
 }

@@ -60,7 +60,7 @@ static const char help[] =
     "  supine pv show patient.pv.csv --step 0.5 > curve.csv\n";
 
 static bool parse_positive(const char *text, double *number) {
-  return supine_parse_number(text, number) && *number > 0.0;
+  return supine_options_parse_number(text, number) && *number > 0.0;
 }
 
 typedef struct options {
@@ -104,7 +104,7 @@ static void print_json(const supine_pv *pv, const supine_pv_report *reports, dou
   (void)printf("{\"confidence\": %.17g", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].samples > 0) {
-      (void)printf(", \"%s\": ", supine_pv_limb_name((supine_pv_limb)limb));
+      (void)printf(", \"%s\": ", supine_breath_limb_name((supine_pv_limb)limb));
       print_json_limb(&pv->limb[limb], &reports[limb]);
     }
   }
@@ -135,32 +135,32 @@ static int run_fit(const char *path, const options *chosen) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   supine_pv_samples samples = {0};
-  supine_status status = supine_pv_samples_load(path, &samples, &error);
+  supine_status status = supine_breath_samples_load(path, &samples, &error);
   if (status == SUPINE_OK) {
-    status = supine_pv_fit_samples(&samples, chosen->confidence, &pv, reports, &error);
+    status = supine_breath_fit_samples(&samples, chosen->confidence, &pv, reports, &error);
   }
-  supine_pv_samples_clear(&samples);
+  supine_breath_samples_clear(&samples);
   if (status == SUPINE_OK && chosen->output != NULL) {
-    status = supine_pv_save(chosen->output, &pv, &error);
+    status = supine_breath_save(chosen->output, &pv, &error);
   }
   if (status != SUPINE_OK) {
-    return supine_command_fail(command, &error);
+    return supine_options_fail(command, &error);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].rms_percent > 1.0) {
-      supine_command_say(command, "note: the %s samples scatter %.2g %% about their curve",
-                         supine_pv_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
+      supine_options_say(command, "note: the %s samples scatter %.2g %% about their curve",
+                         supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
     }
   }
   if (chosen->json) {
     print_json(&pv, reports, chosen->confidence);
-    return supine_command_finish(command);
+    return supine_options_finish(command);
   }
   (void)printf("intervals at %g %% confidence\n", 100.0 * chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    print_limb(supine_pv_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
+    print_limb(supine_breath_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
   }
-  return supine_command_finish(command);
+  return supine_options_finish(command);
 }
 
 /* One row of show; nothing where the pressure is outside a limb. */
@@ -175,7 +175,7 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
     double volume = 0.0;
     double compliance = 0.0;
     const supine_status status =
-        supine_pv_evaluate(curve, 1, &pressure, &volume, &compliance, error);
+        supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -188,16 +188,16 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
 static int run_show(const char *path, const options *chosen) {
   enum { ROWS_MAX = 1000000 };
   supine_error error = {0};
-  supine_pv pv = *supine_pv_normal();
-  supine_status status = path != NULL ? supine_pv_load(path, &pv, &error) : SUPINE_OK;
+  supine_pv pv = *supine_breath_normal();
+  supine_status status = path != NULL ? supine_breath_load(path, &pv, &error) : SUPINE_OK;
   if (status != SUPINE_OK) {
-    return supine_command_fail(command, &error);
+    return supine_options_fail(command, &error);
   }
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
   const double steps = (high - low) / chosen->step;
   if (!(steps < ROWS_MAX)) {
-    return supine_command_usage(command, "--step is too small for this range");
+    return supine_options_usage(command, "--step is too small for this range");
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
@@ -206,8 +206,8 @@ static int run_show(const char *path, const options *chosen) {
   if (status == SUPINE_OK) {
     status = print_row(&pv, high, &error);
   }
-  return status == SUPINE_OK ? supine_command_finish(command)
-                             : supine_command_fail(command, &error);
+  return status == SUPINE_OK ? supine_options_finish(command)
+                             : supine_options_fail(command, &error);
 }
 
 int supine_command_pv(int argc, char **argv) {
@@ -226,7 +226,7 @@ int supine_command_pv(int argc, char **argv) {
       break;
     case 'c':
       if (!parse_positive(optarg, &chosen.confidence) || chosen.confidence >= 1.0) {
-        return supine_command_usage(
+        return supine_options_usage(
             command, "--confidence wants a number between 0 and 1, not '%s'", optarg);
       }
       break;
@@ -235,27 +235,27 @@ int supine_command_pv(int argc, char **argv) {
       break;
     case 's':
       if (!parse_positive(optarg, &chosen.step)) {
-        return supine_command_usage(command, "--step wants a positive number of cmH2O, not '%s'",
+        return supine_options_usage(command, "--step wants a positive number of cmH2O, not '%s'",
                                     optarg);
       }
       break;
     case 'h':
       (void)fputs(help, stdout);
-      return supine_command_finish(command);
+      return supine_options_finish(command);
     default:
-      return supine_command_bad_option(command, names, option, argv);
+      return supine_options_bad_option(command, names, option, argv);
     }
   }
   const int words = argc - optind;
   const char *verb = words > 0 ? argv[optind] : "";
   if (strcmp(verb, "fit") == 0) {
     return words == 2 ? run_fit(argv[optind + 1], &chosen)
-                      : supine_command_usage(command, "fit wants one file of samples");
+                      : supine_options_usage(command, "fit wants one file of samples");
   }
   if (strcmp(verb, "show") == 0) {
     return words <= 2 ? run_show(words == 2 ? argv[optind + 1] : NULL, &chosen)
-                      : supine_command_usage(command, "show wants at most one file of parameters");
+                      : supine_options_usage(command, "show wants at most one file of parameters");
   }
-  return words > 0 ? supine_command_usage(command, "fit or show, not '%s'", verb)
-                   : supine_command_usage(command, "fit or show what?");
+  return words > 0 ? supine_options_usage(command, "fit or show, not '%s'", verb)
+                   : supine_options_usage(command, "fit or show what?");
 }

@@ -8,8 +8,8 @@
 #include "sh/base/output.h"
 #include <supine/volume.h>
 
-#include "runtime/options/orientation.h"
 #include "precompute/command/model_options.h"
+#include "runtime/options/orientation.h"
 
 static const char name[] = "solve";
 
@@ -51,14 +51,15 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   supine_output output = {0};
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (column == NULL || supine_lungs_network(lungs, &network) != SUPINE_OK ||
-      supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
+  if (column == NULL || supine_physics_lungs_network(lungs, &network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
-  status = supine_equilibrium_set_stiffness(equilibrium, wanted->model.model.stiffness, error);
+  status =
+      supine_physics_equilibrium_set_stiffness(equilibrium, wanted->model.model.stiffness, error);
   if (status == SUPINE_OK) {
-    status = supine_transfer_column(equilibrium, wanted->vertex, column, error);
+    status = supine_physics_transfer_column(equilibrium, wanted->vertex, column, error);
   }
   if (status == SUPINE_OK) {
     status = supine_output_open(wanted->path, &output, error);
@@ -72,8 +73,8 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
     status = supine_output_commit(&output, error);
   }
 cleanup:
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   free(column);
   return status;
 }
@@ -86,7 +87,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   double scale = 1.0;
   deformed.vertices = NULL;
   rest.vertices = NULL;
-  supine_status status = supine_solve(lungs, &wanted->model.model, g, &solution, error);
+  supine_status status = supine_physics_solve(lungs, &wanted->model.model, g, &solution, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -101,7 +102,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
       goto cleanup;
     }
   }
-  const double largest = supine_solution_largest(&solution);
+  const double largest = supine_physics_solution_largest(&solution);
   if (wanted->has_scale && !(largest > 0.0)) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
     goto cleanup;
@@ -114,8 +115,8 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_lungs_rest(lungs, rest.vertices);
-  supine_solution_apply(&solution, &rest, scale, deformed.vertices);
+  supine_tissue_rest(lungs, rest.vertices);
+  supine_physics_solution_apply(&solution, &rest, scale, deformed.vertices);
   const supine_mesh_save_options save = {.rest = rest.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
@@ -131,7 +132,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
 cleanup:
   free(deformed.vertices);
   free(rest.vertices);
-  supine_solution_free(&solution);
+  supine_physics_solution_free(&solution);
   return status;
 }
 
@@ -139,20 +140,20 @@ static int run(request *wanted, char **paths, size_t count) {
   double g[3] = {0.0, 0.0, 0.0};
   int result = SUPINE_EXIT_OK;
   if (!wanted->has_vertex) {
-    result = supine_orientation_finish(&wanted->orientation, name, g);
+    result = supine_options_orientation_finish(&wanted->orientation, name, g);
   }
   supine_lungs lungs = {0};
   if (result == SUPINE_EXIT_OK) {
-    result = supine_model_load(&wanted->model, name, paths, count, &lungs);
+    result = supine_command_model_load(&wanted->model, name, paths, count, &lungs);
   }
   if (result == SUPINE_EXIT_OK) {
     supine_error error;
     const supine_status status = wanted->has_vertex ? write_column(&lungs, wanted, &error)
                                                     : write_solution(&lungs, wanted, g, &error);
-    result = status == SUPINE_OK ? supine_command_finish(name) : supine_command_fail(name, &error);
+    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   }
   supine_lungs_free(&lungs);
-  supine_model_options_free(&wanted->model);
+  supine_command_model_options_free(&wanted->model);
   return result;
 }
 
@@ -166,7 +167,7 @@ int supine_command_solve(int argc, char **argv) {
                                           SUPINE_MODEL_OPTIONS,
                                           {"help", no_argument, NULL, 'h'},
                                           {NULL, 0, NULL, 0}};
-  request wanted = {.model = supine_model_options_default()};
+  request wanted = {.model = supine_command_model_options_default()};
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
@@ -176,58 +177,58 @@ int supine_command_solve(int argc, char **argv) {
       wanted.path = optarg;
       break;
     case VOLUME:
-      wanted.has_volume = supine_parse_number(optarg, &wanted.volume);
+      wanted.has_volume = supine_options_parse_number(optarg, &wanted.volume);
       if (!wanted.has_volume) {
-        result = supine_command_usage(name, "--volume takes millilitres, not '%s'", optarg);
+        result = supine_options_usage(name, "--volume takes millilitres, not '%s'", optarg);
       }
       break;
     case SCALE:
-      wanted.has_scale = supine_parse_number(optarg, &wanted.scale);
+      wanted.has_scale = supine_options_parse_number(optarg, &wanted.scale);
       if (!wanted.has_scale) {
-        result = supine_command_usage(name, "--scale takes millimetres, not '%s'", optarg);
+        result = supine_options_usage(name, "--scale takes millimetres, not '%s'", optarg);
       }
       break;
     case UNIT_FORCE:
-      wanted.has_vertex = supine_parse_count(optarg, &wanted.vertex);
+      wanted.has_vertex = supine_options_parse_count(optarg, &wanted.vertex);
       if (!wanted.has_vertex) {
-        result = supine_command_usage(name, "--unit-force takes a vertex, not '%s'", optarg);
+        result = supine_options_usage(name, "--unit-force takes a vertex, not '%s'", optarg);
       }
       break;
     case OPTION_POSTURE:
     case OPTION_GRAVITY:
     case OPTION_QUATERNION:
     case OPTION_TILT:
-      result = supine_orientation_take(&wanted.orientation, name, option, optarg);
+      result = supine_options_orientation_take(&wanted.orientation, name, option, optarg);
       break;
     case 'h':
       (void)fputs(help, stdout);
-      (void)fputs(supine_orientation_help, stdout);
+      (void)fputs(supine_options_orientation_help, stdout);
       (void)fputc('\n', stdout);
-      (void)fputs(supine_model_options_help, stdout);
+      (void)fputs(supine_command_model_options_help, stdout);
       (void)fputs(examples, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     case '?':
     case ':':
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     default:
-      result = supine_model_options_take(&wanted.model, name, option, optarg);
+      result = supine_command_model_options_take(&wanted.model, name, option, optarg);
     }
     if (result != SUPINE_EXIT_OK) {
       return result;
     }
   }
   if (optind == argc) {
-    return supine_command_usage(name, "which surface? Name one or more mesh files");
+    return supine_options_usage(name, "which surface? Name one or more mesh files");
   }
   if (wanted.path == NULL) {
-    return supine_command_usage(name, "-o FILE is missing");
+    return supine_options_usage(name, "-o FILE is missing");
   }
   if (!wanted.has_vertex && !supine_mesh_save_supports(wanted.path)) {
-    return supine_command_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
                                 wanted.path);
   }
   if (wanted.has_volume && wanted.has_scale) {
-    return supine_command_usage(name, "give --volume or --scale, not both");
+    return supine_options_usage(name, "give --volume or --scale, not both");
   }
   return run(&wanted, argv + optind, (size_t)(argc - optind));
 }

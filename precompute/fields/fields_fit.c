@@ -8,11 +8,11 @@
 
 #include "precompute/fields/fields.h"
 #include "sh/grid.h"
-#include <supine/sh.h>
 #include "sh/transform.h"
+#include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
 #include "precompute/accuracy/tally.h"
+#include "precompute/projection/compression.h"
 
 /* Directions determine a band while the harmonics there are no closer to dependent than this, and
  * no direction is fitted by itself alone. */
@@ -420,7 +420,7 @@ static supine_status leave_out(const fitting *w, const double *gram, size_t d, s
   cblas_dger(CblasRowMajor, terms, terms, cblas_ddot(rows, o->residual, 1, o->residual, 1),
              o->removed, 1, o->removed, 1, o->gram, terms);
   const supine_status status =
-      supine_leading_eigenpairs(w->chosen.terms, o->gram, modes, o->values, o->vectors);
+      supine_projection_leading_eigenpairs(w->chosen.terms, o->gram, modes, o->values, o->vectors);
   memset(o->seen, 0, w->chosen.terms * sizeof *o->seen);
   for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
     const double *mode = o->vectors + k * w->chosen.terms;
@@ -450,7 +450,7 @@ static void tally_misses(const fitting *w, const without *o, size_t d, supine_ta
       square += fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - along * along, 0.0);
     }
     const double miss = sqrt(square);
-    supine_tally_add(tally, 1, &miss);
+    supine_accuracy_tally_add(tally, 1, &miss);
   }
 }
 
@@ -484,7 +484,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   const double size = sqrt(w->field2 / samples);
   *accuracy = (supine_accuracy){.direction_count = m,
                                 .rms_mm = sqrt(tally->square_sum / samples),
-                                .p95_mm = supine_tally_percentile(tally, 0.95),
+                                .p95_mm = supine_accuracy_tally_percentile(tally, 0.95),
                                 .max_mm = tally->largest};
   accuracy->relative_rms = accuracy->rms_mm / size;
   accuracy->relative_p95 = accuracy->p95_mm / size;
@@ -514,9 +514,10 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     status = project(&w, found.band, error);
   }
   if (status == SUPINE_OK) {
-    status = options->modes == 0 ? supine_compress_harmonics(&w.projection, &made, error)
-                                 : supine_compress_modes(&w.projection, NULL, options->modes, &made,
-                                                         NULL, NULL, error);
+    status = options->modes == 0
+                 ? supine_projection_compress_harmonics(&w.projection, &made, error)
+                 : supine_projection_compress_modes(&w.projection, NULL, options->modes, &made,
+                                                    NULL, NULL, error);
   }
   if (status == SUPINE_OK) {
     status = cross_validate(&w, made.mode_count, &found.accuracy, error);
@@ -527,7 +528,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     *report = found;
     made = (supine_compression){0};
   }
-  supine_compression_free(&made);
+  supine_projection_compression_free(&made);
   fitting_free(&w);
   return status;
 }

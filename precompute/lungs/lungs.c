@@ -180,8 +180,8 @@ static supine_status group(supine_lungs *lungs, const component *parts, supine_e
   free(position);
   supine_mesh_free(mesh);
   *mesh = sorted;
-  supine_topology_free(&lungs->topology);
-  const supine_status status = supine_topology_create(mesh, &lungs->topology);
+  supine_mesh_topology_free(&lungs->topology);
+  const supine_status status = supine_mesh_topology_create(mesh, &lungs->topology);
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
@@ -206,7 +206,7 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
       goto cleanup;
     }
   }
-  status = supine_topology_create(&made.mesh, &made.topology);
+  status = supine_mesh_topology_create(&made.mesh, &made.topology);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for the edges of %zu triangles",
                            made.mesh.triangle_count);
@@ -243,7 +243,7 @@ cleanup:
 
 void supine_lungs_free(supine_lungs *lungs) {
   supine_mesh_free(&lungs->mesh);
-  supine_topology_free(&lungs->topology);
+  supine_mesh_topology_free(&lungs->topology);
   free(lungs->lesions);
   *lungs = (supine_lungs){0};
 }

@@ -12,11 +12,11 @@ static const unsigned char faces[FACES][3] = {
     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1},
 };
 
-size_t supine_geodesic_vertex_count(size_t frequency) {
+size_t supine_phantom_geodesic_vertex_count(size_t frequency) {
   return 10 * frequency * frequency + 2;
 }
 
-size_t supine_geodesic_triangle_count(size_t frequency) {
+size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
   return 20 * frequency * frequency;
 }
 
@@ -74,7 +74,8 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 
-void supine_geodesic(size_t frequency, uint32_t base, double *vertices, uint32_t *triangles) {
+void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
+                             uint32_t *triangles) {
   const size_t f = frequency;
   uint32_t *out = triangles;
   for (size_t face = 0; face < FACES; ++face) {

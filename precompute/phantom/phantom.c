@@ -41,8 +41,8 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
   }
   const double exact = sqrt(((double)vertices / 2.0 - 2.0) / 10.0);
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
-  const size_t count = supine_geodesic_vertex_count(frequency);
-  const size_t faces = supine_geodesic_triangle_count(frequency);
+  const size_t count = supine_phantom_geodesic_vertex_count(frequency);
+  const size_t faces = supine_phantom_geodesic_triangle_count(frequency);
   supine_mesh made = {.vertex_count = 2 * count, .triangle_count = 2 * faces};
   made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
   made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);
@@ -52,7 +52,8 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
   }
   for (size_t lung = 0; lung < 2; ++lung) {
     double *part = made.vertices + 3 * lung * count;
-    supine_geodesic(frequency, (uint32_t)(lung * count), part, made.triangles + 3 * lung * faces);
+    supine_phantom_geodesic(frequency, (uint32_t)(lung * count), part,
+                            made.triangles + 3 * lung * faces);
     const supine_status status = shape(lung, count, part);
     if (status != SUPINE_OK) {
       supine_mesh_free(&made);

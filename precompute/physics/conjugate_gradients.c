@@ -139,22 +139,22 @@ static supine_status allocate(supine_equilibrium *eq) {
   return SUPINE_ERROR_MEMORY;
 }
 
-supine_status supine_conjugate_gradients(supine_pass *work, size_t steps_max,
-                                         supine_solve_report *report) {
+supine_status supine_physics_conjugate_gradients(supine_pass *work, size_t steps_max,
+                                                 supine_solve_report *report) {
   supine_equilibrium *eq = work->eq;
   double last_rr[SUPINE_RHS_MAX] = {0.0};
   bool done[SUPINE_RHS_MAX] = {false};
   if (allocate(eq) != SUPINE_OK) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_pass_run(work, start_range);
+  supine_physics_pass_run(work, start_range);
   for (size_t step = 0;; ++step) {
-    supine_pass_run(work, image_range);
+    supine_physics_pass_run(work, image_range);
     report->residual = 0.0;
     bool all = true;
     for (size_t r = 0; r < eq->count; ++r) {
-      const double rr = supine_pass_total(work->rr, r);
-      const double rw = supine_pass_total(work->rw, r);
+      const double rr = supine_physics_pass_total(work->rr, r);
+      const double rw = supine_physics_pass_total(work->rw, r);
       const double relative = work->norm[r] > 0.0 ? sqrt(rr / work->norm[r]) : sqrt(rr);
       report->residual = relative <= report->residual ? report->residual : relative; /* keeps NaN */
       done[r] = done[r] || relative <= work->wanted;
@@ -171,7 +171,7 @@ supine_status supine_conjugate_gradients(supine_pass *work, size_t steps_max,
     if (all || step == steps_max || !isfinite(report->residual)) {
       return SUPINE_OK;
     }
-    supine_pass_run(work, step_range);
+    supine_physics_pass_run(work, step_range);
     ++report->iterations;
   }
 }

@@ -5,7 +5,7 @@
 
 #include "precompute/physics/force.h"
 
-supine_direction_law supine_direction_law_default(void) {
+supine_direction_law supine_physics_direction_law_default(void) {
   return (supine_direction_law){SUPINE_DIRECTION_BOX, {2.0, 1.5, 1.5, 1.0, 16.0, 1.4}, NULL};
 }
 
@@ -67,8 +67,8 @@ static void normalise(size_t count, double *d) {
   }
 }
 
-supine_status supine_directions(const supine_lungs *lungs, const supine_direction_law *law,
-                                double *directions, supine_error *error) {
+supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
+                                        double *directions, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   for (size_t k = 0; k < 6; ++k) {
     if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {

@@ -4,8 +4,8 @@
 
 #include "sh/base/csv.h"
 
-supine_status supine_directions_load(const char *path, size_t count, double *vectors,
-                                     supine_error *error) {
+supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
+                                             supine_error *error) {
   static const char *const columns[] = {"dx", "dy", "dz"};
   supine_csv csv;
   bool more = true;

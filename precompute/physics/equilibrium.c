@@ -10,8 +10,8 @@ enum { ROWS_GRAIN = 4096, STEPS_MAX = 200, STEPS_MAX_WITH_REACH = 20000 };
 
 static const double default_tolerance = 1e-14;
 
-supine_status supine_equilibrium_create(const supine_network *network, size_t rhs_max,
-                                        size_t threads, supine_equilibrium **equilibrium) {
+supine_status supine_physics_equilibrium_create(const supine_network *network, size_t rhs_max,
+                                                size_t threads, supine_equilibrium **equilibrium) {
   *equilibrium = NULL;
   if (rhs_max < 1 || rhs_max > SUPINE_RHS_MAX) {
     return SUPINE_ERROR_ARGUMENT;
@@ -30,20 +30,20 @@ supine_status supine_equilibrium_create(const supine_network *network, size_t rh
   made->inner = malloc(n * sizeof(double));
   made->weight = malloc((links + 1) * sizeof(double));
   made->scale = malloc(n * sizeof(double));
-  supine_status status = supine_relaxation_prepare(made);
+  supine_status status = supine_physics_relaxation_prepare(made);
   made->right = malloc(n * rhs_max * sizeof(double));
   made->solution = malloc((n + made->halo_count) * rhs_max * sizeof(double));
   if (status != SUPINE_OK || made->stiffness == NULL || made->inner == NULL ||
       made->weight == NULL || made->scale == NULL || made->right == NULL ||
       made->solution == NULL) {
-    supine_equilibrium_destroy(made);
+    supine_physics_equilibrium_destroy(made);
     return SUPINE_ERROR_MEMORY;
   }
   *equilibrium = made;
   return SUPINE_OK;
 }
 
-void supine_equilibrium_destroy(supine_equilibrium *equilibrium) {
+void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
   if (equilibrium != NULL) {
     free(equilibrium->stiffness);
     free(equilibrium->inner);
@@ -92,11 +92,12 @@ static void scale_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-supine_status supine_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
-                                               const double *stiffness, supine_error *error) {
+supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
+                                                       const double *stiffness,
+                                                       supine_error *error) {
   const supine_network *net = equilibrium->network;
-  const supine_status status =
-      supine_stiffness_normalise(net->vertex_count, stiffness, equilibrium->stiffness, error);
+  const supine_status status = supine_physics_stiffness_normalise(net->vertex_count, stiffness,
+                                                                  equilibrium->stiffness, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -158,7 +159,7 @@ static void flushed_range(void *context, size_t begin, size_t end, size_t thread
   supine_denormals_restore(saved);
 }
 
-void supine_pass_run(supine_pass *work, supine_range_function *function) {
+void supine_physics_pass_run(supine_pass *work, supine_range_function *function) {
   flushed call = {function, work};
   memset(work->rr, 0, sizeof work->rr);
   memset(work->rw, 0, sizeof work->rw);
@@ -166,7 +167,7 @@ void supine_pass_run(supine_pass *work, supine_range_function *function) {
                       &call);
 }
 
-double supine_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], size_t r) {
+double supine_physics_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], size_t r) {
   double sum = 0.0;
   for (size_t t = 0; t < SUPINE_SOLVE_THREADS_MAX; ++t) {
     sum += sums[t][r];
@@ -174,10 +175,10 @@ double supine_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], 
   return sum;
 }
 
-supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
-                                       const double *force, double tolerance, bool warm,
-                                       double *catch_, supine_solve_report *report,
-                                       supine_error *error) {
+supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
+                                               const double *force, double tolerance, bool warm,
+                                               double *catch_, supine_solve_report *report,
+                                               supine_error *error) {
   supine_equilibrium *eq = equilibrium;
   const bool reach = eq->network->reach > 0.0;
   supine_solve_report made = {0, INFINITY};
@@ -196,19 +197,20 @@ supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t c
   eq->count = count;
   *work = (supine_pass){.eq = eq, .force = force, .catch_ = catch_};
   work->wanted = tolerance > 0.0 ? tolerance : default_tolerance;
-  supine_pass_run(work, load_range);
+  supine_physics_pass_run(work, load_range);
   for (size_t r = 0; r < count; ++r) {
-    work->norm[r] = supine_pass_total(work->rr, r);
+    work->norm[r] = supine_physics_pass_total(work->rr, r);
   }
   /* A reach couples far beyond a link, and sweeps get slow; alone, a right-hand side has each row
    * wait for the last. Conjugate gradients take those, and what sweeps leave. */
   if (!reach && count > 1) {
-    supine_relaxation(work, &made);
+    supine_physics_relaxation(work, &made);
   }
   if (made.residual > work->wanted) {
-    status = supine_conjugate_gradients(work, reach ? STEPS_MAX_WITH_REACH : STEPS_MAX, &made);
+    status =
+        supine_physics_conjugate_gradients(work, reach ? STEPS_MAX_WITH_REACH : STEPS_MAX, &made);
   }
-  supine_pass_run(work, store_range);
+  supine_physics_pass_run(work, store_range);
   const double wanted = work->wanted;
   free(work);
   if (report != NULL) {
@@ -225,8 +227,8 @@ supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t c
   return SUPINE_OK;
 }
 
-void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
-                                     const supine_topology *topology, double *catch_) {
+void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
+                                             const supine_topology *topology, double *catch_) {
   const supine_equilibrium *eq = equilibrium;
   const supine_network *net = eq->network;
   for (size_t e = 0; e < topology->edge_count; ++e) {
@@ -248,8 +250,8 @@ void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
   }
 }
 
-supine_status supine_transfer_column(supine_equilibrium *equilibrium, size_t vertex, double *column,
-                                     supine_error *error) {
+supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
+                                             double *column, supine_error *error) {
   const size_t n = equilibrium->network->vertex_count;
   if (vertex >= n) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "vertex %zu of %zu: they count from 0",
@@ -261,7 +263,7 @@ supine_status supine_transfer_column(supine_equilibrium *equilibrium, size_t ver
   }
   force[vertex] = 1.0;
   const supine_status status =
-      supine_equilibrium_solve(equilibrium, 1, force, 0.0, false, column, NULL, error);
+      supine_physics_equilibrium_solve(equilibrium, 1, force, 0.0, false, column, NULL, error);
   free(force);
   return status;
 }

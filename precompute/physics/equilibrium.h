@@ -52,15 +52,16 @@ typedef struct supine_network supine_network;
  * @param mesh      [N] vertices in mm
  * @param topology  its edges
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_network_create(const supine_mesh *mesh, const supine_topology *topology,
-                                    supine_network **network);
+supine_status supine_physics_network_create(const supine_mesh *mesh,
+                                            const supine_topology *topology,
+                                            supine_network **network);
 
 /** The network of lungs as they are, with their lesions and their reach: what solves are set up
  * with. The number of steps of a solve grows as R over the links' length.
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **network);
-void supine_network_destroy(supine_network *network);
-size_t supine_network_vertex_count(const supine_network *network);
+supine_status supine_physics_lungs_network(const supine_lungs *lungs, supine_network **network);
+void supine_physics_network_destroy(supine_network *network);
+size_t supine_physics_network_vertex_count(const supine_network *network);
 
 /** One stiffness on a network, with the space to solve for it. For one thread at a time. */
 typedef struct supine_equilibrium supine_equilibrium;
@@ -69,15 +70,16 @@ typedef struct supine_equilibrium supine_equilibrium;
  *  @param rhs_max   most right-hand sides of one solve, 1 to SUPINE_RHS_MAX
  *  @param threads   threads of one solve; 0: all that supine_thread_count() names
  *  @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
-supine_status supine_equilibrium_create(const supine_network *network, size_t rhs_max,
-                                        size_t threads, supine_equilibrium **equilibrium);
-void supine_equilibrium_destroy(supine_equilibrium *equilibrium);
+supine_status supine_physics_equilibrium_create(const supine_network *network, size_t rhs_max,
+                                                size_t threads, supine_equilibrium **equilibrium);
+void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
 /** Sets the stiffness and computes the matrix: one pass over the edges.
  * @param stiffness  [N] E > 0, relative: scaled here to geometric mean 1; NULL: 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
-supine_status supine_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
-                                               const double *stiffness, supine_error *error);
+supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
+                                                       const double *stiffness,
+                                                       supine_error *error);
 
 /** How a solve went. */
 typedef struct supine_solve_report {
@@ -93,25 +95,25 @@ typedef struct supine_solve_report {
  * @param report     optional
  * @retval SUPINE_ERROR_ARGUMENT   count out of range
  * @retval SUPINE_ERROR_NUMERICAL  200 steps (20,000 with a reach) did not reach the tolerance */
-supine_status supine_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
-                                       const double *force, double tolerance, bool warm,
-                                       double *catch_, supine_solve_report *report,
-                                       supine_error *error);
+supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
+                                               const double *force, double tolerance, bool warm,
+                                               double *catch_, supine_solve_report *report,
+                                               supine_error *error);
 
 /** What the spring nodes caught in the last solve, [edge_count, count] in the topology's order:
  * with the masses' catch it sums to the sum of f. 0 with a reach. */
-void supine_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
-                                     const supine_topology *topology, double *catch_);
+void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
+                                             const supine_topology *topology, double *catch_);
 
 /** Column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force on that
  * vertex alone.
  * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
-supine_status supine_transfer_column(supine_equilibrium *equilibrium, size_t vertex, double *column,
-                                     supine_error *error);
+supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
+                                             double *column, supine_error *error);
 
 /** The Pitcher/Catcher iteration as the paper writes it: whichever node holds most distributes
  * what it holds over its clique, until no node holds more than `tolerance` times the largest f.
- * The reference for supine_equilibrium_solve; slow, for small meshes.
+ * The reference for supine_physics_equilibrium_solve; slow, for small meshes.
  *
  * @param stiffness  [N] or NULL, as above
  * @param force      [N]
@@ -120,11 +122,10 @@ supine_status supine_transfer_column(supine_equilibrium *equilibrium, size_t ver
  * @param progress   called after every N distributions with their number and the sum still held
  * relative to the sum of |f|; NULL: not wanted
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
-supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
-                                     const double *stiffness, const double *force, double tolerance,
-                                     double *masses, double *springs,
-                                     void (*progress)(void *context, size_t steps, double held),
-                                     void *context, supine_error *error);
+supine_status supine_physics_pitcher_catcher(
+    const supine_mesh *mesh, const supine_topology *topology, const double *stiffness,
+    const double *force, double tolerance, double *masses, double *springs,
+    void (*progress)(void *context, size_t steps, double held), void *context, supine_error *error);
 
 #ifdef __cplusplus
 }

@@ -51,21 +51,21 @@ typedef struct supine_pass {
 
 /* Calls `function` with `work` on all rows, in threads, denormals flushed, after zeroing the sums.
  */
-void supine_pass_run(supine_pass *work, supine_range_function *function);
+void supine_physics_pass_run(supine_pass *work, supine_range_function *function);
 
 /* The threads' sums of one right-hand side. */
-double supine_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], size_t r);
+double supine_physics_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], size_t r);
 
 /* Blocks and halo of relaxation. */
-supine_status supine_relaxation_prepare(supine_equilibrium *eq);
+supine_status supine_physics_relaxation_prepare(supine_equilibrium *eq);
 
 /* Improves the solution by sweeps until the residual is as wanted, or until it is plain that
  * conjugate gradients will do better; the report's residual tells. */
-void supine_relaxation(supine_pass *work, supine_solve_report *report);
+void supine_physics_relaxation(supine_pass *work, supine_solve_report *report);
 
 /* Improves the solution to the residual wanted, in at most `steps_max` steps.
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_conjugate_gradients(supine_pass *work, size_t steps_max,
-                                         supine_solve_report *report);
+supine_status supine_physics_conjugate_gradients(supine_pass *work, size_t steps_max,
+                                                 supine_solve_report *report);
 
 #endif

@@ -7,7 +7,7 @@
 
 #include "precompute/physics/network.h"
 
-supine_force_law supine_force_law_default(void) {
+supine_force_law supine_physics_force_law_default(void) {
   return (supine_force_law){.gain = 1.0};
 }
 
@@ -21,8 +21,8 @@ static double fixed_part(const supine_lungs *lungs, const supine_force_law *law,
   return supine_dot(law->box, box);
 }
 
-void supine_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
-                  double minimum, double maximum, double *force) {
+void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
+                          double minimum, double maximum, double *force) {
   const bool fixed = has_fixed_part(law);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
@@ -30,16 +30,16 @@ void supine_force(const supine_lungs *lungs, const supine_force_law *law, const 
   }
 }
 
-void supine_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
-                            const double *stiffness, const double g[3], double minimum,
-                            double maximum, double *softened) {
+void supine_physics_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
+                                    const double *stiffness, const double g[3], double minimum,
+                                    double maximum, double *softened) {
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
     softened[i] = (stiffness == NULL ? 1.0 : stiffness[i]) * exp(-law->soften * (h - 0.5));
   }
 }
 
-size_t supine_force_column_count(const supine_force_law *law) {
+size_t supine_physics_force_column_count(const supine_force_law *law) {
   return has_fixed_part(law) ? 5 : 4;
 }
 
@@ -54,8 +54,9 @@ static double box_frame(const supine_lungs *lungs, double centre[3]) {
   return sqrt(square);
 }
 
-void supine_force_columns(const supine_lungs *lungs, const supine_force_law *law, double *columns) {
-  const size_t count = supine_force_column_count(law);
+void supine_physics_force_columns(const supine_lungs *lungs, const supine_force_law *law,
+                                  double *columns) {
+  const size_t count = supine_physics_force_column_count(law);
   double centre[3];
   const double radius = box_frame(lungs, centre);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -70,8 +71,9 @@ void supine_force_columns(const supine_lungs *lungs, const supine_force_law *law
   }
 }
 
-void supine_force_functions(const supine_lungs *lungs, const supine_force_law *law,
-                            const double g[3], double minimum, double maximum, double *functions) {
+void supine_physics_force_functions(const supine_lungs *lungs, const supine_force_law *law,
+                                    const double g[3], double minimum, double maximum,
+                                    double *functions) {
   double centre[3];
   const double radius = box_frame(lungs, centre);
   const double slope = law->gain / (maximum - minimum);

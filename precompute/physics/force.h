@@ -26,22 +26,23 @@ typedef struct supine_force_law {
   double soften; /**< how much softer dependent tissue is; not 0 breaks the linear route */
 } supine_force_law;
 
-supine_force_law supine_force_law_default(void);
+supine_force_law supine_physics_force_law_default(void);
 
 /** min and max over the vertices of g.p for `count` directions [count, 3] into minimum [count] and
  * maximum [count], mm. Uses all cores.
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_height_range(const supine_mesh *mesh, size_t count, const double *directions,
-                                  double *minimum, double *maximum);
+supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
+                                          const double *directions, double *minimum,
+                                          double *maximum);
 
 /** f [N] for gravity along the unit vector `g`, given its height range. */
-void supine_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
-                  double minimum, double maximum, double *force);
+void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
+                          double minimum, double maximum, double *force);
 
 /** E [N] for gravity along `g` from E without gravity (NULL: 1). */
-void supine_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
-                            const double *stiffness, const double g[3], double minimum,
-                            double maximum, double *softened);
+void supine_physics_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
+                                    const double *stiffness, const double g[3], double minimum,
+                                    double maximum, double *softened);
 
 /** The law as a sum of a few forces that do not turn, times functions of gravity alone:
  * f_i(g) = sum over r of columns[i, r] functions[r](g). The columns are 1 and the position (about
@@ -49,14 +50,16 @@ void supine_force_stiffness(const supine_lungs *lungs, const supine_force_law *l
 enum { SUPINE_FORCE_COLUMNS_MAX = 5 };
 
 /** Number of columns: 4, or 5 with a body-fixed part. */
-size_t supine_force_column_count(const supine_force_law *law);
+size_t supine_physics_force_column_count(const supine_force_law *law);
 
 /** The columns, [N, R]. */
-void supine_force_columns(const supine_lungs *lungs, const supine_force_law *law, double *columns);
+void supine_physics_force_columns(const supine_lungs *lungs, const supine_force_law *law,
+                                  double *columns);
 
 /** The functions at one direction, [R]. */
-void supine_force_functions(const supine_lungs *lungs, const supine_force_law *law,
-                            const double g[3], double minimum, double maximum, double *functions);
+void supine_physics_force_functions(const supine_lungs *lungs, const supine_force_law *law,
+                                    const double g[3], double minimum, double maximum,
+                                    double *functions);
 
 /** How vertices move. */
 typedef enum supine_direction_model {
@@ -77,19 +80,19 @@ typedef struct supine_direction_law {
   const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; the caller's */
 } supine_direction_law;
 
-supine_direction_law supine_direction_law_default(void);
+supine_direction_law supine_physics_direction_law_default(void);
 
 /** Reads vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each of
  * `count` vertices in the model's order, into vectors [count, 3].
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (line named), SUPINE_ERROR_MEMORY */
-supine_status supine_directions_load(const char *path, size_t count, double *vectors,
-                                     supine_error *error);
+supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
+                                             supine_error *error);
 
 /** d [N, 3], mm; of any length, so that the fixed planes stay fixed.
  * @retval SUPINE_ERROR_ARGUMENT  a constant that is not finite, or an exponent that is not positive
  * @retval SUPINE_ERROR_MESH      no vertex would move */
-supine_status supine_directions(const supine_lungs *lungs, const supine_direction_law *law,
-                                double *directions, supine_error *error);
+supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
+                                        double *directions, supine_error *error);
 
 #ifdef __cplusplus
 }

@@ -83,8 +83,9 @@ static void height_range(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
-supine_status supine_height_range(const supine_mesh *mesh, size_t count, const double *directions,
-                                  double *minimum, double *maximum) {
+supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
+                                          const double *directions, double *minimum,
+                                          double *maximum) {
   const size_t box_count = (mesh->vertex_count + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
   if (boxes == NULL) {

@@ -18,7 +18,7 @@ typedef struct supine_model {
   const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
 } supine_model;
 
-supine_model supine_model_default(void);
+supine_model supine_physics_model_default(void);
 
 #ifdef __cplusplus
 }

@@ -6,7 +6,7 @@
 
 #include "precompute/physics/network.h"
 
-double supine_link_distance(const double *first, const double *second) {
+double supine_physics_link_distance(const double *first, const double *second) {
   const double x = first[0] - second[0];
   const double y = first[1] - second[1];
   const double z = first[2] - second[2];
@@ -70,8 +70,9 @@ static void breadth_first(size_t vertices, const size_t *row_begin, const uint32
   }
 }
 
-supine_status supine_network_create(const supine_mesh *mesh, const supine_topology *topology,
-                                    supine_network **network) {
+supine_status supine_physics_network_create(const supine_mesh *mesh,
+                                            const supine_topology *topology,
+                                            supine_network **network) {
   const size_t n = mesh->vertex_count;
   const size_t links = 2 * topology->edge_count;
   supine_network *made = calloc(1, sizeof *made);
@@ -106,8 +107,8 @@ supine_status supine_network_create(const supine_mesh *mesh, const supine_topolo
     made->row_begin[i] = slot;
     for (size_t s = row_begin[v]; s < row_begin[v + 1]; ++s, ++slot) {
       made->neighbour[slot] = made->rank[neighbour[s]];
-      made->distance[slot] = supine_link_distance(mesh->vertices + 3 * (size_t)v,
-                                                  mesh->vertices + 3 * (size_t)neighbour[s]);
+      made->distance[slot] = supine_physics_link_distance(
+          mesh->vertices + 3 * (size_t)v, mesh->vertices + 3 * (size_t)neighbour[s]);
     }
   }
   made->row_begin[n] = slot;
@@ -118,11 +119,11 @@ supine_status supine_network_create(const supine_mesh *mesh, const supine_topolo
 fail:
   free(row_begin);
   free(neighbour);
-  supine_network_destroy(made);
+  supine_physics_network_destroy(made);
   return SUPINE_ERROR_MEMORY;
 }
 
-void supine_network_destroy(supine_network *network) {
+void supine_physics_network_destroy(supine_network *network) {
   if (network != NULL) {
     free(network->row_begin);
     free(network->neighbour);
@@ -135,6 +136,6 @@ void supine_network_destroy(supine_network *network) {
   }
 }
 
-size_t supine_network_vertex_count(const supine_network *network) {
+size_t supine_physics_network_vertex_count(const supine_network *network) {
   return network->vertex_count;
 }

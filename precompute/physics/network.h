@@ -3,8 +3,8 @@
 #ifndef SUPINE_PRECOMPUTE_INTERNAL_H
 #define SUPINE_PRECOMPUTE_INTERNAL_H
 
-#include "sh/base/clones.h"
 #include "precompute/physics/equilibrium.h"
+#include "sh/base/clones.h"
 
 /* Vertex adjacency in compressed rows: the links of vertex i are row_begin[i] <= s < row_begin[i +
  * 1]. */
@@ -23,16 +23,16 @@ struct supine_network {
 };
 
 /* The stiffness of (III-E) from expandability or as given: scaled to geometric mean 1. */
-supine_status supine_stiffness_normalise(size_t count, const double *stiffness, double *scaled,
-                                         supine_error *error);
+supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
+                                                 double *scaled, supine_error *error);
 
 /* D(mass, spring) of an edge of the given length, mm. */
-double supine_link_distance(const double *first, const double *second);
+double supine_physics_link_distance(const double *first, const double *second);
 
 /* Replaces the links' distances and the masses' own weights by those of a spreading length in mm.
  */
-supine_status supine_network_set_reach(supine_network *network, const supine_mesh *mesh,
-                                       const supine_topology *topology, double reach);
+supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
+                                               const supine_topology *topology, double reach);
 
 /* Of vectors of three. */
 static inline double supine_dot(const double *a, const double *b) {

@@ -95,8 +95,8 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   }
   for (size_t e = 0; e < topology->edge_count; ++e) {
     const uint32_t *edge = topology->edges + 2 * e;
-    const double d = supine_link_distance(mesh->vertices + 3 * (size_t)edge[0],
-                                          mesh->vertices + 3 * (size_t)edge[1]);
+    const double d = supine_physics_link_distance(mesh->vertices + 3 * (size_t)edge[0],
+                                                  mesh->vertices + 3 * (size_t)edge[1]);
     const double spring = 0.5 * (stiffness[edge[0]] + stiffness[edge[1]]);
     for (size_t k = 0; k < 2; ++k) {
       it->clique[begin[edge[k]]] = n + e;
@@ -138,11 +138,12 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
-supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
-                                     const double *stiffness, const double *force, double tolerance,
-                                     double *masses, double *springs,
-                                     void (*progress)(void *context, size_t steps, double held),
-                                     void *context, supine_error *error) {
+supine_status
+supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
+                               const double *stiffness, const double *force, double tolerance,
+                               double *masses, double *springs,
+                               void (*progress)(void *context, size_t steps, double held),
+                               void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
   if (n == 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices");
@@ -157,7 +158,7 @@ supine_status supine_pitcher_catcher(const supine_mesh *mesh, const supine_topol
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the tolerance must be positive");
     goto cleanup;
   }
-  status = supine_stiffness_normalise(n, stiffness, scaled, error);
+  status = supine_physics_stiffness_normalise(n, stiffness, scaled, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Links whose spreading has a length in mm: what supine_lungs_network makes of the reach. */
+/* Links whose spreading has a length in mm: what supine_physics_lungs_network makes of the reach.
+ */
 #include <math.h>
 #include <stdlib.h>
 
@@ -50,8 +51,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
  * unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within a
  * tenth or so. It is kept as 1 / w in place of
  * the distance. */
-supine_status supine_network_set_reach(supine_network *network, const supine_mesh *mesh,
-                                       const supine_topology *topology, double reach) {
+supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
+                                               const supine_topology *topology, double reach) {
   const size_t n = network->vertex_count;
   double *area = malloc(n * sizeof *area);
   double *link = calloc(network->row_begin[n] + 1, sizeof *link);
@@ -99,12 +100,12 @@ supine_status supine_network_set_reach(supine_network *network, const supine_mes
   return SUPINE_OK;
 }
 
-supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **network) {
+supine_status supine_physics_lungs_network(const supine_lungs *lungs, supine_network **network) {
   supine_network *made = NULL;
   *network = NULL;
-  supine_status status = supine_network_create(&lungs->mesh, &lungs->topology, &made);
+  supine_status status = supine_physics_network_create(&lungs->mesh, &lungs->topology, &made);
   if (status == SUPINE_OK && lungs->reach > 0.0) {
-    status = supine_network_set_reach(made, &lungs->mesh, &lungs->topology, lungs->reach);
+    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology, lungs->reach);
   }
   if (status == SUPINE_OK && lungs->lesions != NULL) {
     made->lesions = malloc(made->vertex_count * sizeof *made->lesions);
@@ -114,7 +115,7 @@ supine_status supine_lungs_network(const supine_lungs *lungs, supine_network **n
     }
   }
   if (status != SUPINE_OK) {
-    supine_network_destroy(made);
+    supine_physics_network_destroy(made);
     return status;
   }
   *network = made;

@@ -58,7 +58,7 @@ static supine_status number_halo(supine_equilibrium *eq) {
   return SUPINE_OK;
 }
 
-supine_status supine_relaxation_prepare(supine_equilibrium *eq) {
+supine_status supine_physics_relaxation_prepare(supine_equilibrium *eq) {
   const size_t n = eq->network->vertex_count;
   size_t blocks = n / ROWS_MIN;
   blocks = blocks > eq->threads ? eq->threads : blocks;
@@ -135,14 +135,14 @@ static double sweep(supine_pass *work, double omega) {
   supine_parallel_for(eq->block_count, 1, eq->block_count, sweep_blocks, work);
   double largest = 0.0;
   for (size_t r = 0; r < count; ++r) {
-    const double rr = supine_pass_total(work->rr, r);
+    const double rr = supine_physics_pass_total(work->rr, r);
     const double relative = work->norm[r] > 0.0 ? sqrt(rr / work->norm[r]) : sqrt(rr);
     largest = relative <= largest ? largest : relative; /* keeps NaN */
   }
   return largest;
 }
 
-void supine_relaxation(supine_pass *work, supine_solve_report *report) {
+void supine_physics_relaxation(supine_pass *work, supine_solve_report *report) {
   while (report->iterations < SWEEPS_MAX) {
     report->residual = sweep(work, over_relaxation);
     ++report->iterations;

@@ -3,22 +3,24 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "precompute/tissue/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
+#include "precompute/tissue/disease.h"
 
-supine_model supine_model_default(void) {
-  return (supine_model){supine_force_law_default(), supine_direction_law_default(), NULL};
+supine_model supine_physics_model_default(void) {
+  return (supine_model){supine_physics_force_law_default(), supine_physics_direction_law_default(),
+                        NULL};
 }
 
-void supine_solution_free(supine_solution *solution) {
+void supine_physics_solution_free(supine_solution *solution) {
   free(solution->catch_);
   free(solution->directions);
   *solution = (supine_solution){0};
 }
 
-supine_status supine_solve(const supine_lungs *lungs, const supine_model *model, const double g[3],
-                           supine_solution *solution, supine_error *error) {
+supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
+                                   const double g[3], supine_solution *solution,
+                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
@@ -31,48 +33,49 @@ supine_status supine_solve(const supine_lungs *lungs, const supine_model *model,
   made.directions = malloc(3 * n * sizeof *made.directions);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
-      supine_lungs_network(lungs, &network) != SUPINE_OK ||
-      supine_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
-      supine_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
+      supine_physics_lungs_network(lungs, &network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
+      supine_physics_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_directions(lungs, &model->direction, made.directions, error);
+  status = supine_physics_directions(lungs, &model->direction, made.directions, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_force_stiffness(lungs, &model->force, model->stiffness, g, minimum, maximum, work);
-  status = supine_equilibrium_set_stiffness(equilibrium, work, error);
+  supine_physics_force_stiffness(lungs, &model->force, model->stiffness, g, minimum, maximum, work);
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, work, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_force(lungs, &model->force, g, minimum, maximum, work);
-  status =
-      supine_equilibrium_solve(equilibrium, 1, work, 0.0, false, made.catch_, &made.report, error);
+  supine_physics_force(lungs, &model->force, g, minimum, maximum, work);
+  status = supine_physics_equilibrium_solve(equilibrium, 1, work, 0.0, false, made.catch_,
+                                            &made.report, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   if (made.has_volume) {
     const double one = 1.0;
-    status = supine_volume_forms_create(lungs, made.directions, made.catch_, 1, &forms, error);
+    status =
+        supine_physics_volume_forms_create(lungs, made.directions, made.catch_, 1, &forms, error);
     if (status != SUPINE_OK) {
       goto cleanup;
     }
-    supine_volume_forms_contract(&forms, &one, made.cubic);
+    supine_physics_volume_forms_contract(&forms, &one, made.cubic);
   }
-  supine_lungs_rest_directions(lungs, made.directions);
+  supine_tissue_rest_directions(lungs, made.directions);
   *solution = made;
   made = (supine_solution){0};
 cleanup:
-  supine_volume_forms_free(&forms);
-  supine_solution_free(&made);
+  supine_physics_volume_forms_free(&forms);
+  supine_physics_solution_free(&made);
   free(work);
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   return status;
 }
 
-double supine_solution_largest(const supine_solution *solution) {
+double supine_physics_solution_largest(const supine_solution *solution) {
   double largest = 0.0;
   for (size_t i = 0; i < solution->vertex_count; ++i) {
     const double *d = solution->directions + 3 * i;
@@ -82,8 +85,8 @@ double supine_solution_largest(const supine_solution *solution) {
   return largest;
 }
 
-void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
-                           double *positions) {
+void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
+                                   double scale, double *positions) {
   for (size_t i = 0; i < solution->vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {
       positions[3 * i + k] =

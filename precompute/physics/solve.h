@@ -23,17 +23,18 @@ typedef struct supine_solution {
 
 /** Solves for gravity along the unit vector `g`.
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_solve(const supine_lungs *lungs, const supine_model *model, const double g[3],
-                           supine_solution *solution, supine_error *error);
-void supine_solution_free(supine_solution *solution);
+supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
+                                   const double g[3], supine_solution *solution,
+                                   supine_error *error);
+void supine_physics_solution_free(supine_solution *solution);
 
 /** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
-double supine_solution_largest(const supine_solution *solution);
+double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Positions p + s F d, [N, 3], mm, from the surface at rest (disease.h: that of healthy lungs is
  * their mesh). */
-void supine_solution_apply(const supine_solution *solution, const supine_mesh *rest, double scale,
-                           double *positions);
+void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
+                                   double scale, double *positions);
 
 #ifdef __cplusplus
 }

@@ -4,8 +4,8 @@
 
 #include "precompute/physics/network.h"
 
-supine_status supine_stiffness_normalise(size_t count, const double *stiffness, double *scaled,
-                                         supine_error *error) {
+supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
+                                                 double *scaled, supine_error *error) {
   if (stiffness == NULL) {
     for (size_t i = 0; i < count; ++i) {
       scaled[i] = 1.0;

@@ -4,16 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/parallel.h"
-#include "precompute/projection/projection.h"
-#include <supine/volume.h>
 #include "precompute/physics/volume_forms.h"
+#include "precompute/projection/projection.h"
+#include "sh/base/parallel.h"
+#include <supine/volume.h>
 
 #include "precompute/physics/network.h"
 
 static const double millilitres = 1e-3; /* in a cubic millimetre */
 
-void supine_volume_forms_free(supine_volume_forms *forms) {
+void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
   free(forms->quadratic);
   free(forms->cubic);
@@ -26,7 +26,7 @@ static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_fo
   forms->quadratic = calloc(lungs * count * count, sizeof(double));
   forms->cubic = calloc(lungs * count * count * count, sizeof(double));
   if (forms->linear == NULL || forms->quadratic == NULL || forms->cubic == NULL) {
-    supine_volume_forms_free(forms);
+    supine_physics_volume_forms_free(forms);
     return SUPINE_ERROR_MEMORY;
   }
   return SUPINE_OK;
@@ -192,22 +192,24 @@ static supine_status create(const supine_lungs *lungs, const double *directions,
   *forms = made;
   made = (supine_volume_forms){0};
 cleanup:
-  supine_volume_forms_free(&made);
+  supine_physics_volume_forms_free(&made);
   free(work.linear);
   free(work.quadratic);
   free(work.cubic);
   return status;
 }
 
-supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
-                                         const double *columns, size_t count,
-                                         supine_volume_forms *forms, supine_error *error) {
+supine_status supine_physics_volume_forms_create(const supine_lungs *lungs,
+                                                 const double *directions, const double *columns,
+                                                 size_t count, supine_volume_forms *forms,
+                                                 supine_error *error) {
   return create(lungs, directions, columns, count, forms, error);
 }
 
-supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
-                                                size_t count, supine_volume_forms *forms,
-                                                supine_error *error) {
+supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
+                                                        const double *columns, size_t count,
+                                                        supine_volume_forms *forms,
+                                                        supine_error *error) {
   return create(lungs, NULL, columns, count, forms, error);
 }
 
@@ -226,8 +228,8 @@ static void mix_middle(const double *in, size_t outer, size_t n, size_t inner, c
   }
 }
 
-supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
-                                      size_t count, supine_volume_forms *mixed) {
+supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
+                                              size_t count, supine_volume_forms *mixed) {
   const size_t g = forms->lung_count;
   const size_t n = forms->column_count;
   const size_t larger = n > count ? n : count;
@@ -251,8 +253,8 @@ supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const do
   return SUPINE_OK;
 }
 
-void supine_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
-                                  double cubic[3]) {
+void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
+                                          double cubic[3]) {
   const size_t n = forms->column_count;
   cubic[0] = cubic[1] = cubic[2] = 0.0;
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {

@@ -25,7 +25,7 @@ typedef struct supine_volume_forms {
   double *cubic;     /**< [G, K, K, K] symmetric */
 } supine_volume_forms;
 
-void supine_volume_forms_free(supine_volume_forms *forms);
+void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
 /** Forms of closed lungs; a collapsed lung's are its share of its healthy ones (disease.h).
  * @param directions  [N, 3] d of the healthy shape, mm
@@ -33,24 +33,26 @@ void supine_volume_forms_free(supine_volume_forms *forms);
  * Cost: count^3 multiplications a triangle. Uses all cores.
  * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_volume_forms_create(const supine_lungs *lungs, const double *directions,
-                                         const double *columns, size_t count,
-                                         supine_volume_forms *forms, supine_error *error);
+supine_status supine_physics_volume_forms_create(const supine_lungs *lungs,
+                                                 const double *directions, const double *columns,
+                                                 size_t count, supine_volume_forms *forms,
+                                                 supine_error *error);
 
 /** The same for vector fields, u_i = s sum over k of w_k c_ik with c_ik of three components.
  * @param columns  [N, 3, count] */
-supine_status supine_volume_forms_create_vector(const supine_lungs *lungs, const double *columns,
-                                                size_t count, supine_volume_forms *forms,
-                                                supine_error *error);
+supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
+                                                        const double *columns, size_t count,
+                                                        supine_volume_forms *forms,
+                                                        supine_error *error);
 
 /** Forms for the columns c' = c x mix, mix [K, count].
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
-                                      size_t count, supine_volume_forms *mixed);
+supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
+                                              size_t count, supine_volume_forms *mixed);
 
 /** Coefficients of s, s^2 and s^3 for weights [K], summed over the lungs: into cubic [3], mL. */
-void supine_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
-                                  double cubic[3]);
+void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
+                                          double cubic[3]);
 
 #ifdef __cplusplus
 }

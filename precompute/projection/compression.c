@@ -3,14 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/parallel.h"
 #include "precompute/projection/projection.h"
+#include "sh/base/parallel.h"
 #include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
 #include "precompute/physics/network.h"
+#include "precompute/projection/compression.h"
 
-void supine_compression_free(supine_compression *compression) {
+void supine_projection_compression_free(supine_compression *compression) {
   free(compression->coefficients);
   free(compression->modes);
   free(compression->mix);
@@ -47,21 +47,22 @@ SUPINE_CLONES static void mix_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-supine_status supine_compression_create(const supine_projection *projection, size_t mode_count,
-                                        supine_compression *made) {
+supine_status supine_projection_compression_create(const supine_projection *projection,
+                                                   size_t mode_count, supine_compression *made) {
   *made = (supine_compression){
       .vertex_count = projection->vertex_count, .band = projection->band, .mode_count = mode_count};
   made->coefficients = malloc(projection->vertex_count * mode_count * sizeof(float));
   made->modes = calloc(mode_count * supine_sh_count(projection->band), sizeof(double));
   made->mix = calloc(projection->rank * mode_count, sizeof(double));
   if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
-    supine_compression_free(made);
+    supine_projection_compression_free(made);
     return SUPINE_ERROR_MEMORY;
   }
   return SUPINE_OK;
 }
 
-void supine_compression_mix(const supine_projection *projection, supine_compression *made) {
+void supine_projection_compression_mix(const supine_projection *projection,
+                                       supine_compression *made) {
   mix_work work = {projection, made};
   supine_parallel_for(projection->vertex_count, 1024, 0, mix_range, &work);
 }
@@ -73,8 +74,9 @@ static double function_at(const supine_projection *projection, size_t r, size_t 
              : (double)(r == t);
 }
 
-supine_status supine_compress_harmonics(const supine_projection *projection,
-                                        supine_compression *compression, supine_error *error) {
+supine_status supine_projection_compress_harmonics(const supine_projection *projection,
+                                                   supine_compression *compression,
+                                                   supine_error *error) {
   const size_t terms = supine_sh_count(projection->band);
   if (terms > SUPINE_MODES_MADE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -83,7 +85,7 @@ supine_status supine_compress_harmonics(const supine_projection *projection,
                             projection->band, terms, SUPINE_MODES_MADE_MAX);
   }
   supine_compression made;
-  if (supine_compression_create(projection, terms, &made) != SUPINE_OK) {
+  if (supine_projection_compression_create(projection, terms, &made) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu harmonics", terms);
   }
   for (size_t t = 0; t < terms; ++t) {
@@ -92,7 +94,7 @@ supine_status supine_compress_harmonics(const supine_projection *projection,
       made.mix[r * terms + t] = function_at(projection, r, t);
     }
   }
-  supine_compression_mix(projection, &made);
+  supine_projection_compression_mix(projection, &made);
   *compression = made;
   return SUPINE_OK;
 }
@@ -105,7 +107,8 @@ static void keep_columns(void *data, size_t rows, size_t width, size_t count, si
   }
 }
 
-void supine_compression_truncate(supine_compression *compression, size_t rank, size_t count) {
+void supine_projection_compression_truncate(supine_compression *compression, size_t rank,
+                                            size_t count) {
   const size_t width = compression->mode_count;
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
@@ -114,8 +117,8 @@ void supine_compression_truncate(supine_compression *compression, size_t rank, s
   }
 }
 
-void supine_compression_weights(const supine_compression *compression, const double *y,
-                                double *weights) {
+void supine_projection_compression_weights(const supine_compression *compression, const double *y,
+                                           double *weights) {
   const size_t terms = supine_sh_count(compression->band);
   for (size_t k = 0; k < compression->mode_count; ++k) {
     double sum = 0.0;
@@ -126,9 +129,11 @@ void supine_compression_weights(const supine_compression *compression, const dou
   }
 }
 
-supine_status supine_compression_volume_forms(const supine_compression *compression,
-                                              const supine_lungs *lungs, const double *directions,
-                                              supine_volume_forms *forms, supine_error *error) {
+supine_status supine_projection_compression_volume_forms(const supine_compression *compression,
+                                                         const supine_lungs *lungs,
+                                                         const double *directions,
+                                                         supine_volume_forms *forms,
+                                                         supine_error *error) {
   const size_t count = compression->mode_count;
   const size_t values = compression->vertex_count * count;
   double *columns = malloc(values * sizeof *columns);
@@ -141,8 +146,8 @@ supine_status supine_compression_volume_forms(const supine_compression *compress
   }
   const supine_status status =
       directions != NULL
-          ? supine_volume_forms_create(lungs, directions, columns, count, forms, error)
-          : supine_volume_forms_create_vector(lungs, columns, count, forms, error);
+          ? supine_physics_volume_forms_create(lungs, directions, columns, count, forms, error)
+          : supine_physics_volume_forms_create_vector(lungs, columns, count, forms, error);
   free(columns);
   return status;
 }

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/grid.h"
 #include "precompute/projection/projection.h"
+#include "sh/grid.h"
 #include <supine/sh.h>
 
 /* The functions of gravity have kinks where another vertex becomes the lowest or highest. Rules
@@ -39,7 +39,7 @@ static supine_status project_functions(const supine_lungs *lungs, const supine_f
   for (size_t d = 0; d < count; ++d) {
     supine_sh_grid_direction(grid, d / grid->longitudes, d % grid->longitudes, directions + 3 * d);
   }
-  status = supine_height_range(&lungs->mesh, count, directions, minimum, maximum);
+  status = supine_physics_height_range(&lungs->mesh, count, directions, minimum, maximum);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -48,7 +48,7 @@ static supine_status project_functions(const supine_lungs *lungs, const supine_f
   for (size_t d = 0; d < count; ++d) {
     const double *g = directions + 3 * d;
     double values[SUPINE_FORCE_COLUMNS_MAX];
-    supine_force_functions(lungs, law, g, minimum[d], maximum[d], values);
+    supine_physics_force_functions(lungs, law, g, minimum[d], maximum[d], values);
     status = supine_sh_evaluate(band, g, y);
     if (status != SUPINE_OK) {
       goto cleanup;
@@ -69,21 +69,21 @@ cleanup:
   return status;
 }
 
-supine_status supine_project_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, size_t band,
-                                    supine_projection *projection, supine_error *error) {
+supine_status supine_projection_linear(const supine_lungs *lungs, const supine_force_law *law,
+                                       const double *stiffness, size_t band,
+                                       supine_projection *projection, supine_error *error) {
   size_t latitudes = LATITUDES_PER_BAND * (band + 1);
   latitudes = latitudes < LATITUDES_MIN ? LATITUDES_MIN : latitudes;
-  return supine_project_linear_rule(lungs, law, stiffness, band, latitudes, 2 * latitudes,
-                                    projection, error);
+  return supine_projection_linear_rule(lungs, law, stiffness, band, latitudes, 2 * latitudes,
+                                       projection, error);
 }
 
-supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
-                                         const double *stiffness, size_t band, size_t latitudes,
-                                         size_t longitudes, supine_projection *projection,
-                                         supine_error *error) {
+supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
+                                            const double *stiffness, size_t band, size_t latitudes,
+                                            size_t longitudes, supine_projection *projection,
+                                            supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  const size_t rank = supine_force_column_count(law);
+  const size_t rank = supine_physics_force_column_count(law);
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   double *force = NULL;
@@ -97,9 +97,9 @@ supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu is above %d", band,
                             SUPINE_SH_BAND_MAX);
   }
-  supine_status status = supine_lungs_network(lungs, &network);
+  supine_status status = supine_physics_lungs_network(lungs, &network);
   if (status == SUPINE_OK) {
-    status = supine_equilibrium_create(network, rank, 0, &equilibrium);
+    status = supine_physics_equilibrium_create(network, rank, 0, &equilibrium);
   }
   force = malloc(n * rank * sizeof *force);
   made.columns = malloc(n * rank * sizeof *made.columns);
@@ -108,13 +108,13 @@ supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_equilibrium_set_stiffness(equilibrium, stiffness, error);
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_force_columns(lungs, law, force);
-  status =
-      supine_equilibrium_solve(equilibrium, rank, force, 0.0, false, made.columns, &report, error);
+  supine_physics_force_columns(lungs, law, force);
+  status = supine_physics_equilibrium_solve(equilibrium, rank, force, 0.0, false, made.columns,
+                                            &report, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -131,7 +131,7 @@ supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine
 cleanup:
   supine_projection_free(&made);
   free(force);
-  supine_equilibrium_destroy(equilibrium);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
   return status;
 }

@@ -39,8 +39,8 @@ static supine_status gram_matrix(const supine_projection *projection, const doub
   return SUPINE_OK;
 }
 
-supine_status supine_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
-                                        double *vectors) {
+supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, size_t count,
+                                                   double *values, double *vectors) {
   lapack_int found = 0;
   lapack_int *support = malloc(2 * n * sizeof *support);
   double *rising = malloc(n * count * sizeof *rising);
@@ -78,7 +78,7 @@ static supine_status factored_modes(const supine_projection *projection, double 
   if (vectors == NULL || reduced == NULL) {
     goto cleanup;
   }
-  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  status = supine_projection_leading_eigenpairs(rank, gram, rank, values, vectors);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -93,7 +93,7 @@ static supine_status factored_modes(const supine_projection *projection, double 
   for (size_t r = 0; r < rank; ++r) {
     *total += gram[r * rank + r];
   }
-  status = supine_leading_eigenpairs(rank, gram, rank, values, vectors);
+  status = supine_projection_leading_eigenpairs(rank, gram, rank, values, vectors);
   for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* A^T U_k / sigma_k */
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
@@ -112,7 +112,7 @@ static supine_status plain_modes(const supine_projection *projection, double *gr
   for (size_t r = 0; r < projection->rank; ++r) {
     *total += gram[r * projection->rank + r];
   }
-  return supine_leading_eigenpairs(projection->rank, gram, count, values, modes);
+  return supine_projection_leading_eigenpairs(projection->rank, gram, count, values, modes);
 }
 
 /* mix = functions x modes^T, [R, K]. */
@@ -132,9 +132,10 @@ static void find_mix(const supine_projection *projection, supine_compression *ma
   }
 }
 
-supine_status supine_compress_modes(const supine_projection *projection, const double *weight,
-                                    size_t mode_max, supine_compression *compression,
-                                    double *singular, double *total, supine_error *error) {
+supine_status supine_projection_compress_modes(const supine_projection *projection,
+                                               const double *weight, size_t mode_max,
+                                               supine_compression *compression, double *singular,
+                                               double *total, supine_error *error) {
   const size_t rank = projection->rank;
   const size_t terms = supine_sh_count(projection->band);
   const size_t most = mode_max < rank ? mode_max : rank;
@@ -170,14 +171,14 @@ supine_status supine_compress_modes(const supine_projection *projection, const d
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
     goto cleanup;
   }
-  status = supine_compression_create(projection, count, &made);
+  status = supine_projection_compression_create(projection, count, &made);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu modes", count);
     goto cleanup;
   }
   memcpy(made.modes, modes, count * terms * sizeof *modes);
   find_mix(projection, &made);
-  supine_compression_mix(projection, &made);
+  supine_projection_compression_mix(projection, &made);
   for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
     singular[k] = k < count ? sqrt(values[k]) : 0.0;
   }

@@ -38,16 +38,16 @@ typedef bool supine_progress_function(void *context, double fraction);
  * @param stiffness  [N] or NULL
  * @retval SUPINE_ERROR_ARGUMENT  soften is not 0, a band above SUPINE_SH_BAND_MAX, bad stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_project_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, size_t band,
-                                    supine_projection *projection, supine_error *error);
+supine_status supine_projection_linear(const supine_lungs *lungs, const supine_force_law *law,
+                                       const double *stiffness, size_t band,
+                                       supine_projection *projection, supine_error *error);
 
 /** The same with a rule of latitudes x longitudes directions instead of the default, which is eight
  * times finer than the band. */
-supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
-                                         const double *stiffness, size_t band, size_t latitudes,
-                                         size_t longitudes, supine_projection *projection,
-                                         supine_error *error);
+supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
+                                            const double *stiffness, size_t band, size_t latitudes,
+                                            size_t longitudes, supine_projection *projection,
+                                            supine_error *error);
 
 /** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
  * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
@@ -56,10 +56,10 @@ supine_status supine_project_linear_rule(const supine_lungs *lungs, const supine
  * @param progress   optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_project_sampled(const supine_lungs *lungs, const supine_force_law *law,
-                                     const double *stiffness, size_t band, double tolerance,
-                                     supine_progress_function *progress, void *context,
-                                     supine_projection *projection, supine_error *error);
+supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_force_law *law,
+                                        const double *stiffness, size_t band, double tolerance,
+                                        supine_progress_function *progress, void *context,
+                                        supine_projection *projection, supine_error *error);
 
 /** Most functions of orientation that a basis is made with. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
@@ -75,13 +75,14 @@ typedef struct supine_compression {
   double *mix;         /**< [R, K]: coefficients = columns x mix */
 } supine_compression;
 
-void supine_compression_free(supine_compression *compression);
+void supine_projection_compression_free(supine_compression *compression);
 
 /** The harmonics themselves as modes: K = (band + 1)^2, the paper's form.
  * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_compress_harmonics(const supine_projection *projection,
-                                        supine_compression *compression, supine_error *error);
+supine_status supine_projection_compress_harmonics(const supine_projection *projection,
+                                                   supine_compression *compression,
+                                                   supine_error *error);
 
 /** The best functions of orientation: the leading right singular vectors of the weighted
  * coefficient matrix, from the Gram matrix of the columns.
@@ -93,12 +94,14 @@ supine_status supine_compress_harmonics(const supine_projection *projection,
  * optional
  * @param total      sum of the squares of all singular values; optional
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (the field is zero) */
-supine_status supine_compress_modes(const supine_projection *projection, const double *weight,
-                                    size_t mode_max, supine_compression *compression,
-                                    double *singular, double *total, supine_error *error);
+supine_status supine_projection_compress_modes(const supine_projection *projection,
+                                               const double *weight, size_t mode_max,
+                                               supine_compression *compression, double *singular,
+                                               double *total, supine_error *error);
 
 /** Keeps the first `count` modes of a compression whose projection had `rank` columns. */
-void supine_compression_truncate(supine_compression *compression, size_t rank, size_t count);
+void supine_projection_compression_truncate(supine_compression *compression, size_t rank,
+                                            size_t count);
 
 #ifdef __cplusplus
 }

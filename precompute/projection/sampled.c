@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "sh/base/parallel.h"
-#include <supine/sh.h>
 #include "sh/transform.h"
+#include <supine/sh.h>
 
 #include "precompute/projection/sampled.h"
 
@@ -23,13 +23,13 @@ struct supine_sampler {
   double **softened;               /* [N] one a thread */
 };
 
-void supine_sampler_destroy(supine_sampler *sampler) {
+void supine_projection_sampler_destroy(supine_sampler *sampler) {
   if (sampler == NULL) {
     return;
   }
   for (size_t t = 0; t < sampler->threads; ++t) {
     if (sampler->equilibria != NULL) {
-      supine_equilibrium_destroy(sampler->equilibria[t]);
+      supine_physics_equilibrium_destroy(sampler->equilibria[t]);
     }
     if (sampler->force != NULL) {
       free(sampler->force[t]);
@@ -41,13 +41,14 @@ void supine_sampler_destroy(supine_sampler *sampler) {
   free(sampler->equilibria);
   free(sampler->force);
   free(sampler->softened);
-  supine_network_destroy(sampler->network);
+  supine_physics_network_destroy(sampler->network);
   free(sampler);
 }
 
-supine_status supine_sampler_create(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, double tolerance,
-                                    supine_sampler **sampler, supine_error *error) {
+supine_status supine_projection_sampler_create(const supine_lungs *lungs,
+                                               const supine_force_law *law, const double *stiffness,
+                                               double tolerance, supine_sampler **sampler,
+                                               supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_sampler *made = calloc(1, sizeof *made);
   *sampler = NULL;
@@ -63,15 +64,16 @@ supine_status supine_sampler_create(const supine_lungs *lungs, const supine_forc
   made->force = calloc(made->threads, sizeof(double *));
   made->softened = calloc(made->threads, sizeof(double *));
   bool whole = made->equilibria != NULL && made->force != NULL && made->softened != NULL &&
-               supine_lungs_network(lungs, &made->network) == SUPINE_OK;
+               supine_physics_lungs_network(lungs, &made->network) == SUPINE_OK;
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < made->threads && whole; ++t) {
     made->force[t] = malloc(n * sizeof(double));
     made->softened[t] = malloc(n * sizeof(double));
-    whole = made->force[t] != NULL && made->softened[t] != NULL &&
-            supine_equilibrium_create(made->network, 1, 1, &made->equilibria[t]) == SUPINE_OK;
+    whole =
+        made->force[t] != NULL && made->softened[t] != NULL &&
+        supine_physics_equilibrium_create(made->network, 1, 1, &made->equilibria[t]) == SUPINE_OK;
     if (whole) { /* stays so unless the law softens; also finds bad stiffness before the work */
-      status = supine_equilibrium_set_stiffness(made->equilibria[t], stiffness, error);
+      status = supine_physics_equilibrium_set_stiffness(made->equilibria[t], stiffness, error);
       if (status != SUPINE_OK) {
         break;
       }
@@ -81,7 +83,7 @@ supine_status supine_sampler_create(const supine_lungs *lungs, const supine_forc
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to sample %zu vertices", n);
   }
   if (status != SUPINE_OK) {
-    supine_sampler_destroy(made);
+    supine_projection_sampler_destroy(made);
     return status;
   }
   *sampler = made;
@@ -108,20 +110,20 @@ static void sample_range(void *context, size_t begin, size_t end, size_t thread)
   for (size_t d = begin; d < end && work->statuses[thread] == SUPINE_OK; ++d) {
     const double *g = work->directions + 3 * d;
     if (sampler->law->soften != 0.0) {
-      supine_force_stiffness(sampler->lungs, sampler->law, sampler->stiffness, g, work->minimum[d],
-                             work->maximum[d], sampler->softened[thread]);
-      work->statuses[thread] = supine_equilibrium_set_stiffness(
+      supine_physics_force_stiffness(sampler->lungs, sampler->law, sampler->stiffness, g,
+                                     work->minimum[d], work->maximum[d], sampler->softened[thread]);
+      work->statuses[thread] = supine_physics_equilibrium_set_stiffness(
           equilibrium, sampler->softened[thread], &work->errors[thread]);
       if (work->statuses[thread] != SUPINE_OK) {
         return;
       }
     }
-    supine_force(sampler->lungs, sampler->law, g, work->minimum[d], work->maximum[d],
-                 sampler->force[thread]);
+    supine_physics_force(sampler->lungs, sampler->law, g, work->minimum[d], work->maximum[d],
+                         sampler->force[thread]);
     supine_solve_report report;
-    work->statuses[thread] =
-        supine_equilibrium_solve(equilibrium, 1, sampler->force[thread], sampler->tolerance,
-                                 d > begin, work->fields + d * n, &report, &work->errors[thread]);
+    work->statuses[thread] = supine_physics_equilibrium_solve(
+        equilibrium, 1, sampler->force[thread], sampler->tolerance, d > begin, work->fields + d * n,
+        &report, &work->errors[thread]);
     supine_solve_report *worst = &work->worst[thread];
     worst->iterations =
         report.iterations > worst->iterations ? report.iterations : worst->iterations;
@@ -129,9 +131,9 @@ static void sample_range(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
-supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const double *directions,
-                                   double *fields, supine_solve_report *worst,
-                                   supine_error *error) {
+supine_status supine_projection_sampler_solve(supine_sampler *sampler, size_t count,
+                                              const double *directions, double *fields,
+                                              supine_solve_report *worst, supine_error *error) {
   if (sampler == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there is no sampler");
   }
@@ -142,7 +144,7 @@ supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const 
   supine_error *errors = calloc(threads, sizeof *errors);
   supine_solve_report *reports = calloc(threads, sizeof *reports);
   if (range == NULL || statuses == NULL || errors == NULL || reports == NULL ||
-      supine_height_range(&sampler->lungs->mesh, count, directions, range, range + count) !=
+      supine_physics_height_range(&sampler->lungs->mesh, count, directions, range, range + count) !=
           SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu directions", count);
     goto cleanup;
@@ -168,10 +170,10 @@ cleanup:
   return status;
 }
 
-supine_status supine_project_sampled(const supine_lungs *lungs, const supine_force_law *law,
-                                     const double *stiffness, size_t band, double tolerance,
-                                     supine_progress_function *progress, void *context,
-                                     supine_projection *projection, supine_error *error) {
+supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_force_law *law,
+                                        const double *stiffness, size_t band, double tolerance,
+                                        supine_progress_function *progress, void *context,
+                                        supine_projection *projection, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const size_t terms = supine_sh_count(band);
   supine_projection made = {.vertex_count = n, .band = band, .rank = terms};
@@ -181,7 +183,8 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
   double *directions = NULL;
   double *ring = NULL;
   supine_solve_report worst = {0};
-  supine_status status = supine_sampler_create(lungs, law, stiffness, tolerance, &sampler, error);
+  supine_status status =
+      supine_projection_sampler_create(lungs, law, stiffness, tolerance, &sampler, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -219,7 +222,8 @@ supine_status supine_project_sampled(const supine_lungs *lungs, const supine_for
     for (size_t k = 0; k < grid->longitudes; ++k) {
       supine_sh_grid_direction(grid, j, k, directions + 3 * k);
     }
-    status = supine_sampler_solve(sampler, grid->longitudes, directions, ring, &worst, error);
+    status =
+        supine_projection_sampler_solve(sampler, grid->longitudes, directions, ring, &worst, error);
     if (status == SUPINE_OK) {
       status = supine_sh_forward_ring(plan, &batch, j, ring, made.columns, error);
     }
@@ -235,7 +239,7 @@ cleanup:
   supine_projection_free(&made);
   supine_sh_transform_destroy(plan);
   supine_sh_grid_destroy(grid);
-  supine_sampler_destroy(sampler);
+  supine_projection_sampler_destroy(sampler);
   free(directions);
   free(ring);
   return status;

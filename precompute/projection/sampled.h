@@ -9,14 +9,16 @@
 typedef struct supine_sampler supine_sampler;
 
 /* The arguments must outlive the sampler. tolerance: relative residual, 0: the solver's default. */
-supine_status supine_sampler_create(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, double tolerance,
-                                    supine_sampler **sampler, supine_error *error);
-void supine_sampler_destroy(supine_sampler *sampler);
+supine_status supine_projection_sampler_create(const supine_lungs *lungs,
+                                               const supine_force_law *law, const double *stiffness,
+                                               double tolerance, supine_sampler **sampler,
+                                               supine_error *error);
+void supine_projection_sampler_destroy(supine_sampler *sampler);
 
 /* F for unit directions [count, 3] into fields [count, N]; `worst` (optional) is raised to the most
  * iterations and the largest residual. */
-supine_status supine_sampler_solve(supine_sampler *sampler, size_t count, const double *directions,
-                                   double *fields, supine_solve_report *worst, supine_error *error);
+supine_status supine_projection_sampler_solve(supine_sampler *sampler, size_t count,
+                                              const double *directions, double *fields,
+                                              supine_solve_report *worst, supine_error *error);
 
 #endif

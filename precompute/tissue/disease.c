@@ -19,8 +19,8 @@ static bool positive(double value) {
   return value > 0.0 && isfinite(value);
 }
 
-supine_status supine_lungs_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
-                                      size_t *reached, supine_error *error) {
+supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
+                                       size_t *reached, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double *c = lesion->centre;
   if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) || !positive(lesion->radius) ||
@@ -55,8 +55,8 @@ supine_status supine_lungs_add_lesion(supine_lungs *lungs, const supine_lesion *
   return SUPINE_OK;
 }
 
-supine_status supine_lungs_collapse(supine_lungs *lungs, size_t lung, double share,
-                                    supine_error *error) {
+supine_status supine_tissue_collapse(supine_lungs *lungs, size_t lung, double share,
+                                     supine_error *error) {
   if (lung >= lungs->lung_count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
                             lungs->lung_count);
@@ -99,7 +99,7 @@ static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) 
   }
 }
 
-void supine_lungs_rest(const supine_lungs *lungs, double *vertices) {
+void supine_tissue_rest(const supine_lungs *lungs, double *vertices) {
   memcpy(vertices, lungs->mesh.vertices, 3 * lungs->mesh.vertex_count * sizeof *vertices);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (lungs->share[lung] == 1.0) {
@@ -116,7 +116,7 @@ void supine_lungs_rest(const supine_lungs *lungs, double *vertices) {
   }
 }
 
-void supine_lungs_rest_directions(const supine_lungs *lungs, double *directions) {
+void supine_tissue_rest_directions(const supine_lungs *lungs, double *directions) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (lungs->share[lung] == 1.0) {
       continue;

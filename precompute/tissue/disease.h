@@ -34,8 +34,8 @@ typedef struct supine_lesion {
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *                                positive and finite
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_lungs_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
-                                      size_t *reached, supine_error *error);
+supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
+                                       size_t *reached, supine_error *error);
 
 /** Collapses a lung (pneumothorax) to a share of its volume and of its breath.
  *
@@ -51,15 +51,15 @@ supine_status supine_lungs_add_lesion(supine_lungs *lungs, const supine_lesion *
  * @param lung   0 to lung_count - 1
  * @param share  0 < share <= 1; 1 changes nothing
  * @retval SUPINE_ERROR_ARGUMENT */
-supine_status supine_lungs_collapse(supine_lungs *lungs, size_t lung, double share,
-                                    supine_error *error);
+supine_status supine_tissue_collapse(supine_lungs *lungs, size_t lung, double share,
+                                     supine_error *error);
 
 /** The surface at rest, [N, 3] mm: the healthy lungs' with collapsed ones drawn together. `mesh` of
  * the lungs itself keeps the healthy shape, which forces, heights and links are taken from. */
-void supine_lungs_rest(const supine_lungs *lungs, double *vertices);
+void supine_tissue_rest(const supine_lungs *lungs, double *vertices);
 
 /** Turns directions d [N, 3] of the healthy shape into those of the surface at rest, in place. */
-void supine_lungs_rest_directions(const supine_lungs *lungs, double *directions);
+void supine_tissue_rest_directions(const supine_lungs *lungs, double *directions);
 
 #ifdef __cplusplus
 }

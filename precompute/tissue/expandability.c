@@ -8,9 +8,9 @@ static bool positive(double value) {
   return value > 0.0 && isfinite(value);
 }
 
-supine_status supine_expandability_regional(const supine_lungs *lungs,
-                                            const supine_expandability_law *law, double *a,
-                                            supine_error *error) {
+supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
+                                                   const supine_expandability_law *law, double *a,
+                                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   if (law->shape == SUPINE_EXPANDABILITY_UNIFORM) {
     for (size_t i = 0; i < n; ++i) {
@@ -36,8 +36,8 @@ supine_status supine_expandability_regional(const supine_lungs *lungs,
   return SUPINE_OK;
 }
 
-supine_status supine_expandability_stiffness(size_t count, const double *a, double *stiffness,
-                                             supine_error *error) {
+supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,
+                                                    double *stiffness, supine_error *error) {
   for (size_t i = 0; i < count; ++i) {
     if (!positive(a[i]) || !positive(1.0 / a[i])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

@@ -32,9 +32,9 @@ typedef struct supine_expandability_law {
 
 /** a [N] of a regional model.
  * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or an end that is not positive */
-supine_status supine_expandability_regional(const supine_lungs *lungs,
-                                            const supine_expandability_law *law, double *a,
-                                            supine_error *error);
+supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
+                                                   const supine_expandability_law *law, double *a,
+                                                   supine_error *error);
 
 /** a [N] from a CSV file: a header line, then either one value a line in the model's order, or
  * `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin with
@@ -43,8 +43,8 @@ supine_status supine_expandability_regional(const supine_lungs *lungs,
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
  *                              or not in the model: the message names line and vertex
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_expandability_load(const char *path, size_t count, double *a,
-                                        supine_error *error);
+supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
+                                               supine_error *error);
 
 /** a of the model's vertices that a PLY file has, from a property of its vertices of any number
  * type; vertices are recognised by their position. For a model of several files: once for each.
@@ -58,15 +58,15 @@ supine_status supine_expandability_load(const char *path, size_t count, double *
  * @retval SUPINE_ERROR_FORMAT  not a PLY file, truncated, no such property, a value that is not
  *                              positive and finite (the file's vertex is named)
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_expandability_load_ply(const char *path, const char *property,
-                                            supine_axes axes, double millimetres_per_unit,
-                                            const supine_lungs *lungs, double *a,
-                                            supine_error *error);
+supine_status supine_tissue_expandability_load_ply(const char *path, const char *property,
+                                                   supine_axes axes, double millimetres_per_unit,
+                                                   const supine_lungs *lungs, double *a,
+                                                   supine_error *error);
 
 /** E = 1/a; `stiffness` may be `a`.
  * @retval SUPINE_ERROR_ARGUMENT  an a that is not positive and finite (vertex named) */
-supine_status supine_expandability_stiffness(size_t count, const double *a, double *stiffness,
-                                             supine_error *error);
+supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,
+                                                    double *stiffness, supine_error *error);
 
 #ifdef __cplusplus
 }

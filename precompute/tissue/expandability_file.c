@@ -96,8 +96,8 @@ static supine_status check_all_there(const reader *in) {
   return SUPINE_OK;
 }
 
-supine_status supine_expandability_load(const char *path, size_t count, double *a,
-                                        supine_error *error) {
+supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
+                                               supine_error *error) {
   reader in = {.path = path, .count = count, .a = a, .error = error};
   char *text = NULL;
   size_t capacity = 0;

@@ -258,10 +258,10 @@ static supine_status read_vertices(const ply_file *in, const supine_lungs *lungs
   return SUPINE_OK;
 }
 
-supine_status supine_expandability_load_ply(const char *path, const char *property,
-                                            supine_axes axes, double millimetres_per_unit,
-                                            const supine_lungs *lungs, double *a,
-                                            supine_error *error) {
+supine_status supine_tissue_expandability_load_ply(const char *path, const char *property,
+                                                   supine_axes axes, double millimetres_per_unit,
+                                                   const supine_lungs *lungs, double *a,
+                                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double unit = millimetres_per_unit > 0.0 ? millimetres_per_unit : 1.0;
   const double turn = axes == SUPINE_AXES_RAS ? -unit : unit; /* x and y point the other way */

@@ -126,8 +126,8 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-supine_status supine_basis_file_write(const char *path, const supine_basis_content *content,
-                                      supine_error *error) {
+supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
+                                        supine_error *error) {
   const supine_lungs *lungs = content->lungs;
   const supine_compression *field = content->compression;
   const size_t n = lungs->mesh.vertex_count;
@@ -141,12 +141,12 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
   if (rest != NULL) { /* the surface at rest, then its directions */
-    supine_lungs_rest(lungs, rest);
+    supine_tissue_rest(lungs, rest);
     vertices = to_float(rest, 3 * n);
   }
   if (rest != NULL && !vector) {
     memcpy(rest, content->directions, 3 * n * sizeof *rest);
-    supine_lungs_rest_directions(lungs, rest);
+    supine_tissue_rest_directions(lungs, rest);
     directions = to_float(rest, 3 * n);
   }
   if (list == NULL || vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
@@ -207,7 +207,8 @@ supine_status supine_basis_file_write(const char *path, const supine_basis_conte
     tensors[count++] =
         (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
   }
-  status = supine_safetensors_write(path, tensors, count, list->metadata, list->count, error);
+  status =
+      supine_writer_safetensors_write(path, tensors, count, list->metadata, list->count, error);
 cleanup:
   free(list);
   free(rest);

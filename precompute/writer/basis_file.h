@@ -16,14 +16,14 @@ typedef struct supine_basis_content {
   const supine_compression *compression;
   const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
-  const double *turned_over;       /* optional, see supine_turned_over */
+  const double *turned_over;       /* optional, see supine_accuracy_turned_over */
   const supine_error_table *table; /* optional */
   const char *route;               /* how the field was found */
   bool harmonics;                  /* the modes are the harmonics themselves */
   const char *made_by;             /* optional */
 } supine_basis_content;
 
-supine_status supine_basis_file_write(const char *path, const supine_basis_content *content,
-                                      supine_error *error);
+supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
+                                        supine_error *error);
 
 #endif

@@ -69,7 +69,7 @@ static const char *clean_copy(char **to, const char *text) {
   char *const begin = *to;
   size_t left = strlen(text);
   while (left > 0) {
-    const size_t length = supine_utf8_length(text, left);
+    const size_t length = supine_safetensors_utf8_length(text, left);
     const size_t step = length == 0 ? 1 : length;
     if (length == 0) {
       **to = '?';
@@ -91,7 +91,7 @@ static supine_status check_tensors(const supine_tensor *tensors, size_t count, c
     const supine_tensor *tensor = &tensors[i];
     size_t size = 0;
     if ((int)tensor->dtype < 0 || tensor->dtype >= SUPINE_DTYPE_COUNT || tensor->rank < 1 ||
-        tensor->rank > SUPINE_TENSOR_RANK_MAX || !supine_tensor_size(tensor, &size) ||
+        tensor->rank > SUPINE_TENSOR_RANK_MAX || !supine_safetensors_tensor_size(tensor, &size) ||
         __builtin_add_overflow(total, size, &total) || (tensor->data == NULL && size > 0)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "%s: tensor '%s': dtype, rank or size out of range", path,
@@ -144,7 +144,7 @@ static bool writer_open(writer *w, const supine_tensor *tensors, size_t tensor_c
   size_t placed = 0;
   for (size_t size = 8; size >= 1; size /= 2) { /* descending element size keeps all aligned */
     for (size_t i = 0; i < tensor_count; ++i) {
-      if (supine_dtype_size(tensors[i].dtype) == size) {
+      if (supine_safetensors_dtype_size(tensors[i].dtype) == size) {
         w->tensors[placed] = tensors[i];
         w->tensors[placed++].name = clean_copy(&to, tensors[i].name);
       }
@@ -176,11 +176,11 @@ static void put_header(writer *w, size_t tensor_count, size_t metadata_count) {
   for (size_t i = 0; i < tensor_count; ++i) {
     const supine_tensor *tensor = &w->tensors[i];
     size_t size = 0;
-    (void)supine_tensor_size(tensor, &size);
+    (void)supine_safetensors_tensor_size(tensor, &size);
     put_text(w, ",");
     put_string(w, tensor->name);
     put_text(w, ":{\"dtype\":");
-    put_string(w, supine_dtype_name(tensor->dtype));
+    put_string(w, supine_safetensors_dtype_name(tensor->dtype));
     put_text(w, ",\"shape\":[");
     for (size_t r = 0; r < tensor->rank; ++r) {
       put_text(w, r == 0 ? "" : ",");
@@ -199,9 +199,9 @@ static void put_header(writer *w, size_t tensor_count, size_t metadata_count) {
   }
 }
 
-supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
-                                       size_t tensor_count, const supine_metadata *metadata,
-                                       size_t metadata_count, supine_error *error) {
+supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
+                                              size_t tensor_count, const supine_metadata *metadata,
+                                              size_t metadata_count, supine_error *error) {
   writer w = {0};
   supine_output output = {0};
   supine_status status = check_tensors(tensors, tensor_count, path, error);
@@ -229,7 +229,7 @@ supine_status supine_safetensors_write(const char *path, const supine_tensor *te
   (void)fwrite(w.header, 1, w.size, output.file);
   for (size_t i = 0; i < tensor_count; ++i) {
     size_t size = 0;
-    (void)supine_tensor_size(&w.tensors[i], &size);
+    (void)supine_safetensors_tensor_size(&w.tensors[i], &size);
     if (size > 0) {
       (void)fwrite(w.tensors[i].data, 1, size, output.file);
     }

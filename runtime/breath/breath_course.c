@@ -39,7 +39,7 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   cross(unit, from, quarter);
 }
 
-void breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
+void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
   const double cosine = fmax(-1.0, fmin(1.0, dot(turn->from, turn->to)));
   if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
     memcpy(gravity, turn->to, 3 * sizeof *gravity);
@@ -53,32 +53,33 @@ void breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]
   }
 }
 
-void breath_course_free(breath_course *course) {
+void supine_breath_course_free(breath_course *course) {
   free(course->time);
   free(course->volume);
   free(course->gravity);
   *course = (breath_course){0};
 }
 
-supine_status breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
-                                   const breath_turn *turn, double rate, size_t count, size_t lungs,
-                                   breath_course *course, supine_error *error) {
+supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
+                                          const breath_turn *turn, double rate, size_t count,
+                                          size_t lungs, breath_course *course,
+                                          supine_error *error) {
   breath_course made = {.count = count, .lungs = lungs, .fixed = turn->seconds == 0.0};
   made.time = malloc(count * sizeof *made.time);
   made.volume = malloc(count * sizeof *made.volume);
   made.gravity = malloc(3 * count * sizeof *made.gravity);
   if (made.time == NULL || made.volume == NULL || made.gravity == NULL) {
-    breath_course_free(&made);
+    supine_breath_course_free(&made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
   }
   for (size_t i = 0; i < count; ++i) {
     made.time[i] = (double)i / rate;
-    breath_turn_gravity(turn, made.time[i], made.gravity + 3 * i);
+    supine_breath_turn_gravity(turn, made.time[i], made.gravity + 3 * i);
   }
   const supine_status status =
-      supine_pv_breath_evaluate(pv, breath, count, made.time, made.volume, NULL, error);
+      supine_breath_evaluate(pv, breath, count, made.time, made.volume, NULL, error);
   if (status != SUPINE_OK) {
-    breath_course_free(&made);
+    supine_breath_course_free(&made);
     return status;
   }
   *course = made;

@@ -14,7 +14,7 @@ typedef struct breath_turn {
 
 /* Gravity at a time: along the shorter arc; from a direction to its opposite over the left side, or
  * over the back where gravity begins along the body. */
-void breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
+void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
 /* All frames, of `lungs` lungs. */
 typedef struct breath_course {
@@ -26,10 +26,10 @@ typedef struct breath_course {
   double *gravity; /* [T, 3] */
 } breath_course;
 
-/* Frames 0 to `count` - 1 at `rate` a second; release with breath_course_free. */
-supine_status breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
-                                   const breath_turn *turn, double rate, size_t count, size_t lungs,
-                                   breath_course *course, supine_error *error);
-void breath_course_free(breath_course *course);
+/* Frames 0 to `count` - 1 at `rate` a second; release with supine_breath_course_free. */
+supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
+                                          const breath_turn *turn, double rate, size_t count,
+                                          size_t lungs, breath_course *course, supine_error *error);
+void supine_breath_course_free(breath_course *course);
 
 #endif

@@ -23,7 +23,7 @@ struct breath_frames {
   size_t stepped;
 };
 
-void breath_frames_destroy(breath_frames *frames) {
+void supine_breath_frames_destroy(breath_frames *frames) {
   if (frames != NULL) {
     free(frames->scale);
     free(frames->volumes);
@@ -121,8 +121,8 @@ static void find_runs(breath_frames *frames) {
   }
 }
 
-supine_status breath_frames_create(const supine_basis *basis, const breath_course *course,
-                                   breath_frames **frames, supine_error *error) {
+supine_status supine_breath_frames_create(const supine_basis *basis, const breath_course *course,
+                                          breath_frames **frames, supine_error *error) {
   const size_t count = course->count;
   breath_frames *made = calloc(1, sizeof *made);
   *frames = NULL;
@@ -136,12 +136,12 @@ supine_status breath_frames_create(const supine_basis *basis, const breath_cours
   made->run = calloc(count, sizeof *made->run);
   made->step = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *made->step);
   if (made->scale == NULL || made->volumes == NULL || made->run == NULL || made->step == NULL) {
-    breath_frames_destroy(made);
+    supine_breath_frames_destroy(made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
   }
   const supine_status status = find_scales(made, error);
   if (status != SUPINE_OK) {
-    breath_frames_destroy(made);
+    supine_breath_frames_destroy(made);
     return status;
   }
   find_runs(made);
@@ -172,7 +172,7 @@ static void place(breath_frames *frames, size_t t, float *xyz) {
   }
 }
 
-double breath_frames_next(breath_frames *frames, float *xyz) {
+double supine_breath_frames_next(breath_frames *frames, float *xyz) {
   const size_t t = frames->next++;
   const double begin = supine_clock_seconds();
   if (frames->run[t] == t) {
@@ -183,10 +183,10 @@ double breath_frames_next(breath_frames *frames, float *xyz) {
   return supine_clock_seconds() - begin;
 }
 
-const double *breath_frames_volumes(const breath_frames *frames) {
+const double *supine_breath_frames_volumes(const breath_frames *frames) {
   return frames->volumes;
 }
 
-size_t breath_frames_stepped(const breath_frames *frames) {
+size_t supine_breath_frames_stepped(const breath_frames *frames) {
   return frames->stepped;
 }

@@ -13,18 +13,18 @@ typedef struct breath_frames breath_frames;
 
 /* Finds every frame's breath scale and the runs. The arguments must outlive the frames.
  * SUPINE_ERROR_NUMERICAL: a volume that is out of reach, with the frame's time. */
-supine_status breath_frames_create(const supine_basis *basis, const breath_course *course,
-                                   breath_frames **frames, supine_error *error);
-void breath_frames_destroy(breath_frames *frames);
+supine_status supine_breath_frames_create(const supine_basis *basis, const breath_course *course,
+                                          breath_frames **frames, supine_error *error);
+void supine_breath_frames_destroy(breath_frames *frames);
 
 /* The next frame's positions into xyz [N, 3], which holds the frame before's: call once a frame, in
  * order. Returns the seconds that it took. */
-double breath_frames_next(breath_frames *frames, float *xyz);
+double supine_breath_frames_next(breath_frames *frames, float *xyz);
 
 /* Volume of each lung above rest, [T, G], mL. */
-const double *breath_frames_volumes(const breath_frames *frames);
+const double *supine_breath_frames_volumes(const breath_frames *frames);
 
 /* Frames that three additions a vertex made. */
-size_t breath_frames_stepped(const breath_frames *frames);
+size_t supine_breath_frames_stepped(const breath_frames *frames);
 
 #endif

@@ -67,7 +67,7 @@ typedef struct supine_pv {
 } supine_pv;
 
 /** "inhale" or "exhale"; never NULL. */
-const char *supine_pv_limb_name(supine_pv_limb limb);
+const char *supine_breath_limb_name(supine_pv_limb limb);
 
 /** The normal adult lung that stands in where nothing was measured, 0 to 30 cmH2O, 0 to 6000 mL.
  *
@@ -77,11 +77,11 @@ const char *supine_pv_limb_name(supine_pv_limb limb);
  * limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that Narusawa (J. Appl. Physiol. 91,
  * 2001, 201-210) found over published curves, but c and d are round numbers, no mean of measured
  * lungs. */
-const supine_pv *supine_pv_normal(void);
+const supine_pv *supine_breath_normal(void);
 
 /** Whether a limb's numbers are finite, its ranges rise and its parameters are within bounds.
  * @retval SUPINE_ERROR_ARGUMENT */
-supine_status supine_pv_curve_check(const supine_pv_curve *curve, supine_error *error);
+supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_error *error);
 
 /** V(P) and the compliance dV/dP: integrates the equation (GSL, Prince-Dormand 8(9)).
  *
@@ -91,17 +91,17 @@ supine_status supine_pv_curve_check(const supine_pv_curve *curve, supine_error *
  * @retval SUPINE_ERROR_ARGUMENT   a pressure outside the range, or not finite; a bad curve
  * @retval SUPINE_ERROR_NUMERICAL  the integration failed
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_pv_evaluate(const supine_pv_curve *curve, size_t count,
-                                 const double *pressures, double *volumes, double *compliances,
-                                 supine_error *error);
+supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t count,
+                                           const double *pressures, double *volumes,
+                                           double *compliances, supine_error *error);
 
-/** P(V), the inverse of supine_pv_evaluate; it exists for every limb.
+/** P(V), the inverse of supine_breath_curve_evaluate; it exists for every limb.
  *
  * @param volumes    [count] mL within the limb's range, in any order
  * @param pressures  [count] cmH2O, written
- * Statuses as supine_pv_evaluate. */
-supine_status supine_pv_invert(const supine_pv_curve *curve, size_t count, const double *volumes,
-                               double *pressures, supine_error *error);
+ * Statuses as supine_breath_curve_evaluate. */
+supine_status supine_breath_invert(const supine_pv_curve *curve, size_t count,
+                                   const double *volumes, double *pressures, supine_error *error);
 
 /** How well samples determine a limb. */
 typedef struct supine_pv_report {
@@ -144,9 +144,10 @@ typedef struct supine_pv_report {
  * @retval SUPINE_ERROR_ARGUMENT   confidence
  * @retval SUPINE_ERROR_NUMERICAL  no minimum was reached
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_pv_fit(size_t count, const double *pressures, const double *volumes,
-                            const size_t *lines, const char *name, double confidence,
-                            supine_pv_curve *curve, supine_pv_report *report, supine_error *error);
+supine_status supine_breath_fit(size_t count, const double *pressures, const double *volumes,
+                                const size_t *lines, const char *name, double confidence,
+                                supine_pv_curve *curve, supine_pv_report *report,
+                                supine_error *error);
 
 /** Samples of a lung as a file holds them. */
 typedef struct supine_pv_samples {
@@ -163,26 +164,27 @@ typedef struct supine_pv_samples {
  * @retval SUPINE_ERROR_READ    missing file
  * @retval SUPINE_ERROR_FORMAT  the message names the line
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_pv_samples_load(const char *path, supine_pv_samples *samples,
-                                     supine_error *error);
+supine_status supine_breath_samples_load(const char *path, supine_pv_samples *samples,
+                                         supine_error *error);
 
 /** Frees what load allocated; legal on a zeroed struct, and twice. */
-void supine_pv_samples_clear(supine_pv_samples *samples);
+void supine_breath_samples_clear(supine_pv_samples *samples);
 
 /** Fits both limbs. A limb without samples takes the other's curve.
  * @param reports  [SUPINE_PV_LIMB_COUNT] written; NULL: not wanted
- * Statuses as supine_pv_fit. */
-supine_status supine_pv_fit_samples(const supine_pv_samples *samples, double confidence,
-                                    supine_pv *pv, supine_pv_report *reports, supine_error *error);
+ * Statuses as supine_breath_fit. */
+supine_status supine_breath_fit_samples(const supine_pv_samples *samples, double confidence,
+                                        supine_pv *pv, supine_pv_report *reports,
+                                        supine_error *error);
 
 /** Writes parameters, whole or not at all: CSV, one row a limb, digits enough to read back the very
  * same numbers.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_ARGUMENT (a bad curve), SUPINE_ERROR_MEMORY */
-supine_status supine_pv_save(const char *path, const supine_pv *pv, supine_error *error);
+supine_status supine_breath_save(const char *path, const supine_pv *pv, supine_error *error);
 
-/** Reads what supine_pv_save wrote. Where a file has one limb alone it serves for both.
+/** Reads what supine_breath_save wrote. Where a file has one limb alone it serves for both.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
-supine_status supine_pv_load(const char *path, supine_pv *pv, supine_error *error);
+supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
 
 /** How pressure goes from rest to its peak and back. */
 typedef enum supine_pv_course {
@@ -203,7 +205,7 @@ typedef struct supine_pv_breath {
 } supine_pv_breath;
 
 /** 500 mL, 12 a minute, inhaling a third of the time, from 5 cmH2O, half cosines. */
-supine_pv_breath supine_pv_breath_default(void);
+supine_pv_breath supine_breath_default(void);
 
 /** Volume above rest, and pressure, at given times. A breath begins at time 0, at rest.
  *
@@ -221,9 +223,9 @@ supine_pv_breath supine_pv_breath_default(void);
  * @retval SUPINE_ERROR_ARGUMENT  a breath outside its documented ranges, a rest pressure outside a
  *                                limb, or a tidal volume or its peak pressure past a limb's end
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status supine_pv_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
-                                        size_t count, const double *times, double *volumes,
-                                        double *pressures, supine_error *error);
+supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
+                                     size_t count, const double *times, double *volumes,
+                                     double *pressures, supine_error *error);
 
 #ifdef __cplusplus
 }

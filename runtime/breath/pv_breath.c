@@ -5,7 +5,7 @@
 
 #include "runtime/breath/pv_internal.h"
 
-supine_pv_breath supine_pv_breath_default(void) {
+supine_pv_breath supine_breath_default(void) {
   return (supine_pv_breath){.tidal = 500.0,
                             .rate = 12.0,
                             .inhale_fraction = 1.0 / 3.0,
@@ -55,14 +55,14 @@ static supine_status limb_holds(const supine_pv *pv, const char *what, double pr
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const supine_pv_curve *curve = &pv->limb[limb];
-    const supine_status status = supine_pv_curve_check(curve, error);
+    const supine_status status = supine_breath_curve_check(curve, error);
     if (status != SUPINE_OK) {
       return status;
     }
     if (!(pressure >= curve->pressure[0] && pressure <= curve->pressure[1])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "%s pressure %g cmH2O is outside the %s limb's range, %g to %g cmH2O",
-                              what, pressure, supine_pv_limb_name((supine_pv_limb)limb),
+                              what, pressure, supine_breath_limb_name((supine_pv_limb)limb),
                               curve->pressure[0], curve->pressure[1]);
     }
   }
@@ -76,7 +76,7 @@ static supine_status loop_fill(const supine_pv *pv, const supine_pv_breath *brea
   cycle->rest = breath->rest_pressure;
   supine_status status = limb_holds(pv, "rest", cycle->rest, error);
   if (status == SUPINE_OK) {
-    status = supine_pv_evaluate(inhale, 1, &cycle->rest, &rest, NULL, error);
+    status = supine_breath_curve_evaluate(inhale, 1, &cycle->rest, &rest, NULL, error);
   }
   if (status != SUPINE_OK) {
     return status;
@@ -88,20 +88,20 @@ static supine_status loop_fill(const supine_pv *pv, const supine_pv_breath *brea
                             "above its volume at %g cmH2O",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
-  status = supine_pv_invert(inhale, 1, &full, &cycle->peak, error);
+  status = supine_breath_invert(inhale, 1, &full, &cycle->peak, error);
   if (status == SUPINE_OK) {
     status = limb_holds(pv, "peak", cycle->peak, error);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     const double pressures[2] = {cycle->rest, cycle->peak};
     double volumes[2] = {0.0, 0.0};
-    status = supine_pv_evaluate(&pv->limb[limb], 2, pressures, volumes, NULL, error);
+    status = supine_breath_curve_evaluate(&pv->limb[limb], 2, pressures, volumes, NULL, error);
     cycle->volume[limb] = volumes[0];
     cycle->gain[limb] = volumes[1] - volumes[0];
     if (status == SUPINE_OK && !(cycle->gain[limb] > 0.0)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL, "the %s limb is too flat between %g and %g cmH2O",
-          supine_pv_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
+          supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
     }
   }
   return status;
@@ -134,8 +134,9 @@ static supine_status breath_follow(const supine_pv *pv, const supine_pv_breath *
       given[used++] = between(begin + share * (end - begin), begin, end);
     }
   }
-  const supine_status status = flow ? supine_pv_invert(curve, used, given, found, error)
-                                    : supine_pv_evaluate(curve, used, given, found, NULL, error);
+  const supine_status status =
+      flow ? supine_breath_invert(curve, used, given, found, error)
+           : supine_breath_curve_evaluate(curve, used, given, found, NULL, error);
   used = 0;
   for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
     supine_pv_limb of = limb;
@@ -155,9 +156,9 @@ static supine_status breath_follow(const supine_pv *pv, const supine_pv_breath *
   return status;
 }
 
-supine_status supine_pv_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
-                                        size_t count, const double *times, double *volumes,
-                                        double *pressures, supine_error *error) {
+supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
+                                     size_t count, const double *times, double *volumes,
+                                     double *pressures, supine_error *error) {
   supine_status status = breath_check(breath, error);
   for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
     if (!isfinite(times[j])) {

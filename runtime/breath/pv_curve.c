@@ -7,18 +7,18 @@
 
 #include "runtime/breath/pv_internal.h"
 
-const char *supine_pv_limb_name(supine_pv_limb limb) {
+const char *supine_breath_limb_name(supine_pv_limb limb) {
   return limb == SUPINE_PV_INHALE ? "inhale" : limb == SUPINE_PV_EXHALE ? "exhale" : "unknown limb";
 }
 
-double supine_pv_normalise(const supine_pv_curve *curve, double pressure) {
+double supine_breath_normalise(const supine_pv_curve *curve, double pressure) {
   const double low = curve->pressure[0];
   const double high = curve->pressure[1];
   const double x = ((pressure - low) - (high - pressure)) / (high - low);
   return x < -1.0 ? -1.0 : x > 1.0 ? 1.0 : x;
 }
 
-supine_status supine_pv_curve_check(const supine_pv_curve *curve, supine_error *error) {
+supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_error *error) {
   const double pressures = curve->pressure[1] - curve->pressure[0];
   const double volumes = curve->volume[1] - curve->volume[0];
   if (!(pressures > 0.0) || !isfinite(pressures)) {
@@ -53,16 +53,16 @@ static supine_status curve_sort(const supine_pv_curve *curve, size_t count, cons
   }
   gsl_sort_index(order, pressures, 1, count);
   for (size_t j = 0; j < count; ++j) {
-    x[j] = supine_pv_normalise(curve, pressures[order[j]]);
+    x[j] = supine_breath_normalise(curve, pressures[order[j]]);
   }
   x[count] = 1.0;
   return SUPINE_OK;
 }
 
-supine_status supine_pv_evaluate(const supine_pv_curve *curve, size_t count,
-                                 const double *pressures, double *volumes, double *compliances,
-                                 supine_error *error) {
-  supine_status status = supine_pv_curve_check(curve, error);
+supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t count,
+                                           const double *pressures, double *volumes,
+                                           double *compliances, supine_error *error) {
+  supine_status status = supine_breath_curve_check(curve, error);
   if (status != SUPINE_OK || count == 0) {
     return status;
   }
@@ -77,7 +77,7 @@ supine_status supine_pv_evaluate(const supine_pv_curve *curve, size_t count,
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = supine_pv_integrate(curve->control, count + 1, x, PV_STATE, states);
+  status = supine_breath_integrate(curve->control, count + 1, x, PV_STATE, states);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "cannot integrate the pressure-volume equation");
     goto cleanup;

@@ -32,8 +32,8 @@ static int equation_derivative(double x, const double state[], double derivative
   return GSL_SUCCESS;
 }
 
-supine_status supine_pv_integrate(const double control[SUPINE_PV_CONTROLS], size_t count,
-                                  const double *x, size_t size, double *states) {
+supine_status supine_breath_integrate(const double control[SUPINE_PV_CONTROLS], size_t count,
+                                      const double *x, size_t size, double *states) {
   static const double first_step = 1e-3;
   static const double absolute = 1e-14;
   static const double relative = 1e-12;

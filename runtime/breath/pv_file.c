@@ -12,11 +12,11 @@ static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_l
                                supine_error *error) {
   const char *text = supine_csv_text(csv, column);
   *limb = SUPINE_PV_INHALE;
-  if (text == NULL || strcmp(text, supine_pv_limb_name(SUPINE_PV_INHALE)) == 0) {
+  if (text == NULL || strcmp(text, supine_breath_limb_name(SUPINE_PV_INHALE)) == 0) {
     return SUPINE_OK;
   }
   *limb = SUPINE_PV_EXHALE;
-  if (strcmp(text, supine_pv_limb_name(SUPINE_PV_EXHALE)) == 0) {
+  if (strcmp(text, supine_breath_limb_name(SUPINE_PV_EXHALE)) == 0) {
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -73,8 +73,8 @@ static supine_status samples_add(const supine_csv *csv, const char *const *names
   return status;
 }
 
-supine_status supine_pv_samples_load(const char *path, supine_pv_samples *samples,
-                                     supine_error *error) {
+supine_status supine_breath_samples_load(const char *path, supine_pv_samples *samples,
+                                         supine_error *error) {
   static const char *const names[] = {"pressure_cmH2O", "volume_mL", "limb"};
   *samples = (supine_pv_samples){0};
   supine_csv csv = {0};
@@ -99,12 +99,12 @@ supine_status supine_pv_samples_load(const char *path, supine_pv_samples *sample
 cleanup:
   supine_csv_close(&csv);
   if (status != SUPINE_OK) {
-    supine_pv_samples_clear(samples);
+    supine_breath_samples_clear(samples);
   }
   return status;
 }
 
-void supine_pv_samples_clear(supine_pv_samples *samples) {
+void supine_breath_samples_clear(supine_pv_samples *samples) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     free(samples->line[limb]);
     free(samples->volume[limb]);
@@ -114,8 +114,9 @@ void supine_pv_samples_clear(supine_pv_samples *samples) {
   *samples = (supine_pv_samples){0};
 }
 
-supine_status supine_pv_fit_samples(const supine_pv_samples *samples, double confidence,
-                                    supine_pv *pv, supine_pv_report *reports, supine_error *error) {
+supine_status supine_breath_fit_samples(const supine_pv_samples *samples, double confidence,
+                                        supine_pv *pv, supine_pv_report *reports,
+                                        supine_error *error) {
   supine_pv found = {0};
   supine_pv_report told[SUPINE_PV_LIMB_COUNT] = {{0}};
   int fitted = 0;
@@ -123,7 +124,7 @@ supine_status supine_pv_fit_samples(const supine_pv_samples *samples, double con
     if (samples->count[limb] == 0 && (fitted > 0 || limb + 1 < SUPINE_PV_LIMB_COUNT)) {
       continue;
     }
-    const supine_status status = supine_pv_fit(
+    const supine_status status = supine_breath_fit(
         samples->count[limb], samples->pressure[limb], samples->volume[limb], samples->line[limb],
         samples->name, confidence, &found.limb[limb], &told[limb], error);
     if (status != SUPINE_OK) {
@@ -155,9 +156,9 @@ static const char *const parameter_names[] = {"limb",
                                               "c5"};
 enum { PARAMETER_COUNT = sizeof parameter_names / sizeof *parameter_names };
 
-supine_status supine_pv_save(const char *path, const supine_pv *pv, supine_error *error) {
+supine_status supine_breath_save(const char *path, const supine_pv *pv, supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    const supine_status status = supine_pv_curve_check(&pv->limb[limb], error);
+    const supine_status status = supine_breath_curve_check(&pv->limb[limb], error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -177,8 +178,8 @@ supine_status supine_pv_save(const char *path, const supine_pv *pv, supine_error
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const supine_pv_curve *curve = &pv->limb[limb];
     (void)fprintf(output.file, "%s,%.17g,%.17g,%.17g,%.17g",
-                  supine_pv_limb_name((supine_pv_limb)limb), curve->pressure[0], curve->pressure[1],
-                  curve->volume[0], curve->volume[1]);
+                  supine_breath_limb_name((supine_pv_limb)limb), curve->pressure[0],
+                  curve->pressure[1], curve->volume[0], curve->volume[1]);
     for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
       (void)fprintf(output.file, ",%.17g", curve->control[i]);
     }
@@ -201,7 +202,7 @@ static supine_status parameters_add(const supine_csv *csv, supine_pv *pv, bool *
   }
   if (seen[limb]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a second row for %s", csv->path,
-                            csv->line, supine_pv_limb_name(limb));
+                            csv->line, supine_breath_limb_name(limb));
   }
   seen[limb] = true;
   supine_pv_curve *curve = &pv->limb[limb];
@@ -209,14 +210,14 @@ static supine_status parameters_add(const supine_csv *csv, supine_pv *pv, bool *
   memcpy(curve->volume, number + 3, sizeof curve->volume);
   memcpy(curve->control, number + 5, sizeof curve->control);
   supine_error why;
-  if (supine_pv_curve_check(curve, &why) != SUPINE_OK) {
+  if (supine_breath_curve_check(curve, &why) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %.300s", csv->path, csv->line,
                             why.message);
   }
   return SUPINE_OK;
 }
 
-supine_status supine_pv_load(const char *path, supine_pv *pv, supine_error *error) {
+supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error) {
   supine_pv found = {0};
   bool seen[SUPINE_PV_LIMB_COUNT] = {false};
   supine_csv csv = {0};

@@ -33,7 +33,7 @@ static int problem_evaluate(const gsl_vector *unknowns, problem *limb, gsl_vecto
       return GSL_SUCCESS;
     }
   }
-  limb->status = supine_pv_integrate(control, limb->count, limb->x, size, limb->states);
+  limb->status = supine_breath_integrate(control, limb->count, limb->x, size, limb->states);
   if (limb->status != SUPINE_OK) {
     return GSL_EFAILED;
   }
@@ -99,7 +99,7 @@ static void problem_fill(problem *limb, const double *pressures, const double *v
   const bool falling = pressures[last] < pressures[0];
   for (size_t j = 0; j < limb->count; ++j) {
     const size_t from = falling ? last - j : j;
-    limb->x[j] = supine_pv_normalise(curve, pressures[from]);
+    limb->x[j] = supine_breath_normalise(curve, pressures[from]);
     limb->v[j] = (volumes[from] - curve->volume[0]) / span;
   }
 }
@@ -122,17 +122,18 @@ static supine_status fit_curve(problem *limb, double span, double confidence,
     }
     curve->volume[0] = shift + span * found[LOW];
     curve->volume[1] = shift + span * found[HIGH];
-    status =
-        supine_pv_report_fill(gsl_multifit_nlinear_jac(work), gsl_multifit_nlinear_residual(work),
-                              span, confidence, report, sigma);
+    status = supine_breath_report_fill(gsl_multifit_nlinear_jac(work),
+                                       gsl_multifit_nlinear_residual(work), span, confidence,
+                                       report, sigma);
   }
   gsl_multifit_nlinear_free(work);
   return status;
 }
 
-supine_status supine_pv_fit(size_t count, const double *pressures, const double *volumes,
-                            const size_t *lines, const char *name, double confidence,
-                            supine_pv_curve *curve, supine_pv_report *report, supine_error *error) {
+supine_status supine_breath_fit(size_t count, const double *pressures, const double *volumes,
+                                const size_t *lines, const char *name, double confidence,
+                                supine_pv_curve *curve, supine_pv_report *report,
+                                supine_error *error) {
   enum { TELLING = 15 }; /* samples that let noise be estimated beside the unknowns */
   static const double allowed_share_few = 0.08;
   static const double allowed_share = 0.15;
@@ -142,14 +143,14 @@ supine_status supine_pv_fit(size_t count, const double *pressures, const double 
                             confidence);
   }
   const pv_origin origin = {name, lines, count, pressures, volumes};
-  supine_status status = supine_pv_samples_check(&origin, error);
+  supine_status status = supine_breath_samples_check(&origin, error);
   if (status != SUPINE_OK) {
     return status;
   }
   double span = 0.0;
   supine_pv_curve found = {0};
   supine_pv_report told = {0};
-  supine_pv_samples_range(&origin, &found, &span);
+  supine_breath_samples_range(&origin, &found, &span);
   double sigma = 0.0;
   problem limb = {.count = count,
                   .x = calloc(count, sizeof(double)),
@@ -160,8 +161,8 @@ supine_status supine_pv_fit(size_t count, const double *pressures, const double 
     goto cleanup;
   }
   problem_fill(&limb, pressures, volumes, &found, span);
-  status = supine_pv_check_falls(&origin, limb.v,
-                                 count < TELLING ? allowed_share_few : allowed_share, error);
+  status = supine_breath_check_falls(&origin, limb.v,
+                                     count < TELLING ? allowed_share_few : allowed_share, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -174,10 +175,10 @@ supine_status supine_pv_fit(size_t count, const double *pressures, const double 
     goto cleanup;
   }
   if (count >= TELLING) {
-    status = supine_pv_check_falls(&origin, limb.v, allowed_sigmas * sqrt(2.0) * sigma, error);
+    status = supine_breath_check_falls(&origin, limb.v, allowed_sigmas * sqrt(2.0) * sigma, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_pv_curve_check(&found, error);
+    status = supine_breath_curve_check(&found, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;

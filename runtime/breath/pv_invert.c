@@ -35,7 +35,7 @@ static void root_step(root *search, double target, double volume, double complia
 
 static supine_status invert_check(const supine_pv_curve *curve, size_t count, const double *volumes,
                                   supine_error *error) {
-  const supine_status status = supine_pv_curve_check(curve, error);
+  const supine_status status = supine_breath_curve_check(curve, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -49,8 +49,8 @@ static supine_status invert_check(const supine_pv_curve *curve, size_t count, co
   return SUPINE_OK;
 }
 
-supine_status supine_pv_invert(const supine_pv_curve *curve, size_t count, const double *volumes,
-                               double *pressures, supine_error *error) {
+supine_status supine_breath_invert(const supine_pv_curve *curve, size_t count,
+                                   const double *volumes, double *pressures, supine_error *error) {
   enum { STEPS_MAX = 200 };
   supine_status status = invert_check(curve, count, volumes, error);
   if (status != SUPINE_OK || count == 0) {
@@ -73,7 +73,7 @@ supine_status supine_pv_invert(const supine_pv_curve *curve, size_t count, const
   /* All pressures together, so that each step is one integration along the limb. */
   for (int step = 0, left = 1; left != 0; ++step) {
     status = step < STEPS_MAX
-                 ? supine_pv_evaluate(curve, count, pressures, volume, compliance, error)
+                 ? supine_breath_curve_evaluate(curve, count, pressures, volume, compliance, error)
                  : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                     "no pressure found for a volume of the limb");
     if (status != SUPINE_OK) {

@@ -2,7 +2,7 @@
 /* The normal adult lung. */
 #include "runtime/breath/pv_internal.h"
 
-const supine_pv *supine_pv_normal(void) {
+const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
       /* Fitted to a + b / (1 + exp(-(P - 10) / 6)), a and b such that it spans 0 to 6000 mL. */
       {{{0.0, 30.0},

@@ -49,9 +49,9 @@ static double residual_sigma(const gsl_vector *residual, gsl_vector *scratch) {
   return normal * median * sqrt((double)count / (double)(count - SUPINE_PV_UNKNOWNS));
 }
 
-supine_status supine_pv_report_fill(const gsl_matrix *jacobian, const gsl_vector *residual,
-                                    double span, double confidence, supine_pv_report *report,
-                                    double *sigma) {
+supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_vector *residual,
+                                        double span, double confidence, supine_pv_report *report,
+                                        double *sigma) {
   const size_t count = residual->size;
   gsl_matrix *covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS);
   gsl_vector *scratch = gsl_vector_alloc(count);

@@ -25,7 +25,7 @@ static supine_status sample_fail_fall(const pv_origin *origin, size_t j, double 
   return sample_fail(origin, j, error, why);
 }
 
-supine_status supine_pv_samples_check(const pv_origin *origin, supine_error *error) {
+supine_status supine_breath_samples_check(const pv_origin *origin, supine_error *error) {
   const char *name = origin->name != NULL ? origin->name : "samples";
   if (origin->count <= SUPINE_PV_UNKNOWNS) {
     return supine_error_set(
@@ -58,7 +58,7 @@ supine_status supine_pv_samples_check(const pv_origin *origin, supine_error *err
   return SUPINE_OK;
 }
 
-void supine_pv_samples_range(const pv_origin *origin, supine_pv_curve *curve, double *span) {
+void supine_breath_samples_range(const pv_origin *origin, supine_pv_curve *curve, double *span) {
   const size_t last = origin->count - 1;
   const size_t low = origin->pressures[0] < origin->pressures[last] ? 0 : last;
   double least = origin->volumes[0];
@@ -74,8 +74,8 @@ void supine_pv_samples_range(const pv_origin *origin, supine_pv_curve *curve, do
   *span = greatest - least;
 }
 
-supine_status supine_pv_check_falls(const pv_origin *origin, const double *v, double allowed,
-                                    supine_error *error) {
+supine_status supine_breath_check_falls(const pv_origin *origin, const double *v, double allowed,
+                                        supine_error *error) {
   const size_t last = origin->count - 1;
   const bool falling = origin->pressures[last] < origin->pressures[0];
   double peak = v[0];

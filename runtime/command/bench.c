@@ -46,7 +46,7 @@ static size_t parse_sizes(const char *text, size_t *sizes) {
     }
     memcpy(number, at, digits);
     number[digits] = '\0';
-    if (!supine_parse_count(number, &sizes[count]) || sizes[count] == 0) {
+    if (!supine_options_parse_count(number, &sizes[count]) || sizes[count] == 0) {
       return 0;
     }
     ++count;
@@ -92,7 +92,7 @@ static int measure(const supine_bench_options *options, bool json) {
   }
   if (supine_bench_run(options, NULL, json ? append_row : print_row, rows, &error) != SUPINE_OK) {
     json_decref(rows);
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   json_t *root = json_pack("{s:o}", "rows", rows);
   if (json) {
@@ -100,7 +100,7 @@ static int measure(const supine_bench_options *options, bool json) {
     (void)putchar('\n');
   }
   json_decref(root);
-  return supine_command_finish(name);
+  return supine_options_finish(name);
 }
 
 int supine_command_bench(int argc, char **argv) {
@@ -119,17 +119,17 @@ int supine_command_bench(int argc, char **argv) {
       wanted.vertices_count = parse_sizes(optarg, sizes);
       wanted.vertices = sizes;
       if (wanted.vertices_count == 0) {
-        return supine_command_usage(name, "--vertices takes numbers, N,N,...; not '%s'", optarg);
+        return supine_options_usage(name, "--vertices takes numbers, N,N,...; not '%s'", optarg);
       }
       break;
     case 't':
-      if (!supine_parse_count(optarg, &wanted.threads) || wanted.threads == 0) {
-        return supine_command_usage(name, "--threads takes a number from 1, not '%s'", optarg);
+      if (!supine_options_parse_count(optarg, &wanted.threads) || wanted.threads == 0) {
+        return supine_options_usage(name, "--threads takes a number from 1, not '%s'", optarg);
       }
       break;
     case 'r':
-      if (!supine_parse_count(optarg, &wanted.repeats) || wanted.repeats == 0) {
-        return supine_command_usage(name, "--repeats takes a number from 1, not '%s'", optarg);
+      if (!supine_options_parse_count(optarg, &wanted.repeats) || wanted.repeats == 0) {
+        return supine_options_usage(name, "--repeats takes a number from 1, not '%s'", optarg);
       }
       break;
     case 'j':
@@ -137,18 +137,18 @@ int supine_command_bench(int argc, char **argv) {
       break;
     case 'h':
       (void)fputs(help, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   wanted.like = basis;
   const int result = measure(&wanted, json);

@@ -132,9 +132,9 @@ static supine_status open_tensors(breath_output *made, supine_error *error) {
   return status;
 }
 
-supine_status breath_output_open(const char *path, const supine_mesh *rest,
-                                 const breath_course *course, breath_output **output,
-                                 supine_error *error) {
+supine_status supine_command_breath_output_open(const char *path, const supine_mesh *rest,
+                                                const breath_course *course, breath_output **output,
+                                                supine_error *error) {
   breath_output *made = calloc(1, sizeof *made);
   *output = NULL;
   if (made == NULL) {
@@ -150,14 +150,14 @@ supine_status breath_output_open(const char *path, const supine_mesh *rest,
     status = ends_in(path, ".safetensors") ? open_tensors(made, error) : open_series(made, error);
   }
   if (status != SUPINE_OK) {
-    breath_output_close(made);
+    supine_command_breath_output_close(made);
     return status;
   }
   *output = made;
   return SUPINE_OK;
 }
 
-void breath_output_close(breath_output *output) {
+void supine_command_breath_output_close(breath_output *output) {
   if (output == NULL) {
     return;
   }
@@ -178,7 +178,8 @@ static void frame_name(size_t frame, char name[FRAME_NAME_SIZE]) {
   (void)snprintf(name, FRAME_NAME_SIZE, "frame_%05zu.vtp", frame);
 }
 
-supine_status breath_output_add(breath_output *output, const float *xyz, supine_error *error) {
+supine_status supine_command_breath_output_add(breath_output *output, const float *xyz,
+                                               supine_error *error) {
   const size_t count = 3 * output->rest->vertex_count;
   const size_t frame = output->next++;
   if (output->positions != NULL) {
@@ -220,7 +221,7 @@ static supine_status write_index(const breath_output *output, const char *path, 
     frame_name(t, name);
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
                   output->course->time[t]);
-    supine_html_text(folder, file.file);
+    supine_report_html_text(folder, file.file);
     (void)fprintf(file.file, "%s%s\"/>\n", folder[0] == '\0' ? "" : "/", name);
   }
   (void)fputs("</Collection>\n</VTKFile>\n", file.file);
@@ -298,12 +299,12 @@ static supine_status commit_tensors(const breath_output *output, const double *v
                                       {"units", "mm, s, mL above rest"},
                                       {"axes", "LPS"},
                                       {"made_by", made_by}};
-  return supine_safetensors_write(output->path, tensors, sizeof tensors / sizeof *tensors, metadata,
-                                  sizeof metadata / sizeof *metadata, error);
+  return supine_writer_safetensors_write(output->path, tensors, sizeof tensors / sizeof *tensors,
+                                         metadata, sizeof metadata / sizeof *metadata, error);
 }
 
-supine_status breath_output_commit(breath_output *output, const double *volumes,
-                                   const char *made_by, supine_error *error) {
+supine_status supine_command_breath_output_commit(breath_output *output, const double *volumes,
+                                                  const char *made_by, supine_error *error) {
   return output->positions != NULL ? commit_tensors(output, volumes, made_by, error)
                                    : commit_series(output, volumes, error);
 }

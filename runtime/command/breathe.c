@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/options/basis_input.h"
 #include "runtime/breath/breath_frames.h"
 #include "runtime/command/breath_output.h"
+#include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
 
 static const char name[] = "breathe";
@@ -72,7 +72,7 @@ static int take_turn(request *wanted, const char *value) {
   colon[0] = strchr(text, ':');
   colon[1] = colon[0] == NULL ? NULL : strchr(colon[0] + 1, ':');
   if (strlen(value) >= sizeof text || colon[1] == NULL) {
-    return supine_command_usage(name, "--turn takes FROM:TO:SECONDS, not '%s'", value);
+    return supine_options_usage(name, "--turn takes FROM:TO:SECONDS, not '%s'", value);
   }
   *colon[0] = *colon[1] = '\0';
   char *seconds = colon[1] + 1;
@@ -80,20 +80,22 @@ static int take_turn(request *wanted, const char *value) {
   if (length > 0 && seconds[length - 1] == 's') {
     seconds[length - 1] = '\0';
   }
-  if (!supine_parse_number(seconds, &wanted->turn.seconds) || !(wanted->turn.seconds > 0.0)) {
-    return supine_command_usage(name, "--turn takes a time above 0 s, not '%s'", value);
+  if (!supine_options_parse_number(seconds, &wanted->turn.seconds) ||
+      !(wanted->turn.seconds > 0.0)) {
+    return supine_options_usage(name, "--turn takes a time above 0 s, not '%s'", value);
   }
   wanted->turns = true;
-  const int result = supine_orientation_posture(name, text, wanted->turn.from);
-  return result == SUPINE_EXIT_OK ? supine_orientation_posture(name, colon[0] + 1, wanted->turn.to)
-                                  : result;
+  const int result = supine_options_orientation_posture(name, text, wanted->turn.from);
+  return result == SUPINE_EXIT_OK
+             ? supine_options_orientation_posture(name, colon[0] + 1, wanted->turn.to)
+             : result;
 }
 
 static int take_positive(const char *option, const char *value, double *number) {
-  if (supine_parse_number(value, number) && *number > 0.0) {
+  if (supine_options_parse_number(value, number) && *number > 0.0) {
     return SUPINE_EXIT_OK;
   }
-  return supine_command_usage(name, "--%s takes a number above 0, not '%s'", option, value);
+  return supine_options_usage(name, "--%s takes a number above 0, not '%s'", option, value);
 }
 
 static int take_course(const char *value, supine_pv_course *course) {
@@ -104,7 +106,7 @@ static int take_course(const char *value, supine_pv_course *course) {
       return SUPINE_EXIT_OK;
     }
   }
-  return supine_command_usage(name, "--course takes cosine, ramp or flow, not '%s'", value);
+  return supine_options_usage(name, "--course takes cosine, ramp or flow, not '%s'", value);
 }
 
 enum { TURN = OPTION_ORIENTATION_END, TIDAL, RATE, INHALE, PV, REST, COURSE, STEP, FPS, SECONDS };
@@ -121,17 +123,17 @@ static int take(request *wanted, int option, const char *value) {
   case RATE:
     return take_positive("rate", value, &wanted->breath.rate);
   case INHALE:
-    if (!supine_parse_number(value, &wanted->breath.inhale_fraction) ||
+    if (!supine_options_parse_number(value, &wanted->breath.inhale_fraction) ||
         !(wanted->breath.inhale_fraction > 0.0 && wanted->breath.inhale_fraction < 1.0)) {
-      return supine_command_usage(name, "--inhale takes a share between 0 and 1, not '%s'", value);
+      return supine_options_usage(name, "--inhale takes a share between 0 and 1, not '%s'", value);
     }
     return SUPINE_EXIT_OK;
   case PV:
     wanted->pv = value;
     return SUPINE_EXIT_OK;
   case REST:
-    if (!supine_parse_number(value, &wanted->breath.rest_pressure)) {
-      return supine_command_usage(name, "--rest-pressure takes cmH2O, not '%s'", value);
+    if (!supine_options_parse_number(value, &wanted->breath.rest_pressure)) {
+      return supine_options_usage(name, "--rest-pressure takes cmH2O, not '%s'", value);
     }
     return SUPINE_EXIT_OK;
   case COURSE:
@@ -143,7 +145,7 @@ static int take(request *wanted, int option, const char *value) {
   case SECONDS:
     return take_positive("seconds", value, &wanted->seconds);
   default:
-    return supine_orientation_take(&wanted->orientation, name, option, value);
+    return supine_options_orientation_take(&wanted->orientation, name, option, value);
   }
 }
 
@@ -157,10 +159,11 @@ static int complete(request *wanted, size_t *count) {
     breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
   }
   if (wanted->turns && wanted->orientation.given) {
-    return supine_command_usage(name, "give --turn, or one posture, not both");
+    return supine_options_usage(name, "give --turn, or one posture, not both");
   }
   if (!wanted->turns) {
-    const int result = supine_orientation_finish(&wanted->orientation, name, wanted->turn.to);
+    const int result =
+        supine_options_orientation_finish(&wanted->orientation, name, wanted->turn.to);
     if (result != SUPINE_EXIT_OK) {
       return result;
     }
@@ -170,7 +173,7 @@ static int complete(request *wanted, size_t *count) {
   seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
   const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
   if (!(frames <= FRAMES_MAX)) {
-    return supine_command_usage(name, "%g s at %g frames a second are more than %d frames", seconds,
+    return supine_options_usage(name, "%g s at %g frames a second are more than %d frames", seconds,
                                 wanted->fps, FRAMES_MAX);
   }
   *count = (size_t)frames;
@@ -216,7 +219,7 @@ static void report(const request *wanted, const breath_course *course, const bre
                measured->peak, measured->worst);
   if (course->fixed) {
     (void)printf("one posture: %zu of the frames by three additions a vertex\n",
-                 breath_frames_stepped(frames));
+                 supine_breath_frames_stepped(frames));
   }
   (void)printf("compute time a frame: median %.3f ms, longest %.3f ms, of %.0f ms\n", 1e3 * median,
                1e3 * most, 1e3 * budget);
@@ -225,7 +228,7 @@ static void report(const request *wanted, const breath_course *course, const bre
 static supine_status play(const supine_basis *basis, const request *wanted, size_t count,
                           const char *made_by, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  supine_pv pv = *supine_pv_normal();
+  supine_pv pv = *supine_breath_normal();
   supine_mesh rest = {0};
   breath_course course = {0};
   breath_frames *frames = NULL;
@@ -235,49 +238,50 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   double *seconds = malloc(count * sizeof *seconds);
   supine_progress progress = {0};
   supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || supine_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+  if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
       gauge_begin(&rest, &measured) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
   }
   if (wanted->pv != NULL) {
-    status = supine_pv_load(wanted->pv, &pv, error);
+    status = supine_breath_load(wanted->pv, &pv, error);
   }
   if (status == SUPINE_OK) {
-    status = breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
-                                  info->lung_count, &course, error);
+    status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
+                                         info->lung_count, &course, error);
   }
   if (status == SUPINE_OK) {
-    status = breath_frames_create(basis, &course, &frames, error);
+    status = supine_breath_frames_create(basis, &course, &frames, error);
   }
   if (status == SUPINE_OK) {
-    status = breath_output_open(wanted->path, &rest, &course, &output, error);
+    status = supine_command_breath_output_open(wanted->path, &rest, &course, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_interrupts_catch();
-  progress = supine_progress_begin(name);
+  supine_options_interrupts_catch();
+  progress = supine_options_progress_begin(name);
   for (size_t t = 0; t < count && status == SUPINE_OK; ++t) {
-    seconds[t] = breath_frames_next(frames, xyz);
+    seconds[t] = supine_breath_frames_next(frames, xyz);
     gauge_frame(&measured, xyz, course.volume[t]);
-    status = breath_output_add(output, xyz, error);
-    if (!supine_progress_step(&progress, (double)(t + 1) / (double)count)) {
+    status = supine_command_breath_output_add(output, xyz, error);
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
   }
   if (status == SUPINE_OK) {
-    status = breath_output_commit(output, breath_frames_volumes(frames), made_by, error);
+    status = supine_command_breath_output_commit(output, supine_breath_frames_volumes(frames),
+                                                 made_by, error);
   }
-  supine_progress_end(&progress);
+  supine_options_progress_end(&progress);
   if (status == SUPINE_OK) {
     report(wanted, &course, frames, &measured, seconds);
   }
 cleanup:
-  breath_output_close(output);
-  breath_frames_destroy(frames);
-  breath_course_free(&course);
+  supine_command_breath_output_close(output);
+  supine_breath_frames_destroy(frames);
+  supine_breath_course_free(&course);
   supine_mesh_free(&rest);
   free(measured.mesh.vertices);
   free(xyz);
@@ -300,20 +304,20 @@ int supine_command_breathe(int argc, char **argv) {
                                           SUPINE_ORIENTATION_OPTIONS,
                                           {"help", no_argument, NULL, 'h'},
                                           {NULL, 0, NULL, 0}};
-  request wanted = {.breath = supine_pv_breath_default(), .fps = 66.66};
+  request wanted = {.breath = supine_breath_default(), .fps = 66.66};
   char made_by[512];
-  supine_command_describe(argc, argv, made_by, sizeof made_by);
+  supine_options_describe(argc, argv, made_by, sizeof made_by);
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
     if (option == 'h') {
       (void)fputs(help, stdout);
-      (void)fputs(supine_orientation_help, stdout);
+      (void)fputs(supine_options_orientation_help, stdout);
       (void)fputs(examples, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     }
     if (option == '?' || option == ':') {
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
     const int result = take(&wanted, option, optarg);
     if (result != SUPINE_EXIT_OK) {
@@ -321,10 +325,10 @@ int supine_command_breathe(int argc, char **argv) {
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   if (wanted.path == NULL) {
-    return supine_command_usage(name, "-o OUT is missing");
+    return supine_options_usage(name, "-o OUT is missing");
   }
   size_t count = 1;
   int result = complete(&wanted, &count);
@@ -343,7 +347,7 @@ int supine_command_breathe(int argc, char **argv) {
   if (status == SUPINE_OK) {
     status = play(basis, &wanted, count, made_by, &error);
   }
-  result = status == SUPINE_OK ? supine_command_finish(name) : supine_command_fail(name, &error);
+  result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   supine_basis_close(basis);
   return result;
 }

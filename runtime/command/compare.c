@@ -49,11 +49,11 @@ static int write_file(const char *path, const supine_comparison *comparison, wri
   supine_output output = {0};
   supine_error error;
   if (supine_output_open(path, &output, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   form(comparison, output.file);
   if (supine_output_commit(&output, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   return SUPINE_EXIT_OK;
 }
@@ -69,39 +69,39 @@ typedef struct request {
 static int compare(const char *path, const supine_basis *basis, const request *wanted) {
   supine_comparison comparison = {.path = path, .basis = basis, .inflation = wanted->inflation};
   supine_error error;
-  int result = supine_posture_list_parse(name, wanted->postures, &comparison.postures);
+  int result = supine_options_posture_list_parse(name, wanted->postures, &comparison.postures);
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
   if (wanted->inflation.kind == SUPINE_INFLATION_VOLUME &&
       !supine_basis_get_info(basis)->has_volume) {
-    supine_command_say(name,
+    supine_options_say(name,
                        "%s: the surface is open and encloses no volume: give --rms MM, or close "
                        "the mesh before 'supine precompute'",
                        path);
     return SUPINE_EXIT_INPUT;
   }
-  if (supine_comparison_find(&comparison, &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+  if (supine_report_find(&comparison, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  if (wanted->json && !supine_comparison_json(&comparison, stdout)) {
-    supine_command_say(name, "cannot print JSON");
+  if (wanted->json && !supine_report_json(&comparison, stdout)) {
+    supine_options_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
   if (!wanted->json) {
-    supine_comparison_text(&comparison, stdout);
+    supine_report_text(&comparison, stdout);
   }
-  result = supine_command_finish(name);
+  result = supine_options_finish(name);
   if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
-    result = write_file(wanted->csv, &comparison, supine_comparison_csv);
+    result = write_file(wanted->csv, &comparison, supine_report_csv);
   }
   if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
-    result = write_file(wanted->html, &comparison, supine_comparison_html);
+    result = write_file(wanted->html, &comparison, supine_report_html);
   }
 cleanup:
-  supine_comparison_free(&comparison);
+  supine_report_free(&comparison);
   return result;
 }
 
@@ -134,8 +134,8 @@ int supine_command_compare(int argc, char **argv) {
     case RMS:
       ++inflations;
       wanted.inflation.kind = option == RMS ? SUPINE_INFLATION_RMS : SUPINE_INFLATION_VOLUME;
-      if (!supine_parse_number(optarg, &wanted.inflation.amount)) {
-        return supine_command_usage(name, "--%s takes %s, not '%s'",
+      if (!supine_options_parse_number(optarg, &wanted.inflation.amount)) {
+        return supine_options_usage(name, "--%s takes %s, not '%s'",
                                     option == RMS ? "rms" : "volume",
                                     option == RMS ? "millimetres" : "millilitres", optarg);
       }
@@ -151,26 +151,26 @@ int supine_command_compare(int argc, char **argv) {
       break;
     case 'h':
       (void)fputs(help, stdout);
-      (void)fputs(supine_posture_list_help, stdout);
+      (void)fputs(supine_options_posture_list_help, stdout);
       (void)fputs(notes, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   if (inflations > 1) {
-    return supine_command_usage(name, "give --volume or --rms, once");
+    return supine_options_usage(name, "give --volume or --rms, once");
   }
   if (wanted.html != NULL && !ends_in_html(wanted.html)) {
-    return supine_command_usage(name, "%s: the report's name must end in .html", wanted.html);
+    return supine_options_usage(name, "%s: the report's name must end in .html", wanted.html);
   }
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   const int result = compare(argv[optind], basis, &wanted);
   supine_basis_close(basis);

@@ -71,18 +71,18 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
                        const supine_mesh *rest, supine_mesh *mesh, double *scales) {
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   if (!wanted->has_scale) {
-    return supine_basis_volume_scales(basis, name, weights, wanted->volume, scales);
+    return supine_options_basis_volume_scales(basis, name, weights, wanted->volume, scales);
   }
   for (size_t j = 0; j < lungs; ++j) {
     scales[j] = 1.0;
   }
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   if (deformed_mesh(basis, weights, scales, mesh) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   const double largest = largest_displacement(rest, mesh);
   if (!(largest > 0.0)) {
-    supine_command_say(name, "nothing moves in this direction: no scale gives %g mm",
+    supine_options_say(name, "nothing moves in this direction: no scale gives %g mm",
                        wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
@@ -100,10 +100,10 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   supine_mesh mesh = {0};
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   int result = SUPINE_EXIT_OK;
-  if (supine_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
-      supine_basis_rest_mesh(basis, &mesh) != SUPINE_OK ||
+  if (supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+      supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK ||
       supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+    result = supine_options_fail(name, &error);
     goto cleanup;
   }
   result = find_scales(basis, wanted, weights, &rest, &mesh, scales);
@@ -113,7 +113,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   const supine_mesh_save_options save = {.rest = rest.vertices};
   if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK ||
       supine_mesh_save(wanted->path, &mesh, &save, &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+    result = supine_options_fail(name, &error);
     goto cleanup;
   }
   (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->path, gravity[0],
@@ -122,7 +122,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     (void)printf(", %+.2f mL", 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest)));
   }
   (void)putchar('\n');
-  result = supine_command_finish(name);
+  result = supine_options_finish(name);
 cleanup:
   supine_mesh_free(&rest);
   supine_mesh_free(&mesh);
@@ -148,44 +148,44 @@ int supine_command_deform(int argc, char **argv) {
       wanted.volume = optarg;
       break;
     case SCALE:
-      wanted.has_scale = supine_parse_number(optarg, &wanted.scale);
+      wanted.has_scale = supine_options_parse_number(optarg, &wanted.scale);
       if (!wanted.has_scale) {
-        result = supine_command_usage(name, "--scale takes millimetres, not '%s'", optarg);
+        result = supine_options_usage(name, "--scale takes millimetres, not '%s'", optarg);
       }
       break;
     case OPTION_POSTURE:
     case OPTION_GRAVITY:
     case OPTION_QUATERNION:
     case OPTION_TILT:
-      result = supine_orientation_take(&wanted.orientation, name, option, optarg);
+      result = supine_options_orientation_take(&wanted.orientation, name, option, optarg);
       break;
     case 'h':
       (void)fputs(help, stdout);
-      (void)fputs(supine_orientation_help, stdout);
+      (void)fputs(supine_options_orientation_help, stdout);
       (void)fputs(examples, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
     if (result != SUPINE_EXIT_OK) {
       return result;
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   if (wanted.path == NULL) {
-    return supine_command_usage(name, "-o FILE is missing");
+    return supine_options_usage(name, "-o FILE is missing");
   }
   if (!supine_mesh_save_supports(wanted.path)) {
-    return supine_command_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
                                 wanted.path);
   }
   if (wanted.volume != NULL && wanted.has_scale) {
-    return supine_command_usage(name, "give --volume or --scale, not both");
+    return supine_options_usage(name, "give --volume or --scale, not both");
   }
   double gravity[3];
-  int result = supine_orientation_finish(&wanted.orientation, name, gravity);
+  int result = supine_options_orientation_finish(&wanted.orientation, name, gravity);
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
@@ -193,7 +193,7 @@ int supine_command_deform(int argc, char **argv) {
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open_with(argv[optind], &exact, &basis, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   result = deform(basis, &wanted, gravity);
   supine_basis_close(basis);

@@ -78,15 +78,15 @@ static int take_profile(const char *text, export_glb_options *glb) {
       return SUPINE_EXIT_OK;
     }
   }
-  const char *nearest = supine_suggest(text, names, NAMES);
-  return supine_command_usage(name, "no profile '%s'%s%s", text,
+  const char *nearest = supine_options_suggest(text, names, NAMES);
+  return supine_options_usage(name, "no profile '%s'%s%s", text,
                               nearest != NULL ? "; did you mean " : ": raw, 8 or clamp-safe",
                               nearest != NULL ? nearest : "");
 }
 
 static int take_depth(const char *option, const char *unit, const char *text, double *value) {
-  if (!supine_parse_number(text, value) || *value <= 0) {
-    return supine_command_usage(name, "--%s takes %s above 0, not '%s'", option, unit, text);
+  if (!supine_options_parse_number(text, value) || *value <= 0) {
+    return supine_options_usage(name, "--%s takes %s above 0, not '%s'", option, unit, text);
   }
   return SUPINE_EXIT_OK;
 }
@@ -94,8 +94,8 @@ static int take_depth(const char *option, const char *unit, const char *text, do
 static int write_glb(const export_source *source, const request *wanted) {
   export_glb_report report = {0};
   supine_error error;
-  if (export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+  if (supine_export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
   }
   (void)printf("%s: %zu morph targets%s, %.1f MB\n", wanted->path, report.targets,
                wanted->glb.animate ? " and an animation" : "", 1e-6 * (double)report.bytes);
@@ -103,7 +103,7 @@ static int write_glb(const export_source *source, const request *wanted) {
     (void)printf("  of %zu modes: leaves out %.3g %% of the RMS displacement\n",
                  source->info->mode_count, report.loss_percent);
   }
-  return supine_command_finish(name);
+  return supine_options_finish(name);
 }
 
 static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
@@ -112,26 +112,27 @@ static int write_page(const export_source *source, const request *wanted, const 
   const char *title = wanted->title != NULL ? wanted->title
                       : slash != NULL       ? slash + 1
                                             : basis_path;
-  if (export_html_write(wanted->path, source, &wanted->glb.breath, title, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+  if (supine_export_html_write(wanted->path, source, &wanted->glb.breath, title, &error) !=
+      SUPINE_OK) {
+    return supine_options_fail(name, &error);
   }
   (void)printf("%s: a page of %zu vertices; open it in any browser\n", wanted->path,
                source->info->vertex_count);
-  return supine_command_finish(name);
+  return supine_options_finish(name);
 }
 
 static int export_basis(const char *path, request *wanted) {
   export_source source = {0};
   supine_error error;
   int result = SUPINE_EXIT_OK;
-  if (export_source_open(path, &source, &error) != SUPINE_OK ||
-      export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath, &error) !=
-          SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+  if (supine_export_source_open(path, &source, &error) != SUPINE_OK ||
+      supine_export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath,
+                               &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
   } else {
     result = wanted->page ? write_page(&source, wanted, path) : write_glb(&source, wanted);
   }
-  export_source_close(&source);
+  supine_export_source_close(&source);
   return result;
 }
 
@@ -175,10 +176,10 @@ int supine_command_export(int argc, char **argv) {
   while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
     if (option == 'h') {
       (void)fputs(help, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     }
     if (option == '?' || option == ':') {
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
     const int result = take_option(&wanted, option, optarg);
     if (result != SUPINE_EXIT_OK) {
@@ -186,20 +187,20 @@ int supine_command_export(int argc, char **argv) {
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   if (wanted.path == NULL) {
-    return supine_command_usage(name, "-o FILE is missing");
+    return supine_options_usage(name, "-o FILE is missing");
   }
   wanted.page = ends_with(wanted.path, ".html") || ends_with(wanted.path, ".htm");
   if (!wanted.page && !ends_with(wanted.path, ".glb")) {
-    return supine_command_usage(name, "%s: the name must end in .html or .glb", wanted.path);
+    return supine_options_usage(name, "%s: the name must end in .html or .glb", wanted.path);
   }
   if (wanted.page && wanted.glb_only) {
-    return supine_command_usage(name, "--profile, --quantise and --animate are for .glb");
+    return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
   }
   if (!wanted.page && wanted.title != NULL) {
-    return supine_command_usage(name, "--title is for .html");
+    return supine_options_usage(name, "--title is for .html");
   }
   return export_basis(argv[optind], &wanted);
 }

@@ -183,7 +183,7 @@ static void print_table(const supine_safetensors *file) {
 
 static json_t *number_or_text(const char *text) {
   double value;
-  return supine_parse_number(text, &value) ? json_real(value) : json_string(text);
+  return supine_options_parse_number(text, &value) ? json_real(value) : json_string(text);
 }
 
 static bool print_json(const char *path, const supine_basis *basis, const supine_safetensors *file,
@@ -244,13 +244,13 @@ int supine_command_info(int argc, char **argv) {
       break;
     case 'h':
       (void)fputs(help, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
   }
   if (argc - optind != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   const char *path = argv[optind];
   supine_basis *basis = NULL;
@@ -260,17 +260,17 @@ int supine_command_info(int argc, char **argv) {
   double *energy = NULL;
   if (supine_basis_open(path, &basis, &error) != SUPINE_OK ||
       supine_safetensors_open(path, &file, &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+    result = supine_options_fail(name, &error);
     goto cleanup;
   }
   energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
   if (energy == NULL || !band_energy(file, supine_basis_get_info(basis), energy)) {
-    supine_command_say(name, "out of memory");
+    supine_options_say(name, "out of memory");
     result = SUPINE_EXIT_NUMERICAL;
     goto cleanup;
   }
   if (json && !print_json(path, basis, file, energy)) {
-    supine_command_say(name, "cannot print JSON");
+    supine_options_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
@@ -278,7 +278,7 @@ int supine_command_info(int argc, char **argv) {
     print_text(path, basis, energy);
     print_table(file);
   }
-  result = supine_command_finish(name);
+  result = supine_options_finish(name);
 cleanup:
   free(energy);
   supine_safetensors_close(file);

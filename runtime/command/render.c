@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/compare.h>
 #include "sh/base/output.h"
+#include <supine/compare.h>
 
-#include "runtime/render/render.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/posture_list.h"
+#include "runtime/render/render.h"
 
 static const char name[] = "render";
 
@@ -71,10 +71,11 @@ static int find_state(const supine_basis *basis, const supine_compare *compare,
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   supine_error error = {SUPINE_ERROR_NUMERICAL, "gravity has no direction"};
   if (supine_basis_weights(basis, item->gravity, found->weights) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   if (wanted->scale == 0.0) {
-    return supine_basis_volume_scales(basis, name, found->weights, wanted->volume, found->scales);
+    return supine_options_basis_volume_scales(basis, name, found->weights, wanted->volume,
+                                              found->scales);
   }
   supine_distance_statistics statistics;
   for (size_t lung = 0; lung < lungs; ++lung) {
@@ -83,7 +84,7 @@ static int find_state(const supine_basis *basis, const supine_compare *compare,
   supine_compare_distances(compare, found->weights, found->scales, NULL, NULL, distance);
   supine_compare_statistics(compare, distance, &statistics);
   if (!(statistics.max > 0.0)) {
-    supine_command_say(name, "nothing moves in %s: no scale gives %g mm", item->name,
+    supine_options_say(name, "nothing moves in %s: no scale gives %g mm", item->name,
                        wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
@@ -120,17 +121,17 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
   supine_output output = {0};
   supine_error error;
   if (supine_output_open(wanted->output, &output, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
-  if (supine_picture_write(renderer, picture, output.file, &error) != SUPINE_OK) {
+  if (supine_render_picture_write(renderer, picture, output.file, &error) != SUPINE_OK) {
     supine_output_abandon(&output);
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   if (supine_output_commit(&output, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   (void)printf("%s: %zu x %zu pixels\n", wanted->output, picture->width, picture->height);
-  return supine_command_finish(name);
+  return supine_options_finish(name);
 }
 
 static void choose_size(const request *wanted, supine_picture *picture) {
@@ -154,8 +155,8 @@ static int render(const supine_basis *basis, const request *wanted,
   float *values = malloc((count + 1) * n * sizeof *values);
   if (states == NULL || values == NULL ||
       supine_compare_create(basis, &compare, &error) != SUPINE_OK ||
-      supine_renderer_create(basis, &renderer, &error) != SUPINE_OK) {
-    result = supine_command_fail(name, &error);
+      supine_render_create(basis, &renderer, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
     goto cleanup;
   }
   for (size_t i = 0; i <= count && result == SUPINE_EXIT_OK; ++i) {
@@ -187,14 +188,14 @@ static int render(const supine_basis *basis, const request *wanted,
                             .view_count = wanted->view_count,
                             .heading = wanted->title,
                             .bar_label = label,
-                            .largest =
-                                wanted->largest > 0.0 ? wanted->largest : supine_bar_end(p95),
+                            .largest = wanted->largest > 0.0 ? wanted->largest
+                                                             : supine_render_bar_end(p95),
                             .dark = wanted->dark};
   picture.beyond = largest > picture.largest;
   choose_size(wanted, &picture);
   result = write_picture(wanted, renderer, &picture);
 cleanup:
-  supine_renderer_destroy(renderer);
+  supine_render_destroy(renderer);
   supine_compare_destroy(compare);
   free(states);
   free(values);
@@ -207,13 +208,13 @@ static int take_size(const char *text, request *wanted) {
   if (length < sizeof width && text[length] == 'x') {
     memcpy(width, text, length);
     width[length] = '\0';
-    if (supine_parse_count(width, &wanted->width) &&
-        supine_parse_count(text + length + 1, &wanted->height) && wanted->width > 0 &&
+    if (supine_options_parse_count(width, &wanted->width) &&
+        supine_options_parse_count(text + length + 1, &wanted->height) && wanted->width > 0 &&
         wanted->height > 0 && wanted->width <= 16384 && wanted->height <= 16384) {
       return SUPINE_EXIT_OK;
     }
   }
-  return supine_command_usage(name, "--size takes WIDTHxHEIGHT, up to 16384 each, not '%s'", text);
+  return supine_options_usage(name, "--size takes WIDTHxHEIGHT, up to 16384 each, not '%s'", text);
 }
 
 static int take_views(const char *text, request *wanted) {
@@ -225,18 +226,18 @@ static int take_views(const char *text, request *wanted) {
     size_t view = 0;
     (void)snprintf(word, sizeof word, "%.*s", (int)(length < 31 ? length : 31), at);
     for (supine_view i = 0; i < SUPINE_VIEW_COUNT; ++i) {
-      names[i] = supine_view_name(i);
+      names[i] = supine_render_view_name(i);
     }
     while (view <= SUPINE_VIEW_COUNT && strcmp(word, names[view]) != 0) {
       ++view;
     }
     if (view > SUPINE_VIEW_COUNT) {
-      const char *nearest = supine_suggest(word, names, SUPINE_VIEW_COUNT + 1);
-      return supine_command_usage(name, "no view '%s'; did you mean '%s'?", word,
+      const char *nearest = supine_options_suggest(word, names, SUPINE_VIEW_COUNT + 1);
+      return supine_options_usage(name, "no view '%s'; did you mean '%s'?", word,
                                   nearest != NULL ? nearest : "anterior");
     }
     if (wanted->view_count == SUPINE_VIEWS_MAX) {
-      return supine_command_usage(name, "more than %d views", SUPINE_VIEWS_MAX);
+      return supine_options_usage(name, "more than %d views", SUPINE_VIEWS_MAX);
     }
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
@@ -257,7 +258,7 @@ static int take_colour(const char *text, request *wanted) {
     wanted->reference = text + strlen(difference);
     return SUPINE_EXIT_OK;
   }
-  return supine_command_usage(name, "--colour takes displacement or difference:POSTURE, not '%s'",
+  return supine_options_usage(name, "--colour takes displacement or difference:POSTURE, not '%s'",
                               text);
 }
 
@@ -265,13 +266,13 @@ static int take_theme(const char *text, request *wanted) {
   wanted->dark = strcmp(text, "dark") == 0;
   return wanted->dark || strcmp(text, "light") == 0
              ? SUPINE_EXIT_OK
-             : supine_command_usage(name, "--theme takes light or dark, not '%s'", text);
+             : supine_options_usage(name, "--theme takes light or dark, not '%s'", text);
 }
 
 static int take_positive(const char *option, const char *text, double *value) {
-  return supine_parse_number(text, value) && *value > 0.0
+  return supine_options_parse_number(text, value) && *value > 0.0
              ? SUPINE_EXIT_OK
-             : supine_command_usage(name, "--%s takes millimetres above 0, not '%s'", option, text);
+             : supine_options_usage(name, "--%s takes millimetres above 0, not '%s'", option, text);
 }
 
 static bool ends_in_png(const char *path) {
@@ -283,30 +284,30 @@ static bool ends_in_png(const char *path) {
 static int check(const request *wanted, int operands, supine_posture_list *postures,
                  supine_posture_list *reference) {
   if (operands != 1) {
-    return supine_command_usage(name, "name one basis file (made by 'supine precompute')");
+    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
   }
   if (wanted->output == NULL || !ends_in_png(wanted->output)) {
-    return supine_command_usage(name, "give -o FILE, with a name that ends in .png");
+    return supine_options_usage(name, "give -o FILE, with a name that ends in .png");
   }
   if (wanted->postures == NULL) {
-    return supine_command_usage(name, "which posture? Give --posture supine, for example");
+    return supine_options_usage(name, "which posture? Give --posture supine, for example");
   }
   if (wanted->volume != NULL && wanted->scale > 0.0) {
-    return supine_command_usage(name, "give --volume or --scale, not both");
+    return supine_options_usage(name, "give --volume or --scale, not both");
   }
-  int result = supine_posture_list_parse(name, wanted->postures, postures);
+  int result = supine_options_posture_list_parse(name, wanted->postures, postures);
   if (result == SUPINE_EXIT_OK && wanted->reference != NULL) {
-    result = supine_posture_list_parse(name, wanted->reference, reference);
+    result = supine_options_posture_list_parse(name, wanted->reference, reference);
   }
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
   if (reference->count > 1) {
-    return supine_command_usage(name, "--colour difference: takes one posture");
+    return supine_options_usage(name, "--colour difference: takes one posture");
   }
   return postures->count <= SUPINE_PANELS_MAX
              ? SUPINE_EXIT_OK
-             : supine_command_usage(name, "at most %d postures in one picture", SUPINE_PANELS_MAX);
+             : supine_options_usage(name, "at most %d postures in one picture", SUPINE_PANELS_MAX);
 }
 
 int supine_command_render(int argc, char **argv) {
@@ -363,11 +364,11 @@ int supine_command_render(int argc, char **argv) {
       break;
     case 'h':
       (void)fputs(help, stdout);
-      (void)fputs(supine_posture_list_help, stdout);
+      (void)fputs(supine_options_posture_list_help, stdout);
       (void)fputs(examples, stdout);
-      return supine_command_finish(name);
+      return supine_options_finish(name);
     default:
-      return supine_command_bad_option(name, options, option, argv);
+      return supine_options_bad_option(name, options, option, argv);
     }
     if (result != SUPINE_EXIT_OK) {
       return result;
@@ -382,7 +383,7 @@ int supine_command_render(int argc, char **argv) {
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
-    return supine_command_fail(name, &error);
+    return supine_options_fail(name, &error);
   }
   result = render(basis, &wanted, &postures, reference.count == 1 ? &reference.item[0] : NULL);
   supine_basis_close(basis);

@@ -12,7 +12,7 @@ typedef struct export_asset {
   size_t size;
 } export_asset;
 
-extern const export_asset export_assets[];
-extern const size_t export_asset_count;
+extern const export_asset supine_export_assets[];
+extern const size_t supine_export_asset_count;
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "runtime/export/base64.h"
 
-void export_base64_write(const void *bytes, size_t size, FILE *file) {
+void supine_export_base64_write(const void *bytes, size_t size, FILE *file) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   const unsigned char *from = bytes;
   char text[4096];

@@ -8,6 +8,6 @@
 #include <stdio.h>
 
 /** Writes `size` bytes as base64, padded; errors stay in the stream. */
-void export_base64_write(const void *bytes, size_t size, FILE *file);
+void supine_export_base64_write(const void *bytes, size_t size, FILE *file);
 
 #endif

@@ -5,8 +5,8 @@
 
 #include "runtime/export/export.h"
 
-supine_status export_breath_set(const export_source *source, double volume, double largest,
-                                export_breath *breath, supine_error *error) {
+supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
+                                       export_breath *breath, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   *breath = (export_breath){.volume = volume, .largest = largest};
   if (source->info->has_volume) {
@@ -42,9 +42,9 @@ supine_status export_breath_set(const export_source *source, double volume, doub
   return SUPINE_OK;
 }
 
-supine_status export_breath_scale(const export_source *source, const export_breath *breath,
-                                  const double *weights, double fraction, double *scale,
-                                  supine_error *error) {
+supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
+                                         const double *weights, double fraction, double *scale,
+                                         supine_error *error) {
   if (!source->info->has_volume) {
     *scale = fraction * breath->scale;
     return SUPINE_OK;

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Files as an array in C: cmake -D OUTPUT=assets.c -D FILES=a;b -P embed.cmake
-# Each becomes an entry {name, bytes, size} of export_assets, in the order given.
+# Each becomes an entry {name, bytes, size} of supine_export_assets, in the order given.
 set(arrays "")
 set(table "")
 set(number 0)
@@ -18,7 +18,7 @@ file(WRITE "${OUTPUT}" "/* Made by embed.cmake. */
 #include \"assets.h\"
 
 ${arrays}
-const export_asset export_assets[] = {
+const supine_export_asset supine_export_assets[] = {
 ${table}};
-const size_t export_asset_count = ${number};
+const size_t supine_export_asset_count = ${number};
 ")

@@ -25,13 +25,14 @@ typedef struct export_source {
 
 /** Opens a basis file.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY  as supine_basis_open */
-supine_status export_source_open(const char *path, export_source *source, supine_error *error);
+supine_status supine_export_source_open(const char *path, export_source *source,
+                                        supine_error *error);
 
 /** Releases it; a zeroed one is legal. */
-void export_source_close(export_source *source);
+void supine_export_source_close(export_source *source);
 
 /** Displacement u_k of vertex `vertex` for a weight of 1 in mode `mode`, mm. */
-void export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
+void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** How deep a breath is. */
 typedef struct export_breath {
@@ -44,14 +45,14 @@ typedef struct export_breath {
  * `largest` mm.
  * @retval SUPINE_ERROR_NUMERICAL  nothing moves
  * @retval SUPINE_ERROR_MEMORY */
-supine_status export_breath_set(const export_source *source, double volume, double largest,
-                                export_breath *breath, supine_error *error);
+supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
+                                       export_breath *breath, supine_error *error);
 
 /** The breath scale s at a fraction of the breath (0 rest, 1 all of it) for the basis' weights.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
-supine_status export_breath_scale(const export_source *source, const export_breath *breath,
-                                  const double *weights, double fraction, double *scale,
-                                  supine_error *error);
+supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
+                                         const double *weights, double fraction, double *scale,
+                                         supine_error *error);
 
 /** How to write glTF. Zeros: every mode as a target, float32, no animation. */
 typedef struct export_glb_options {
@@ -79,9 +80,9 @@ typedef struct export_glb_report {
  * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
-supine_status export_glb_write(const char *path, const export_source *source,
-                               const export_glb_options *options, export_glb_report *report,
-                               supine_error *error);
+supine_status supine_export_glb_write(const char *path, const export_source *source,
+                                      const export_glb_options *options, export_glb_report *report,
+                                      supine_error *error);
 
 /** Most modes that the page carries: four vertex attributes of four. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
@@ -89,8 +90,8 @@ enum { EXPORT_PAGE_MODES_MAX = 16 };
 /** Writes one self-contained page that shows the lungs in a browser (WebGL 2), without a network.
  * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, or more than EXPORT_PAGE_MODES_MAX modes
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
-supine_status export_html_write(const char *path, const export_source *source,
-                                const export_breath *breath, const char *title,
-                                supine_error *error);
+supine_status supine_export_html_write(const char *path, const export_source *source,
+                                       const export_breath *breath, const char *title,
+                                       supine_error *error);
 
 #endif

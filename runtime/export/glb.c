@@ -21,8 +21,8 @@ typedef struct glb {
   glb_plan plan;
 } glb;
 
-size_t glb_plan_add(glb_plan *plan, int component, const char *type, size_t count, int target,
-                    size_t axes, const double *low, const double *high) {
+size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
+                                  int target, size_t axes, const double *low, const double *high) {
   const size_t size = component == GLTF_SHORT ? SHORT_STRIDE : 4 * axes;
   const json_int_t length = (json_int_t)count * (json_int_t)size;
   json_t *view = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)plan->bytes,
@@ -37,8 +37,8 @@ size_t glb_plan_add(glb_plan *plan, int component, const char *type, size_t coun
       json_pack("{s:I, s:i, s:I, s:s}", "bufferView", (json_int_t)json_array_size(plan->views),
                 "componentType", component, "count", (json_int_t)count, "type", type);
   if (low != NULL && high != NULL) {
-    (void)json_object_set_new(accessor, "min", glb_numbers(low, axes));
-    (void)json_object_set_new(accessor, "max", glb_numbers(high, axes));
+    (void)json_object_set_new(accessor, "min", supine_export_glb_numbers(low, axes));
+    (void)json_object_set_new(accessor, "max", supine_export_glb_numbers(high, axes));
   }
   (void)json_array_append_new(plan->views, view);
   (void)json_array_append_new(plan->accessors, accessor);
@@ -66,19 +66,20 @@ static json_t *plan_mesh(glb *g) {
   const bool quantise = g->options->quantise;
   double low[3];
   double high[3];
-  (void)glb_plan_add(&g->plan, GLTF_UINT, "SCALAR", 3 * g->source->info->triangle_count,
-                     GLTF_INDICES, 1, NULL, NULL);
-  export_targets_base(g->source, &g->targets, g->xyz);
+  (void)supine_export_glb_plan_add(&g->plan, GLTF_UINT, "SCALAR",
+                                   3 * g->source->info->triangle_count, GLTF_INDICES, 1, NULL,
+                                   NULL);
+  supine_export_targets_base(g->source, &g->targets, g->xyz);
   find_bounds(g->xyz, n, false, low, high);
-  (void)glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, low, high);
-  (void)glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
+  (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, low, high);
+  (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
   json_t *targets = json_array();
   json_t *weights = json_array();
   for (size_t j = 0; j < g->targets.count; ++j) {
-    export_targets_fill(g->source, &g->targets, j, g->xyz);
+    supine_export_targets_fill(g->source, &g->targets, j, g->xyz);
     find_bounds(g->xyz, n, quantise, low, high);
-    const size_t accessor = glb_plan_add(&g->plan, quantise ? GLTF_SHORT : GLTF_FLOAT, "VEC3", n,
-                                         GLTF_VERTICES, 3, low, high);
+    const size_t accessor = supine_export_glb_plan_add(&g->plan, quantise ? GLTF_SHORT : GLTF_FLOAT,
+                                                       "VEC3", n, GLTF_VERTICES, 3, low, high);
     (void)json_array_append_new(targets, json_pack("{s:I}", "POSITION", (json_int_t)accessor));
     /* At rest: breath scale 0. Stored as the positions are, so that no engine sees another rest. */
     (void)json_array_append_new(weights, json_real(0 - g->targets.offset[j] / g->targets.unit[j]));
@@ -86,7 +87,7 @@ static json_t *plan_mesh(glb *g) {
   return json_pack("{s:s, s:[{s:{s:i, s:i}, s:i, s:i, s:o}], s:o, s:o}", "name", "lungs",
                    "primitives", "attributes", "POSITION", 1, "NORMAL", 2, "indices", 0, "material",
                    0, "targets", targets, "weights", weights, "extras",
-                   glb_extras(g->source, g->options, &g->targets));
+                   supine_export_glb_extras(g->source, g->options, &g->targets));
 }
 
 /* Node 0, the patient, turns; node 1 takes millimetres LPS, or counts, to metres with y up. */
@@ -117,8 +118,9 @@ static json_t *make_json(glb *g) {
                               json_pack("[s]", "KHR_mesh_quantization"));
   }
   if (g->options->animate) {
-    (void)json_object_set_new(root, "animations",
-                              glb_animation_plan(&g->animation, g->targets.count, &g->plan));
+    (void)json_object_set_new(
+        root, "animations",
+        supine_export_glb_animation_plan(&g->animation, g->targets.count, &g->plan));
   }
   const bool good =
       json_object_set(root, "bufferViews", g->plan.views) == 0 &&
@@ -134,7 +136,7 @@ static json_t *make_json(glb *g) {
 
 static void write_target(glb *g, size_t j, FILE *file) {
   const size_t n = g->source->info->vertex_count;
-  export_targets_fill(g->source, &g->targets, j, g->xyz);
+  supine_export_targets_fill(g->source, &g->targets, j, g->xyz);
   if (!g->options->quantise) {
     (void)fwrite(g->xyz, 3 * sizeof *g->xyz, n, file);
     return;
@@ -150,9 +152,9 @@ static void write_target(glb *g, size_t j, FILE *file) {
 static supine_status write_numbers(glb *g, FILE *file, supine_error *error) {
   const supine_basis_info *info = g->source->info;
   (void)fwrite(g->source->triangles, 3 * sizeof *g->source->triangles, info->triangle_count, file);
-  export_targets_base(g->source, &g->targets, g->xyz);
+  supine_export_targets_base(g->source, &g->targets, g->xyz);
   (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
-  const supine_status status = glb_normals(g->source, g->xyz, error);
+  const supine_status status = supine_export_glb_normals(g->source, g->xyz, error);
   (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
   for (size_t j = 0; j < g->targets.count; ++j) {
     write_target(g, j, file);
@@ -197,9 +199,9 @@ static supine_status write_file(glb *g, const char *path, const char *text, size
   return status;
 }
 
-supine_status export_glb_write(const char *path, const export_source *source,
-                               const export_glb_options *options, export_glb_report *report,
-                               supine_error *error) {
+supine_status supine_export_glb_write(const char *path, const export_source *source,
+                                      const export_glb_options *options, export_glb_report *report,
+                                      supine_error *error) {
   const size_t n = source->info->vertex_count;
   glb g = {.source = source, .options = options};
   json_t *root = NULL;
@@ -207,9 +209,9 @@ supine_status export_glb_write(const char *path, const export_source *source,
   if (source->info->triangle_count == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH, "a basis without triangles shows nothing");
   }
-  supine_status status = export_targets_choose(source, options, &g.targets, error);
+  supine_status status = supine_export_targets_choose(source, options, &g.targets, error);
   if (status == SUPINE_OK && options->animate) {
-    status = glb_animation_make(source, options, &g.targets, &g.animation, error);
+    status = supine_export_glb_animation_make(source, options, &g.targets, &g.animation, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
@@ -235,7 +237,7 @@ cleanup:
   json_decref(g.plan.accessors);
   free(g.xyz);
   free(g.short4);
-  glb_animation_free(&g.animation);
-  export_targets_free(&g.targets);
+  supine_export_glb_animation_free(&g.animation);
+  supine_export_targets_free(&g.targets);
   return status;
 }

@@ -4,8 +4,8 @@
 #ifndef SUPINE_EXPORT_GLB_H
 #define SUPINE_EXPORT_GLB_H
 
-#include <jansson.h>
 #include "sh/base/output.h"
+#include <jansson.h>
 
 #include "runtime/export/targets.h"
 
@@ -22,19 +22,20 @@ typedef struct glb_plan {
 
 /** Appends a view and its accessor of `count` elements; the accessor's index. `type` is SCALAR,
  * VEC3 or VEC4; low and high are its bounds, `axes` numbers each, or NULL. */
-size_t glb_plan_add(glb_plan *plan, int component, const char *type, size_t count, int target,
-                    size_t axes, const double *low, const double *high);
+size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
+                                  int target, size_t axes, const double *low, const double *high);
 
 /** An array of numbers. */
-json_t *glb_numbers(const double *values, size_t count);
+json_t *supine_export_glb_numbers(const double *values, size_t count);
 
 /** What the mesh's `extras` say: names, and how weights follow from gravity and volume. */
-json_t *glb_extras(const export_source *source, const export_glb_options *options,
-                   const export_targets *targets);
+json_t *supine_export_glb_extras(const export_source *source, const export_glb_options *options,
+                                 const export_targets *targets);
 
 /** Unit normals of the resting surface [N, 3]; (0, 0, 1) where a vertex has no area.
  * @retval SUPINE_ERROR_MEMORY */
-supine_status glb_normals(const export_source *source, float *normals, supine_error *error);
+supine_status supine_export_glb_normals(const export_source *source, float *normals,
+                                        supine_error *error);
 
 /** The patient on the back turns over the left side onto the belly and over the right side back,
  * and breathes. */
@@ -46,12 +47,14 @@ typedef struct glb_animation {
 } glb_animation;
 
 /** @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status glb_animation_make(const export_source *source, const export_glb_options *options,
-                                 const export_targets *targets, glb_animation *animation,
-                                 supine_error *error);
-void glb_animation_free(glb_animation *animation);
+supine_status supine_export_glb_animation_make(const export_source *source,
+                                               const export_glb_options *options,
+                                               const export_targets *targets,
+                                               glb_animation *animation, supine_error *error);
+void supine_export_glb_animation_free(glb_animation *animation);
 
 /** Plans its three accessors and returns the "animations" array. */
-json_t *glb_animation_plan(const glb_animation *animation, size_t targets, glb_plan *plan);
+json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t targets,
+                                         glb_plan *plan);
 
 #endif

@@ -40,18 +40,19 @@ static supine_status make_frame(const export_source *source, const export_glb_op
   double scale = 0;
   (void)supine_basis_weights(source->basis, g, weights); /* a direction that is legal */
   const supine_status status =
-      export_breath_scale(source, &options->breath, weights, fraction, &scale, error);
+      supine_export_breath_scale(source, &options->breath, weights, fraction, &scale, error);
   (void)supine_sh_evaluate(source->info->band, g, y);
-  export_targets_weights(targets, source->terms, y, scale, weights);
+  supine_export_targets_weights(targets, source->terms, y, scale, weights);
   for (size_t j = 0; j < targets->count; ++j) {
     row[j] = (float)weights[j];
   }
   return status;
 }
 
-supine_status glb_animation_make(const export_source *source, const export_glb_options *options,
-                                 const export_targets *targets, glb_animation *animation,
-                                 supine_error *error) {
+supine_status supine_export_glb_animation_make(const export_source *source,
+                                               const export_glb_options *options,
+                                               const export_targets *targets,
+                                               glb_animation *animation, supine_error *error) {
   const size_t frames = RATE * SECONDS * POSTURES + 1;
   glb_animation made = {.frames = frames,
                         .times = malloc(frames * sizeof(float)),
@@ -59,7 +60,7 @@ supine_status glb_animation_make(const export_source *source, const export_glb_o
                         .rotations = malloc(4 * frames * sizeof(float))};
   supine_status status = SUPINE_OK;
   if (made.times == NULL || made.weights == NULL || made.rotations == NULL) {
-    glb_animation_free(&made);
+    supine_export_glb_animation_free(&made);
     *animation = made;
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
@@ -71,29 +72,30 @@ supine_status glb_animation_make(const export_source *source, const export_glb_o
         make_frame(source, options, targets, seconds, made.weights + i * targets->count, error);
   }
   if (status != SUPINE_OK) {
-    glb_animation_free(&made);
+    supine_export_glb_animation_free(&made);
   }
   *animation = made;
   return status;
 }
 
-void glb_animation_free(glb_animation *animation) {
+void supine_export_glb_animation_free(glb_animation *animation) {
   free(animation->times);
   free(animation->weights);
   free(animation->rotations);
   *animation = (glb_animation){0};
 }
 
-json_t *glb_animation_plan(const glb_animation *animation, size_t targets, glb_plan *plan) {
+json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t targets,
+                                         glb_plan *plan) {
   const double first = 0;
   const double last = (double)animation->times[animation->frames - 1];
   const size_t frames = animation->frames;
-  const json_int_t times = (json_int_t)glb_plan_add(plan, GLTF_FLOAT, "SCALAR", frames,
-                                                    GLTF_NO_TARGET, 1, &first, &last);
-  const json_int_t weights = (json_int_t)glb_plan_add(plan, GLTF_FLOAT, "SCALAR", frames * targets,
-                                                      GLTF_NO_TARGET, 1, NULL, NULL);
-  const json_int_t turns =
-      (json_int_t)glb_plan_add(plan, GLTF_FLOAT, "VEC4", frames, GLTF_NO_TARGET, 4, NULL, NULL);
+  const json_int_t times = (json_int_t)supine_export_glb_plan_add(
+      plan, GLTF_FLOAT, "SCALAR", frames, GLTF_NO_TARGET, 1, &first, &last);
+  const json_int_t weights = (json_int_t)supine_export_glb_plan_add(
+      plan, GLTF_FLOAT, "SCALAR", frames * targets, GLTF_NO_TARGET, 1, NULL, NULL);
+  const json_int_t turns = (json_int_t)supine_export_glb_plan_add(plan, GLTF_FLOAT, "VEC4", frames,
+                                                                  GLTF_NO_TARGET, 4, NULL, NULL);
   return json_pack("[{s:s, s:[{s:I, s:I, s:s}, {s:I, s:I, s:s}], s:[{s:i, s:{s:i, s:s}}, {s:i, "
                    "s:{s:i, s:s}}]}]",
                    "name", "breathe and turn", "samplers", "input", times, "output", weights,

@@ -8,7 +8,7 @@
 
 enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
 
-json_t *glb_numbers(const double *values, size_t count) {
+json_t *supine_export_glb_numbers(const double *values, size_t count) {
   json_t *array = json_array();
   for (size_t i = 0; i < count; ++i) {
     (void)json_array_append_new(array, json_real(values[i]));
@@ -74,7 +74,7 @@ static json_t *form(const export_source *source, const export_targets *targets, 
       rows *= targets->count;
       columns /= i + 1 < rank ? k : 1;
     }
-    numbers = glb_numbers(from, rows * columns);
+    numbers = supine_export_glb_numbers(from, rows * columns);
   }
   free(from);
   free(to);
@@ -115,18 +115,19 @@ static json_t *origin(const export_source *source) {
   return object;
 }
 
-json_t *glb_extras(const export_source *source, const export_glb_options *options,
-                   const export_targets *targets) {
+json_t *supine_export_glb_extras(const export_source *source, const export_glb_options *options,
+                                 const export_targets *targets) {
   const size_t count = targets->count;
   json_t *modes = json_array();
   for (size_t j = 0; j < count; ++j) {
-    (void)json_array_append_new(modes,
-                                glb_numbers(targets->modes + j * source->terms, source->terms));
+    (void)json_array_append_new(
+        modes, supine_export_glb_numbers(targets->modes + j * source->terms, source->terms));
   }
   json_t *supine = json_pack(
       "{s:s, s:i, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:s}", "weights", weights_text, "band",
-      (int)source->info->band, "modes", modes, "offset", glb_numbers(targets->offset, count),
-      "unit", glb_numbers(targets->unit, count), "lungBegin", lungs(source), "basis",
+      (int)source->info->band, "modes", modes, "offset",
+      supine_export_glb_numbers(targets->offset, count), "unit",
+      supine_export_glb_numbers(targets->unit, count), "lungBegin", lungs(source), "basis",
       origin(source), "millimetresPerUnit", targets->count_mm, "lossPercent", targets->loss_percent,
       "frame",
       "vertices are in the patient's axes, LPS; the node 'lungs' turns and scales them to metres, "

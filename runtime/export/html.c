@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <jansson.h>
 #include "sh/base/output.h"
+#include <jansson.h>
 
 #include "runtime/export/assets.h"
 #include "runtime/export/base64.h"
@@ -48,7 +48,7 @@ static void write_json(const json_t *value, FILE *file) {
 
 static void write_tensor(const page *p, const char *name, const void *bytes, size_t size) {
   (void)fprintf(p->file, "<script type=\"text/plain\" id=\"tensor-%s\">", name);
-  export_base64_write(bytes, size, p->file);
+  supine_export_base64_write(bytes, size, p->file);
   (void)fputs("</script>\n", p->file);
 }
 
@@ -112,10 +112,10 @@ static void write_basis(const page *p) {
 }
 
 static const export_asset *find_asset(const char *name, size_t length) {
-  for (size_t i = 0; i < export_asset_count; ++i) {
-    if (strlen(export_assets[i].name) == length &&
-        memcmp(export_assets[i].name, name, length) == 0) {
-      return &export_assets[i];
+  for (size_t i = 0; i < supine_export_asset_count; ++i) {
+    if (strlen(supine_export_assets[i].name) == length &&
+        memcmp(supine_export_assets[i].name, name, length) == 0) {
+      return &supine_export_assets[i];
     }
   }
   return NULL;
@@ -150,9 +150,9 @@ static void write_page(const page *p) {
   }
 }
 
-supine_status export_html_write(const char *path, const export_source *source,
-                                const export_breath *breath, const char *title,
-                                supine_error *error) {
+supine_status supine_export_html_write(const char *path, const export_source *source,
+                                       const export_breath *breath, const char *title,
+                                       supine_error *error) {
   const supine_basis_info *info = source->info;
   if (info->vector || info->mode_count > EXPORT_PAGE_MODES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,

@@ -22,7 +22,8 @@ static void add_triangle(const export_source *source, const uint32_t *corner, do
   }
 }
 
-supine_status glb_normals(const export_source *source, float *normals, supine_error *error) {
+supine_status supine_export_glb_normals(const export_source *source, float *normals,
+                                        supine_error *error) {
   const size_t n = source->info->vertex_count;
   double *sum = calloc(3 * n, sizeof *sum);
   if (sum == NULL) {

@@ -22,7 +22,7 @@ static void gram(const export_source *source, gsl_matrix *sum) {
   gsl_matrix_set_zero(sum);
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
     for (size_t a = 0; a < k; ++a) {
-      export_field(source, i, a, u[a]);
+      supine_export_field(source, i, a, u[a]);
     }
     for (size_t a = 0; a < k; ++a) {
       for (size_t b = 0; b <= a; ++b) {
@@ -98,8 +98,8 @@ static bool reduce(const export_source *source, gsl_matrix **m, gsl_vector *valu
   return true;
 }
 
-supine_status export_targets_reduce(const export_source *source, size_t limit,
-                                    export_targets *targets, supine_error *error) {
+supine_status supine_export_targets_reduce(const export_source *source, size_t limit,
+                                           export_targets *targets, supine_error *error) {
   const size_t k = source->info->mode_count;
   gsl_matrix *m[MATRICES] = {NULL};
   supine_status status = SUPINE_ERROR_MEMORY;

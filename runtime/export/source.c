@@ -9,7 +9,8 @@ static const void *tensor(const supine_safetensors *file, const char *name) {
   return found == NULL ? NULL : found->data;
 }
 
-supine_status export_source_open(const char *path, export_source *source, supine_error *error) {
+supine_status supine_export_source_open(const char *path, export_source *source,
+                                        supine_error *error) {
   export_source made = {0};
   static const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
   supine_status status = supine_basis_open_with(path, &exact, &made.basis, error);
@@ -17,7 +18,7 @@ supine_status export_source_open(const char *path, export_source *source, supine
     status = supine_safetensors_open(path, &made.file, error);
   }
   if (status != SUPINE_OK) {
-    export_source_close(&made);
+    supine_export_source_close(&made);
     return status;
   }
   made.info = supine_basis_get_info(made.basis);
@@ -36,13 +37,13 @@ supine_status export_source_open(const char *path, export_source *source, supine
   return SUPINE_OK;
 }
 
-void export_source_close(export_source *source) {
+void supine_export_source_close(export_source *source) {
   supine_safetensors_close(source->file);
   supine_basis_close(source->basis);
   *source = (export_source){0};
 }
 
-void export_field(const export_source *source, size_t vertex, size_t mode, double u[3]) {
+void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]) {
   const size_t k = source->info->mode_count;
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = source->info->vector ? (double)source->coefficients[(3 * vertex + axis) * k + mode]

@@ -21,7 +21,7 @@ static bool allocate(const export_source *source, export_targets *targets) {
          targets->unit != NULL;
 }
 
-void export_targets_free(export_targets *targets) {
+void supine_export_targets_free(export_targets *targets) {
   free(targets->mix);
   free(targets->modes);
   free(targets->offset);
@@ -38,8 +38,8 @@ static void keep_modes(const export_source *source, export_targets *targets) {
   memcpy(targets->modes, source->modes, k * source->terms * sizeof *targets->modes);
 }
 
-void export_targets_weights(const export_targets *targets, size_t terms, const double *y,
-                            double scale, double *weights) {
+void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
+                                   double scale, double *weights) {
   for (size_t j = 0; j < targets->count; ++j) {
     double sum = 0;
     for (size_t t = 0; t < terms; ++t) {
@@ -63,12 +63,13 @@ static supine_status find_ranges(const export_source *source, const export_breat
     const double g[3] = {r * cos(turn * i), r * sin(turn * i), z};
     double scale = 0;
     (void)supine_basis_weights(source->basis, g, weights); /* a direction that is legal */
-    const supine_status status = export_breath_scale(source, breath, weights, 1, &scale, error);
+    const supine_status status =
+        supine_export_breath_scale(source, breath, weights, 1, &scale, error);
     if (status != SUPINE_OK) {
       return status;
     }
     (void)supine_sh_evaluate(source->info->band, g, y);
-    export_targets_weights(targets, source->terms, y, scale, weights);
+    supine_export_targets_weights(targets, source->terms, y, scale, weights);
     for (size_t j = 0; j < targets->count; ++j) {
       low[j] = fmin(low[j], weights[j]);
       high[j] = fmax(high[j], weights[j]);
@@ -100,7 +101,7 @@ static void find_sizes(const export_source *source, const export_targets *target
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
     double u[SUPINE_MODES_MAX][3];
     for (size_t a = 0; a < k; ++a) {
-      export_field(source, i, a, u[a]);
+      supine_export_field(source, i, a, u[a]);
     }
     for (size_t j = 0; j < targets->count; ++j) {
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -129,8 +130,9 @@ static void fit_counts(const export_source *source, export_targets *targets) {
   targets->count_mm = largest > 0 ? largest / COUNT_MAX : 1;
 }
 
-supine_status export_targets_choose(const export_source *source, const export_glb_options *options,
-                                    export_targets *targets, supine_error *error) {
+supine_status supine_export_targets_choose(const export_source *source,
+                                           const export_glb_options *options,
+                                           export_targets *targets, supine_error *error) {
   double low[SUPINE_MODES_MAX] = {0};
   double high[SUPINE_MODES_MAX] = {0};
   export_targets made = {.count_mm = 1};
@@ -140,7 +142,7 @@ supine_status export_targets_choose(const export_source *source, const export_gl
     goto cleanup;
   }
   if (options->eight && source->info->mode_count > EIGHT) {
-    status = export_targets_reduce(source, EIGHT, &made, error);
+    status = supine_export_targets_reduce(source, EIGHT, &made, error);
   } else {
     keep_modes(source, &made);
   }
@@ -156,7 +158,7 @@ supine_status export_targets_choose(const export_source *source, const export_gl
   }
 cleanup:
   if (status != SUPINE_OK) {
-    export_targets_free(&made);
+    supine_export_targets_free(&made);
   }
   *targets = made;
   return status;
@@ -171,15 +173,15 @@ static void add_mix(const export_source *source, const export_targets *targets, 
   for (size_t a = first; a < last; ++a) {
     const double amount = factor * targets->mix[a * targets->count + j];
     double u[3];
-    export_field(source, vertex, a, u);
+    supine_export_field(source, vertex, a, u);
     for (size_t axis = 0; axis < 3; ++axis) {
       sum[axis] += amount * u[axis];
     }
   }
 }
 
-void export_targets_fill(const export_source *source, const export_targets *targets, size_t j,
-                         float *xyz) {
+void supine_export_targets_fill(const export_source *source, const export_targets *targets,
+                                size_t j, float *xyz) {
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
     double sum[3] = {0, 0, 0};
     add_mix(source, targets, j, targets->unit[j] / targets->count_mm, i, sum);
@@ -189,7 +191,8 @@ void export_targets_fill(const export_source *source, const export_targets *targ
   }
 }
 
-void export_targets_base(const export_source *source, const export_targets *targets, float *xyz) {
+void supine_export_targets_base(const export_source *source, const export_targets *targets,
+                                float *xyz) {
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
     double sum[3] = {0, 0, 0};
     for (size_t j = 0; j < targets->count; ++j) {

@@ -23,27 +23,29 @@ typedef struct export_targets {
 
 /** Chooses targets for the options.
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status export_targets_choose(const export_source *source, const export_glb_options *options,
-                                    export_targets *targets, supine_error *error);
+supine_status supine_export_targets_choose(const export_source *source,
+                                           const export_glb_options *options,
+                                           export_targets *targets, supine_error *error);
 
 /** Releases them; a zeroed one is legal. */
-void export_targets_free(export_targets *targets);
+void supine_export_targets_free(export_targets *targets);
 
 /** Weights [J] at breath scale `scale` from the basis' Y [(L+1)^2]. */
-void export_targets_weights(const export_targets *targets, size_t terms, const double *y,
-                            double scale, double *weights);
+void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
+                                   double scale, double *weights);
 
 /** Target `j` for a weight of 1, in stored units, xyz [N, 3]. */
-void export_targets_fill(const export_source *source, const export_targets *targets, size_t j,
-                         float *xyz);
+void supine_export_targets_fill(const export_source *source, const export_targets *targets,
+                                size_t j, float *xyz);
 
 /** The base, in stored units, xyz [N, 3]. */
-void export_targets_base(const export_source *source, const export_targets *targets, float *xyz);
+void supine_export_targets_base(const export_source *source, const export_targets *targets,
+                                float *xyz);
 
 /** The J <= limit mixes that keep most of the displacement's mean square over vertices and
  * directions: mix [K, J] and modes [J, (L+1)^2], and what is lost.
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status export_targets_reduce(const export_source *source, size_t limit,
-                                    export_targets *targets, supine_error *error);
+supine_status supine_export_targets_reduce(const export_source *source, size_t limit,
+                                           export_targets *targets, supine_error *error);
 
 #endif

@@ -24,7 +24,7 @@ static bool has_avx512(void) {
  * int16 tiles and 36 of float32, NONE 37 and 30, and FAR 36 and 26; asking for every line at any
  * distance costs more than it gives there, as the processor fetches lines in pairs. On family 26
  * (Zen 5) FAR is the fastest. */
-supine_prefetch supine_prefetch_choose(void) {
+supine_prefetch supine_kernels_prefetch_choose(void) {
   unsigned a = 0;
   unsigned b = 0;
   unsigned c = 0;
@@ -42,7 +42,7 @@ static bool has_avx2(void) {
 static bool has_avx512(void) {
   return false;
 }
-supine_prefetch supine_prefetch_choose(void) {
+supine_prefetch supine_kernels_prefetch_choose(void) {
   return SUPINE_PREFETCH_NONE;
 }
 #endif

@@ -150,6 +150,6 @@ extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
 /** What serves this processor best. */
-supine_prefetch supine_prefetch_choose(void);
+supine_prefetch supine_kernels_prefetch_choose(void);
 
 #endif

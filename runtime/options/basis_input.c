@@ -7,7 +7,7 @@
 
 static const double default_volume = 500.0; /* mL */
 
-supine_status supine_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {
+supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const float *vertices = supine_basis_vertices(basis);
   supine_mesh made = {.vertex_count = info->vertex_count, .triangle_count = info->triangle_count};
@@ -26,7 +26,8 @@ supine_status supine_basis_rest_mesh(const supine_basis *basis, supine_mesh *mes
   return SUPINE_OK;
 }
 
-void supine_basis_lung_name(const supine_basis *basis, size_t lung, char *text, size_t size) {
+void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char *text,
+                                    size_t size) {
   const char *names = supine_basis_metadata(basis, "lungs");
   for (size_t i = 0; names != NULL && i < lung; ++i) {
     names = strchr(names, ',');
@@ -44,7 +45,7 @@ static size_t named_lung(const supine_basis *basis, const char *piece, size_t le
   const size_t count = supine_basis_get_info(basis)->lung_count;
   for (size_t lung = 0; lung < count; ++lung) {
     char text[32];
-    supine_basis_lung_name(basis, lung, text, sizeof text);
+    supine_options_basis_lung_name(basis, lung, text, sizeof text);
     if (strlen(text) == length && strncmp(piece, text, length) == 0) {
       return lung;
     }
@@ -70,7 +71,7 @@ static bool parse_lung_volumes(const supine_basis *basis, const char *text, doub
     }
     memcpy(number, value, digits);
     number[digits] = '\0';
-    if (!supine_parse_number(number, &volumes[lung])) {
+    if (!supine_options_parse_number(number, &volumes[lung])) {
       return false;
     }
     if (value[digits] == '\0') {
@@ -80,20 +81,20 @@ static bool parse_lung_volumes(const supine_basis *basis, const char *text, doub
   }
 }
 
-int supine_basis_volume_scales(const supine_basis *basis, const char *command,
-                               const double *weights, const char *volume, double *scales) {
+int supine_options_basis_volume_scales(const supine_basis *basis, const char *command,
+                                       const double *weights, const char *volume, double *scales) {
   const size_t count = supine_basis_get_info(basis)->lung_count;
   double volumes[SUPINE_LUNGS_MAX] = {0.0};
   supine_error error = {SUPINE_ERROR_OPEN_SURFACE,
                         "the surface is open and encloses no volume: close the mesh before "
                         "'supine precompute', or give --scale MM instead of a volume"};
   if (!supine_basis_get_info(basis)->has_volume) {
-    return supine_command_fail(command, &error);
+    return supine_options_fail(command, &error);
   }
   double total = default_volume;
-  if (volume == NULL || supine_parse_number(volume, &total)) {
+  if (volume == NULL || supine_options_parse_number(volume, &total)) {
     if (supine_basis_scale(basis, weights, total, &scales[0], &error) != SUPINE_OK) {
-      return supine_command_fail(command, &error);
+      return supine_options_fail(command, &error);
     }
     for (size_t lung = 1; lung < count; ++lung) {
       scales[lung] = scales[0];
@@ -101,7 +102,7 @@ int supine_basis_volume_scales(const supine_basis *basis, const char *command,
     return SUPINE_EXIT_OK;
   }
   if (!parse_lung_volumes(basis, volume, volumes)) {
-    return supine_command_usage(command,
+    return supine_options_usage(command,
                                 "--volume takes millilitres, or LUNG=ML,LUNG=ML with the lungs of "
                                 "the file (%s); not '%s'",
                                 supine_basis_metadata(basis, "lungs") != NULL
@@ -112,7 +113,7 @@ int supine_basis_volume_scales(const supine_basis *basis, const char *command,
   for (size_t lung = 0; lung < count; ++lung) {
     if (supine_basis_lung_scale(basis, lung, weights, volumes[lung], &scales[lung], &error) !=
         SUPINE_OK) {
-      return supine_command_fail(command, &error);
+      return supine_options_fail(command, &error);
     }
   }
   return SUPINE_EXIT_OK;

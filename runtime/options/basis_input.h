@@ -9,14 +9,15 @@
 #include "runtime/options/command.h"
 
 /* The rest surface as a mesh of its own. */
-supine_status supine_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
+supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
 
 /* Name of a lung, "left" or "right" for bases of this program; else its number. */
-void supine_basis_lung_name(const supine_basis *basis, size_t lung, char *text, size_t size);
+void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char *text,
+                                    size_t size);
 
 /* Breath scales [lung_count] for a volume: "500", "left=200,right=300", or NULL for 500 mL; an
  * exit code. Lungs that are not named keep their resting volume. */
-int supine_basis_volume_scales(const supine_basis *basis, const char *command,
-                               const double *weights, const char *volume, double *scales);
+int supine_options_basis_volume_scales(const supine_basis *basis, const char *command,
+                                       const double *weights, const char *volume, double *scales);
 
 #endif

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/words.h"
 #include "runtime/options/command.h"
+#include "runtime/words.h"
 
-int supine_exit_code(supine_status status) {
+int supine_options_exit_code(supine_status status) {
   switch (status) {
   case SUPINE_OK:
     return SUPINE_EXIT_OK;
@@ -40,19 +40,20 @@ static void say(const char *command, const char *format, va_list arguments) {
   (void)fputc('\n', stderr);
 }
 
-void supine_command_say(const char *command, const char *format, ...) {
+void supine_options_say(const char *command, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
   say(command, format, arguments);
   va_end(arguments);
 }
 
-int supine_command_fail(const char *command, const supine_error *error) {
-  supine_command_say(command, "%s", error->message);
-  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL : supine_exit_code(error->status);
+int supine_options_fail(const char *command, const supine_error *error) {
+  supine_options_say(command, "%s", error->message);
+  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL
+                                    : supine_options_exit_code(error->status);
 }
 
-int supine_command_usage(const char *command, const char *format, ...) {
+int supine_options_usage(const char *command, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
   say(command, format, arguments);
@@ -61,17 +62,17 @@ int supine_command_usage(const char *command, const char *format, ...) {
   return SUPINE_EXIT_USAGE;
 }
 
-int supine_command_finish(const char *command) {
+int supine_options_finish(const char *command) {
   errno = 0;
   if (ferror(stdout) != 0 || fflush(stdout) != 0) {
-    supine_command_say(command, "standard output: %s",
+    supine_options_say(command, "standard output: %s",
                        strerror(errno == 0 ? EIO : errno)); /* NOLINT(concurrency-mt-unsafe) */
     return SUPINE_EXIT_OUTPUT;
   }
   return SUPINE_EXIT_OK;
 }
 
-void supine_command_describe(int argc, char **argv, char *text, size_t size) {
+void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
   for (int i = 0; i < argc && used < size; ++i) {
     const char *slash = strrchr(argv[i], '/');
@@ -86,11 +87,11 @@ static const char *scan_number(const char *text, double *value) {
   return end == text || !isfinite(*value) ? NULL : end;
 }
 
-bool supine_parse_number(const char *text, double *value) {
-  return supine_parse_numbers(text, 1, value);
+bool supine_options_parse_number(const char *text, double *value) {
+  return supine_options_parse_numbers(text, 1, value);
 }
 
-bool supine_parse_numbers(const char *text, size_t count, double *values) {
+bool supine_options_parse_numbers(const char *text, size_t count, double *values) {
   const char *at = text;
   for (size_t i = 0; i < count; ++i) {
     at = scan_number(at, &values[i]);
@@ -102,7 +103,7 @@ bool supine_parse_numbers(const char *text, size_t count, double *values) {
   return true;
 }
 
-bool supine_parse_count(const char *text, size_t *value) {
+bool supine_options_parse_count(const char *text, size_t *value) {
   char *end = NULL;
   errno = 0;
   const unsigned long long number = strtoull(text, &end, 10);
@@ -113,7 +114,7 @@ bool supine_parse_count(const char *text, size_t *value) {
   return true;
 }
 
-const char *supine_suggest(const char *text, const char *const *candidates, size_t count) {
+const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
   size_t fewest = 1 + strlen(text) / 2; /* farther than this is another word */
   for (size_t i = 0; i < count; ++i) {
@@ -126,12 +127,12 @@ const char *supine_suggest(const char *text, const char *const *candidates, size
   return best;
 }
 
-int supine_command_bad_option(const char *command, const struct option *options, int result,
+int supine_options_bad_option(const char *command, const struct option *options, int result,
                               char **argv) {
   enum { NAMES_MAX = 64 };
   const char *given = argv[optind - 1];
   if (result == ':') {
-    return supine_command_usage(command, "option '%s' needs a value", given);
+    return supine_options_usage(command, "option '%s' needs a value", given);
   }
   const char *names[NAMES_MAX];
   size_t count = 0;
@@ -139,9 +140,9 @@ int supine_command_bad_option(const char *command, const struct option *options,
     names[count] = options[count].name;
   }
   const char *nearest =
-      strncmp(given, "--", 2) == 0 ? supine_suggest(given + 2, names, count) : NULL;
+      strncmp(given, "--", 2) == 0 ? supine_options_suggest(given + 2, names, count) : NULL;
   if (nearest != NULL) {
-    return supine_command_usage(command, "no option '%s'; did you mean '--%s'?", given, nearest);
+    return supine_options_usage(command, "no option '%s'; did you mean '--%s'?", given, nearest);
   }
-  return supine_command_usage(command, "no option '%s'", given);
+  return supine_options_usage(command, "no option '%s'", given);
 }

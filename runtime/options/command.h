@@ -36,38 +36,38 @@ supine_command_function supine_command_solve;
 supine_command_function supine_command_pv;
 
 /* The exit code that a status ends the program with. */
-int supine_exit_code(supine_status status);
+int supine_options_exit_code(supine_status status);
 
 /* Prints "supine COMMAND: MESSAGE" to stderr. */
-void supine_command_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
 /* Prints the error's message and returns its exit code. */
-int supine_command_fail(const char *command, const supine_error *error);
+int supine_options_fail(const char *command, const supine_error *error);
 
 /* Prints a message and "Try 'supine COMMAND --help'."; returns SUPINE_EXIT_USAGE. */
-int supine_command_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+int supine_options_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
 /* Results reached stdout? Flushes; a full disk or closed pipe ends with SUPINE_EXIT_OUTPUT. */
-int supine_command_finish(const char *command);
+int supine_options_finish(const char *command);
 
 /* The command line in one line, for what a file says of how it was made; names of files without
  * their folders. */
-void supine_command_describe(int argc, char **argv, char *text, size_t size);
+void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
 /* Reads a finite number, or a whole one, that takes up the whole text. */
-bool supine_parse_number(const char *text, double *value);
-bool supine_parse_count(const char *text, size_t *value);
+bool supine_options_parse_number(const char *text, double *value);
+bool supine_options_parse_count(const char *text, size_t *value);
 
 /* Reads exactly `count` finite numbers separated by commas. */
-bool supine_parse_numbers(const char *text, size_t count, double *values);
+bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
 /* The candidate that is fewest edits from `text`, or NULL where all are far. */
-const char *supine_suggest(const char *text, const char *const *candidates, size_t count);
+const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
 /* The value that follows option `name`, or a usage error that names what is missing is printed by
  * getopt_long itself: commands pass ":" first in their short options and call this on '?' and ':'.
  */
-int supine_command_bad_option(const char *command, const struct option *options, int result,
+int supine_options_bad_option(const char *command, const struct option *options, int result,
                               char **argv);
 
 /* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches
@@ -79,12 +79,12 @@ typedef struct supine_progress {
   bool terminal; /* stderr is one */
 } supine_progress;
 
-supine_progress supine_progress_begin(const char *label);
-bool supine_progress_step(void *progress, double fraction);
-void supine_progress_end(supine_progress *progress);
+supine_progress supine_options_progress_begin(const char *label);
+bool supine_options_progress_step(void *progress, double fraction);
+void supine_options_progress_end(supine_progress *progress);
 
 /* Lets SIGINT and SIGTERM ask for an orderly end instead of ending the program. */
-void supine_interrupts_catch(void);
-bool supine_interrupted(void);
+void supine_options_interrupts_catch(void);
+bool supine_options_interrupted(void);
 
 #endif

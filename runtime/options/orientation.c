@@ -7,7 +7,7 @@
 
 #include "runtime/options/orientation.h"
 
-const char supine_orientation_help[] =
+const char supine_options_orientation_help[] =
     "Where gravity points (one of the first three):\n"
     "  --posture NAME       supine, prone, left, right (lying on that side), upright, inverted, "
     "or\n"
@@ -20,7 +20,7 @@ const char supine_orientation_help[] =
     "  --tilt DEGREES       turns gravity in the sagittal plane from the back towards the head:\n"
     "                       from supine, 15 is Trendelenburg, head down\n";
 
-int supine_orientation_posture(const char *command, const char *name, double gravity[3]) {
+int supine_options_orientation_posture(const char *command, const char *name, double gravity[3]) {
   enum { NAMES_MAX = 32 };
   if (supine_posture_gravity(name, gravity) == SUPINE_OK) {
     return SUPINE_EXIT_OK;
@@ -30,11 +30,11 @@ int supine_orientation_posture(const char *command, const char *name, double gra
   for (size_t i = 0; i < count; ++i) {
     names[i] = supine_posture_name(i);
   }
-  const char *nearest = supine_suggest(name, names, count);
+  const char *nearest = supine_options_suggest(name, names, count);
   if (nearest != NULL) {
-    return supine_command_usage(command, "no posture '%s'; did you mean '%s'?", name, nearest);
+    return supine_options_usage(command, "no posture '%s'; did you mean '%s'?", name, nearest);
   }
-  return supine_command_usage(command,
+  return supine_options_usage(command,
                               "no posture '%s': there are supine, prone, left, right, upright, "
                               "inverted and the DICOM patient positions",
                               name);
@@ -42,20 +42,20 @@ int supine_orientation_posture(const char *command, const char *name, double gra
 
 static int take_gravity(supine_orientation *orientation, const char *command, const char *value) {
   double *g = orientation->gravity;
-  if (!supine_parse_numbers(value, 3, g)) {
-    return supine_command_usage(command, "--gravity takes three finite numbers, X,Y,Z, not '%s'",
+  if (!supine_options_parse_numbers(value, 3, g)) {
+    return supine_options_usage(command, "--gravity takes three finite numbers, X,Y,Z, not '%s'",
                                 value);
   }
   const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
   if (largest == 0.0) {
-    return supine_command_usage(command, "gravity 0,0,0 has no direction; supine is 0,1,0");
+    return supine_options_usage(command, "gravity 0,0,0 has no direction; supine is 0,1,0");
   }
   const double x = g[0] / largest; /* so that no square overflows or vanishes */
   const double y = g[1] / largest;
   const double z = g[2] / largest;
   const double length = sqrt(x * x + y * y + z * z);
   if (fabs(length * largest - 1.0) > 1e-6) {
-    supine_command_say(command, "note: gravity has length %g; only its direction counts",
+    supine_options_say(command, "note: gravity has length %g; only its direction counts",
                        length * largest);
   }
   g[0] = x / length;
@@ -64,37 +64,37 @@ static int take_gravity(supine_orientation *orientation, const char *command, co
   return SUPINE_EXIT_OK;
 }
 
-int supine_orientation_take(supine_orientation *orientation, const char *command, int option,
-                            const char *value) {
+int supine_options_orientation_take(supine_orientation *orientation, const char *command,
+                                    int option, const char *value) {
   if (option == OPTION_TILT) {
-    if (!supine_parse_number(value, &orientation->tilt)) {
-      return supine_command_usage(command, "--tilt takes degrees, not '%s'", value);
+    if (!supine_options_parse_number(value, &orientation->tilt)) {
+      return supine_options_usage(command, "--tilt takes degrees, not '%s'", value);
     }
     return SUPINE_EXIT_OK;
   }
   if (orientation->given) {
-    return supine_command_usage(command, "give one of --posture, --gravity and --quaternion");
+    return supine_options_usage(command, "give one of --posture, --gravity and --quaternion");
   }
   orientation->given = true;
   if (option == OPTION_POSTURE) {
-    return supine_orientation_posture(command, value, orientation->gravity);
+    return supine_options_orientation_posture(command, value, orientation->gravity);
   }
   if (option == OPTION_GRAVITY) {
     return take_gravity(orientation, command, value);
   }
   double q[4];
-  if (!supine_parse_numbers(value, 4, q) ||
+  if (!supine_options_parse_numbers(value, 4, q) ||
       supine_posture_quaternion(q, orientation->gravity) != SUPINE_OK) {
-    return supine_command_usage(
+    return supine_options_usage(
         command, "--quaternion takes four finite numbers, W,X,Y,Z, not all 0; not '%s'", value);
   }
   return SUPINE_EXIT_OK;
 }
 
-int supine_orientation_finish(const supine_orientation *orientation, const char *command,
-                              double gravity[3]) {
+int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
+                                      double gravity[3]) {
   if (!orientation->given && orientation->tilt == 0.0) {
-    return supine_command_usage(command, "where does gravity point? Give --posture, for example");
+    return supine_options_usage(command, "where does gravity point? Give --posture, for example");
   }
   static const double supine[3] = {0.0, 1.0, 0.0};
   (void)supine_posture_tilt(orientation->given ? orientation->gravity : supine, orientation->tilt,

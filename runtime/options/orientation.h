@@ -23,7 +23,7 @@ enum {
   }
 
 /* What they add to a command's help. */
-extern const char supine_orientation_help[];
+extern const char supine_options_orientation_help[];
 
 /* Starts as {0}: not given. */
 typedef struct supine_orientation {
@@ -33,15 +33,15 @@ typedef struct supine_orientation {
 } supine_orientation;
 
 /* Takes one option; SUPINE_EXIT_OK, or an exit code after a message. */
-int supine_orientation_take(supine_orientation *orientation, const char *command, int option,
-                            const char *value);
+int supine_options_orientation_take(supine_orientation *orientation, const char *command,
+                                    int option, const char *value);
 
 /* Reads a posture's name; unknown ones are answered with the nearest. */
-int supine_orientation_posture(const char *command, const char *name, double gravity[3]);
+int supine_options_orientation_posture(const char *command, const char *name, double gravity[3]);
 
 /* The unit direction of gravity, tilt included; supine where only a tilt was given. Where nothing
  * was given at all: a usage error. */
-int supine_orientation_finish(const supine_orientation *orientation, const char *command,
-                              double gravity[3]);
+int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
+                                      double gravity[3]);
 
 #endif

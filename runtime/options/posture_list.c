@@ -8,7 +8,7 @@
 #include "runtime/options/orientation.h"
 #include "runtime/options/posture_list.h"
 
-const char supine_posture_list_help[] =
+const char supine_options_posture_list_help[] =
     "  A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient\n"
     "  position), a name tilted by degrees towards the head (supine+15: Trendelenburg), or "
     "gravity\n"
@@ -21,12 +21,12 @@ static int parse_triple(const char *command, const char *name, double gravity[3]
   for (char *c = text; *c != '\0'; ++c) {
     *c = (char)(*c == ':' ? ',' : *c == ',' ? ':' : *c);
   }
-  if (!supine_parse_numbers(text, 3, gravity)) {
-    return supine_command_usage(command, "'%s': gravity is three finite numbers, X:Y:Z", name);
+  if (!supine_options_parse_numbers(text, 3, gravity)) {
+    return supine_options_usage(command, "'%s': gravity is three finite numbers, X:Y:Z", name);
   }
   const double largest = fmax(fabs(gravity[0]), fmax(fabs(gravity[1]), fabs(gravity[2])));
   if (largest == 0.0) {
-    return supine_command_usage(command, "gravity 0:0:0 has no direction; supine is 0:1:0");
+    return supine_options_usage(command, "gravity 0:0:0 has no direction; supine is 0:1:0");
   }
   double square = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -49,14 +49,14 @@ static bool parse_tilted(const char *name, double gravity[3]) {
   (void)snprintf(front, sizeof front, "%.*s", (int)(sign - name), name);
   double degrees = 0.0;
   double upright[3];
-  return sign > name && supine_parse_number(sign, &degrees) &&
+  return sign > name && supine_options_parse_number(sign, &degrees) &&
          supine_posture_gravity(front, upright) == SUPINE_OK &&
          supine_posture_tilt(upright, degrees, gravity) == SUPINE_OK;
 }
 
 static int parse_item(const char *command, supine_posture_item *item) {
   if (item->name[0] == '\0') {
-    return supine_command_usage(command, "an empty name in the list of postures");
+    return supine_options_usage(command, "an empty name in the list of postures");
   }
   if (strchr(item->name, ':') != NULL) {
     return parse_triple(command, item->name, item->gravity);
@@ -64,19 +64,20 @@ static int parse_item(const char *command, supine_posture_item *item) {
   if (parse_tilted(item->name, item->gravity)) {
     return SUPINE_EXIT_OK;
   }
-  return supine_orientation_posture(command, item->name, item->gravity);
+  return supine_options_orientation_posture(command, item->name, item->gravity);
 }
 
-int supine_posture_list_parse(const char *command, const char *text, supine_posture_list *list) {
+int supine_options_posture_list_parse(const char *command, const char *text,
+                                      supine_posture_list *list) {
   list->count = 0;
   for (const char *at = text;;) {
     const size_t length = strcspn(at, ",");
     if (list->count == SUPINE_POSTURE_LIST_MAX) {
-      return supine_command_usage(command, "more than %d postures", SUPINE_POSTURE_LIST_MAX);
+      return supine_options_usage(command, "more than %d postures", SUPINE_POSTURE_LIST_MAX);
     }
     supine_posture_item *item = &list->item[list->count];
     if (length >= sizeof item->name) {
-      return supine_command_usage(command, "no posture '%.*s'", (int)length, at);
+      return supine_options_usage(command, "no posture '%.*s'", (int)length, at);
     }
     memcpy(item->name, at, length);
     item->name[length] = '\0';

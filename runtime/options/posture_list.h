@@ -19,9 +19,10 @@ typedef struct supine_posture_list {
 } supine_posture_list;
 
 /* What a list may hold, for a command's help. */
-extern const char supine_posture_list_help[];
+extern const char supine_options_posture_list_help[];
 
 /* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
-int supine_posture_list_parse(const char *command, const char *text, supine_posture_list *list);
+int supine_options_posture_list_parse(const char *command, const char *text,
+                                      supine_posture_list *list);
 
 #endif

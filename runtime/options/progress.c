@@ -14,7 +14,7 @@ static void on_signal(int number) {
   interrupted = 1;
 }
 
-void supine_interrupts_catch(void) {
+void supine_options_interrupts_catch(void) {
   struct sigaction action = {0};
   action.sa_handler = on_signal;
   action.sa_flags = (int)SA_RESETHAND; /* a second signal ends the program at once */
@@ -22,16 +22,16 @@ void supine_interrupts_catch(void) {
   (void)sigaction(SIGTERM, &action, NULL);
 }
 
-bool supine_interrupted(void) {
+bool supine_options_interrupted(void) {
   return interrupted != 0;
 }
 
-supine_progress supine_progress_begin(const char *label) {
+supine_progress supine_options_progress_begin(const char *label) {
   const double start = supine_clock_seconds();
   return (supine_progress){label, start, start, isatty(STDERR_FILENO) == 1};
 }
 
-bool supine_progress_step(void *progress, double fraction) {
+bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
   if (state->terminal && time - state->shown > 0.1) {
@@ -43,10 +43,10 @@ bool supine_progress_step(void *progress, double fraction) {
     }
     (void)fflush(stderr);
   }
-  return !supine_interrupted();
+  return !supine_options_interrupted();
 }
 
-void supine_progress_end(supine_progress *progress) {
+void supine_options_progress_end(supine_progress *progress) {
   if (progress->terminal) {
     (void)fputs("\r\033[K", stderr);
     (void)fflush(stderr);

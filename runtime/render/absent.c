@@ -8,34 +8,33 @@ static supine_status refuse(supine_error *error) {
                           "or cairo");
 }
 
-supine_status supine_renderer_create(const supine_basis *basis, supine_renderer **renderer,
-                                     supine_error *error) {
+supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
+                                   supine_error *error) {
   (void)basis;
   (void)renderer;
   return refuse(error);
 }
 
-void supine_renderer_destroy(supine_renderer *renderer) {
+void supine_render_destroy(supine_renderer *renderer) {
   (void)renderer;
 }
 
-void supine_renderer_extent(supine_renderer *renderer, const supine_scene *scene,
-                            double extent[4]) {
+void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]) {
   (void)renderer;
   (void)scene;
   (void)extent;
 }
 
-supine_status supine_renderer_draw(supine_renderer *renderer, const supine_scene *scene,
-                                   uint32_t *pixels, supine_error *error) {
+supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
+                                 uint32_t *pixels, supine_error *error) {
   (void)renderer;
   (void)scene;
   (void)pixels;
   return refuse(error);
 }
 
-supine_status supine_renderer_png(supine_renderer *renderer, const supine_scene *scene,
-                                  unsigned char **bytes, size_t *size, supine_error *error) {
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
+                                unsigned char **bytes, size_t *size, supine_error *error) {
   (void)renderer;
   (void)scene;
   (void)bytes;
@@ -43,8 +42,8 @@ supine_status supine_renderer_png(supine_renderer *renderer, const supine_scene 
   return refuse(error);
 }
 
-supine_status supine_picture_write(supine_renderer *renderer, const supine_picture *picture,
-                                   FILE *file, supine_error *error) {
+supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
+                                          FILE *file, supine_error *error) {
   (void)renderer;
   (void)picture;
   (void)file;

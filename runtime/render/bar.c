@@ -4,7 +4,7 @@
 
 #include "runtime/render/render.h"
 
-double supine_bar_step(double value) {
+double supine_render_bar_step(double value) {
   if (!(value > 0)) {
     return 0.2;
   }
@@ -13,7 +13,7 @@ double supine_bar_step(double value) {
   return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
-double supine_bar_end(double value) {
-  const double step = supine_bar_step(value);
+double supine_render_bar_end(double value) {
+  const double step = supine_render_bar_step(value);
   return value > 0 ? step * ceil(value / step - 1e-9) : 5 * step;
 }

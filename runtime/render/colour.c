@@ -23,7 +23,7 @@ static double encode(double x) {
 }
 
 /* Lightness rises and hue turns at constant rates, within what sRGB holds. */
-void supine_colour(double t, double rgb[3]) {
+void supine_render_colour(double t, double rgb[3]) {
   const double at = fmin(1, fmax(0, t));
   const double lightness = 0.36 + 0.56 * at;
   const double hue = (300 - 200 * at) * degree;

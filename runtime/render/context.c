@@ -22,7 +22,7 @@ static bool try_display(EGLDisplay display, supine_gl_context *context) {
                          eglChooseConfig(display, config_wanted, &config, 1, &count) && count > 0
                      ? eglCreateContext(display, config, EGL_NO_CONTEXT, context_wanted)
                      : EGL_NO_CONTEXT};
-  if (made.context != EGL_NO_CONTEXT && supine_gl_use(&made)) {
+  if (made.context != EGL_NO_CONTEXT && supine_render_gl_use(&made)) {
     *context = made;
     return true;
   }
@@ -60,7 +60,7 @@ static bool try_all(supine_gl_context *context) {
   return try_display(eglGetDisplay(EGL_DEFAULT_DISPLAY), context);
 }
 
-supine_status supine_gl_open(supine_gl_context *context, supine_error *error) {
+supine_status supine_render_gl_open(supine_gl_context *context, supine_error *error) {
   return try_all(context)
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
@@ -68,11 +68,11 @@ supine_status supine_gl_open(supine_gl_context *context, supine_error *error) {
                                 "Mesa's (Debian: libegl1 libgl1-mesa-dri)");
 }
 
-bool supine_gl_use(const supine_gl_context *context) {
+bool supine_render_gl_use(const supine_gl_context *context) {
   return eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, context->context);
 }
 
-void supine_gl_close(supine_gl_context *context) {
+void supine_render_gl_close(supine_gl_context *context) {
   if (context->context != EGL_NO_CONTEXT) {
     (void)eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     (void)eglDestroyContext(context->display, context->context);

@@ -79,7 +79,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   size_t first;
   size_t last;
-  supine_view_axes(scene->view, c.axes);
+  supine_render_view_axes(scene->view, c.axes);
   shown_lungs(r, scene, &first, &last);
   for (size_t i = 3 * r->basis->lung_begin[first]; i < 3 * r->basis->lung_begin[last]; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)r->basis->vertices[i]);
@@ -93,7 +93,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   return c;
 }
 
-void supine_renderer_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
+void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
   const camera c = find_camera(r, scene);
   const double closest = c.away - 0.98 * depth_in_radii * c.radius;
   size_t first;
@@ -123,7 +123,7 @@ static void load_camera(supine_renderer *r, const supine_scene *scene) {
   if (scene->extent != NULL) {
     memcpy(extent, scene->extent, sizeof extent);
   } else {
-    supine_renderer_extent(r, scene, extent);
+    supine_render_extent(r, scene, extent);
   }
   const double aspect = (double)scene->width / (double)scene->height;
   const double wide = fmax(1e-3, margin * (extent[1] - extent[0]) / 2);
@@ -230,13 +230,13 @@ static void shrink(const canvas *c, const unsigned char *rgba, const supine_scen
   }
 }
 
-supine_status supine_renderer_draw(supine_renderer *r, const supine_scene *scene, uint32_t *pixels,
-                                   supine_error *error) {
+supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, uint32_t *pixels,
+                                 supine_error *error) {
   canvas c = {{0}, {0}, 0, 0};
   unsigned char *rgba = NULL;
   const double dark = scene->dark ? 1 : 0;
   supine_status status = SUPINE_OK;
-  if (!supine_gl_use(&r->gl)) {
+  if (!supine_render_gl_use(&r->gl)) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED, "the OpenGL context is lost");
   }
   if (!canvas_open(&c, scene)) {

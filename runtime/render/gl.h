@@ -17,9 +17,9 @@ typedef struct supine_gl_context {
 
 /* Opens one and makes it current.
  * SUPINE_ERROR_UNSUPPORTED: no driver here draws off screen. */
-supine_status supine_gl_open(supine_gl_context *context, supine_error *error);
-bool supine_gl_use(const supine_gl_context *context);
-void supine_gl_close(supine_gl_context *context);
+supine_status supine_render_gl_open(supine_gl_context *context, supine_error *error);
+bool supine_render_gl_use(const supine_gl_context *context);
+void supine_render_gl_close(supine_gl_context *context);
 
 /* Vertex attributes of the program, by location. */
 enum {
@@ -32,7 +32,7 @@ enum {
 };
 
 /* Compiles and links; 0 after filling `error`. */
-GLuint supine_gl_program(supine_error *error);
+GLuint supine_render_gl_program(supine_error *error);
 
 struct supine_renderer {
   const supine_basis *basis;

@@ -142,7 +142,7 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
   double axes[3][3];
   double seen[3] = {0, 0, 0};
-  supine_view_axes(view, axes);
+  supine_render_view_axes(view, axes);
   cairo_arc(cr, x, y, radius, 0, 2 * pi);
   cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.13);
   cairo_fill_preserve(cr);
@@ -195,8 +195,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
     goto cleanup;
   }
   cairo_surface_flush(image);
-  status = supine_renderer_draw(renderer, &scene,
-                                (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
+  status = supine_render_draw(renderer, &scene,
+                              (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
   if (status == SUPINE_OK) {
     cairo_surface_mark_dirty(image);
     cairo_set_source_surface(cr, image, floor(x), floor(y));
@@ -234,7 +234,7 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   fitted_text(cr, words, y + at->strip / 2 + at->font * 0.95, at->font * 0.82, false, room,
               panel->subtitle);
   fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
-              supine_view_name(view));
+              supine_render_view_name(view));
   return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->strip,
                at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, extent,
                error);
@@ -251,7 +251,7 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   cairo_pattern_t *fade = cairo_pattern_create_linear(x, 0, x + width, 0);
   for (int i = 0; i <= STOPS; ++i) {
     double rgb[3];
-    supine_colour(i / (double)STOPS, rgb);
+    supine_render_colour(i / (double)STOPS, rgb);
     cairo_pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
   }
   cairo_rectangle(cr, x, y, width, height);
@@ -302,7 +302,7 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                              supine_error *error) {
   const theme *look = &themes[picture->dark ? 1 : 0];
   const layout at = make_layout(picture);
-  const bar_scale bar = {picture->largest, supine_bar_step(picture->largest)};
+  const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
   supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(
@@ -321,7 +321,7 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
       const supine_scene scene = {.weights = picture->panel[column].weights,
                                   .scales = picture->panel[column].scales,
                                   .view = picture->view[row]};
-      supine_renderer_extent(renderer, &scene, extent);
+      supine_render_extent(renderer, &scene, extent);
     }
     for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
       status = cell(cr, renderer, picture, &at, &bar, column, row, extent, error);
@@ -335,8 +335,8 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
   return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
 }
 
-supine_status supine_picture_write(supine_renderer *renderer, const supine_picture *picture,
-                                   FILE *file, supine_error *error) {
+supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
+                                          FILE *file, supine_error *error) {
   enum { SIZE_MAX_CAIRO = 32767 };
   if (picture->width > SIZE_MAX_CAIRO || picture->height > SIZE_MAX_CAIRO) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a picture has at most %d x %d pixels",
@@ -387,8 +387,8 @@ static cairo_status_t to_buffer(void *closure, const unsigned char *bytes, unsig
   return CAIRO_STATUS_SUCCESS;
 }
 
-supine_status supine_renderer_png(supine_renderer *renderer, const supine_scene *scene,
-                                  unsigned char **bytes, size_t *size, supine_error *error) {
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
+                                unsigned char **bytes, size_t *size, supine_error *error) {
   buffer out = {NULL, 0, 0};
   supine_status status = SUPINE_ERROR_MEMORY;
   cairo_surface_t *image =
@@ -396,8 +396,8 @@ supine_status supine_renderer_png(supine_renderer *renderer, const supine_scene 
   if (cairo_surface_status(image) == CAIRO_STATUS_SUCCESS &&
       (size_t)cairo_image_surface_get_stride(image) == 4 * scene->width) {
     cairo_surface_flush(image);
-    status = supine_renderer_draw(renderer, scene,
-                                  (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
+    status = supine_render_draw(renderer, scene,
+                                (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
     cairo_surface_mark_dirty(image);
   } else {
     (void)supine_error_set(error, status, "out of memory");

@@ -28,15 +28,15 @@ typedef enum supine_view {
 } supine_view;
 
 /** Name of a view, or NULL beyond the last. */
-const char *supine_view_name(supine_view view);
+const char *supine_render_view_name(supine_view view);
 
 /** Rows of the rotation from body axes to the viewer's: right, up, towards the viewer. */
-void supine_view_axes(supine_view view, double axes[3][3]);
+void supine_render_view_axes(supine_view view, double axes[3][3]);
 
 /** A colour of the map, sRGB 0 to 1, for 0 <= t <= 1, from blue-violet over teal to yellow:
  * lightness and hue of OKLab [Ottosson2020] change at constant rates, so that equal steps look
  * equal and grey copies keep the order. */
-void supine_colour(double t, double rgb[3]);
+void supine_render_colour(double t, double rgb[3]);
 
 /** An OpenGL context with the surface of one basis. For the thread that made it. */
 typedef struct supine_renderer supine_renderer;
@@ -44,10 +44,10 @@ typedef struct supine_renderer supine_renderer;
 /** @param basis  must outlive the renderer
  * @retval SUPINE_ERROR_UNSUPPORTED  no EGL in the build, or no driver that draws
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_renderer_create(const supine_basis *basis, supine_renderer **renderer,
-                                     supine_error *error);
+supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
+                                   supine_error *error);
 /** Releases it; NULL is legal. */
-void supine_renderer_destroy(supine_renderer *renderer);
+void supine_render_destroy(supine_renderer *renderer);
 
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
@@ -61,28 +61,28 @@ typedef struct supine_scene {
   size_t lung;
   bool dark;            /**< lit for a dark page */
   size_t width, height; /**< pixels */
-  const double *extent; /**< [4] of supine_renderer_extent, or NULL: this scene's own */
+  const double *extent; /**< [4] of supine_render_extent, or NULL: this scene's own */
 } supine_scene;
 
-/** Extent to begin supine_renderer_extent with. */
+/** Extent to begin supine_render_extent with. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
 /** Widens an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
  * so that several states can be drawn to one scale. The scenes must share view and lungs. */
-void supine_renderer_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
+void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
 /** Draws on a transparent ground.
  * @param pixels  [height, width] premultiplied ARGB as cairo has it, top row first; written
  * @retval SUPINE_ERROR_ARGUMENT     a size that the driver cannot draw
  * @retval SUPINE_ERROR_UNSUPPORTED  the driver failed
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_renderer_draw(supine_renderer *renderer, const supine_scene *scene,
-                                   uint32_t *pixels, supine_error *error);
+supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
+                                 uint32_t *pixels, supine_error *error);
 
 /** The same as a PNG file in memory (free()). */
-supine_status supine_renderer_png(supine_renderer *renderer, const supine_scene *scene,
-                                  unsigned char **bytes, size_t *size, supine_error *error);
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
+                                unsigned char **bytes, size_t *size, supine_error *error);
 
 /** One posture of a picture. */
 typedef struct supine_panel {
@@ -111,14 +111,14 @@ typedef struct supine_picture {
 } supine_picture;
 
 /** A round number of which 4 to 10 make up `value`: the ticks of a bar of colours. */
-double supine_bar_step(double value);
+double supine_render_bar_step(double value);
 /** The end of a bar whose values reach `value` in the main: rounded up to a tick. */
-double supine_bar_end(double value);
+double supine_render_bar_end(double value);
 
 /** Composes a picture and writes it as PNG.
  * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
- * @retval SUPINE_ERROR_WRITE, and those of supine_renderer_draw */
-supine_status supine_picture_write(supine_renderer *renderer, const supine_picture *picture,
-                                   FILE *file, supine_error *error);
+ * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
+supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
+                                          FILE *file, supine_error *error);
 
 #endif

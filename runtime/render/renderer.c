@@ -18,7 +18,7 @@ static void load_colours(supine_renderer *r) {
   unsigned char texels[COLOURS][4];
   for (int i = 0; i < COLOURS; ++i) {
     double rgb[3];
-    supine_colour(i / (double)(COLOURS - 1), rgb);
+    supine_render_colour(i / (double)(COLOURS - 1), rgb);
     for (int k = 0; k < 3; ++k) {
       texels[i][k] = (unsigned char)(255 * rgb[k] + 0.5);
     }
@@ -102,8 +102,8 @@ static supine_status load_surface(supine_renderer *r, supine_error *error) {
   return status;
 }
 
-supine_status supine_renderer_create(const supine_basis *basis, supine_renderer **renderer,
-                                     supine_error *error) {
+supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
+                                   supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_renderer *r = calloc(1, sizeof *r);
   if (r == NULL) {
@@ -116,11 +116,11 @@ supine_status supine_renderer_create(const supine_basis *basis, supine_renderer 
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
-  status = supine_gl_open(&r->gl, error);
+  status = supine_render_gl_open(&r->gl, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  r->program = supine_gl_program(error);
+  r->program = supine_render_gl_program(error);
   status = r->program != 0 ? load_surface(r, error) : SUPINE_ERROR_UNSUPPORTED;
   if (status == SUPINE_OK) {
     load_colours(r);
@@ -128,19 +128,19 @@ supine_status supine_renderer_create(const supine_basis *basis, supine_renderer 
     r = NULL;
   }
 cleanup:
-  supine_renderer_destroy(r);
+  supine_render_destroy(r);
   return status;
 }
 
-void supine_renderer_destroy(supine_renderer *renderer) {
+void supine_render_destroy(supine_renderer *renderer) {
   if (renderer != NULL) {
-    if (renderer->program != 0 && supine_gl_use(&renderer->gl)) {
+    if (renderer->program != 0 && supine_render_gl_use(&renderer->gl)) {
       glDeleteTextures(1, &renderer->colours); /* names that are 0 are passed over */
       glDeleteBuffers(4, renderer->buffer);
       glDeleteVertexArrays(1, &renderer->array);
       glDeleteProgram(renderer->program);
     }
-    supine_gl_close(&renderer->gl);
+    supine_render_gl_close(&renderer->gl);
     free(renderer->scratch);
     free(renderer);
   }

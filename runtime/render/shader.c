@@ -84,7 +84,7 @@ static GLuint compile(GLenum kind, const char *first, const char *second, supine
   return shader;
 }
 
-GLuint supine_gl_program(supine_error *error) {
+GLuint supine_render_gl_program(supine_error *error) {
   GLint good = GL_FALSE;
   GLuint program = 0;
   const GLuint vertex = compile(GL_VERTEX_SHADER, supine_glsl, vertex_main, error);

@@ -21,10 +21,10 @@ static const struct {
       {0.54550360738501469, -0.77905988955754191, 0.3090169943749474}}},
 };
 
-const char *supine_view_name(supine_view view) {
+const char *supine_render_view_name(supine_view view) {
   return view < SUPINE_VIEW_COUNT ? views[view].name : NULL;
 }
 
-void supine_view_axes(supine_view view, double axes[3][3]) {
+void supine_render_view_axes(supine_view view, double axes[3][3]) {
   memcpy(axes, views[view].axes, sizeof views[view].axes);
 }

@@ -60,7 +60,7 @@ static supine_status find_energy(supine_comparison *c, supine_error *error) {
   return SUPINE_OK;
 }
 
-supine_status supine_comparison_find(supine_comparison *c, supine_error *error) {
+supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   const size_t count = c->postures.count;
@@ -100,7 +100,7 @@ cleanup:
   return status;
 }
 
-void supine_comparison_free(supine_comparison *c) {
+void supine_report_free(supine_comparison *c) {
   supine_compare_destroy(c->compare);
   free(c->posture);
   free(c->pair);
@@ -109,12 +109,12 @@ void supine_comparison_free(supine_comparison *c) {
   c->pair = NULL;
 }
 
-void supine_comparison_inflation(const supine_comparison *c, char *text, size_t size) {
+void supine_report_inflation(const supine_comparison *c, char *text, size_t size) {
   (void)snprintf(text, size, "%g %s", c->inflation.amount,
                  c->inflation.kind == SUPINE_INFLATION_VOLUME ? "mL" : "mm RMS displacement");
 }
 
-double supine_comparison_gain(const supine_comparison *c, size_t posture) {
+double supine_report_gain(const supine_comparison *c, size_t posture) {
   double gain = 0.0;
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
     gain += c->posture[posture].volume[lung];

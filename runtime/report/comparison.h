@@ -32,20 +32,20 @@ typedef struct supine_comparison {
   supine_extremes extremes;         /* farthest: from supine */
 } supine_comparison;
 
-/* Fills in everything after `postures`. Release with supine_comparison_free also after failure. */
-supine_status supine_comparison_find(supine_comparison *comparison, supine_error *error);
-void supine_comparison_free(supine_comparison *comparison);
+/* Fills in everything after `postures`. Release with supine_report_free also after failure. */
+supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
+void supine_report_free(supine_comparison *comparison);
 
 /* "500 mL" or "5 mm RMS displacement". */
-void supine_comparison_inflation(const supine_comparison *comparison, char *text, size_t size);
+void supine_report_inflation(const supine_comparison *comparison, char *text, size_t size);
 
 /* What a posture gains over all lungs, mL. */
-double supine_comparison_gain(const supine_comparison *comparison, size_t posture);
+double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* The forms. They leave errors of writing to be found when the file is closed. */
-void supine_comparison_text(const supine_comparison *comparison, FILE *file);
-bool supine_comparison_json(const supine_comparison *comparison, FILE *file);
-void supine_comparison_csv(const supine_comparison *comparison, FILE *file);
-void supine_comparison_html(const supine_comparison *comparison, FILE *file);
+void supine_report_text(const supine_comparison *comparison, FILE *file);
+bool supine_report_json(const supine_comparison *comparison, FILE *file);
+void supine_report_csv(const supine_comparison *comparison, FILE *file);
+void supine_report_html(const supine_comparison *comparison, FILE *file);
 
 #endif

@@ -16,7 +16,7 @@ static double expansion(const supine_comparison *c, size_t posture, size_t slab)
 }
 
 static double share(const supine_comparison *c, size_t posture, size_t slab) {
-  const double gain = supine_comparison_gain(c, posture);
+  const double gain = supine_report_gain(c, posture);
   return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
 }
 
@@ -40,7 +40,7 @@ static void profile(const supine_comparison *c, const char *title, slab_value *v
       high = fmax(high, value(c, i, s));
     }
   }
-  const double step = supine_bar_step(high - low);
+  const double step = supine_render_bar_step(high - low);
   low = step * floor(low / step);
   high = step * fmax(1.0 + low / step, ceil(high / step));
   (void)fputs("<figure><svg viewBox=\"0 0 420 330\" role=\"img\" aria-label=\"", file);
@@ -62,7 +62,7 @@ static void profile(const supine_comparison *c, const char *title, slab_value *v
     (void)fprintf(file,
                   "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"2.5\" "
                   "stroke-linejoin=\"round\"%s points=\"",
-                  supine_html_line(i), i >= 7 ? " stroke-dasharray=\"6 4\"" : "");
+                  supine_report_html_line(i), i >= 7 ? " stroke-dasharray=\"6 4\"" : "");
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
       (void)fprintf(file, "%s%.1f,%.1f", s > 0 ? " " : "", across(value(c, i, s), low, high),
                     down(95.0 - 10.0 * (double)s));
@@ -71,8 +71,8 @@ static void profile(const supine_comparison *c, const char *title, slab_value *v
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
       (void)fprintf(file, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"><title>",
                     across(value(c, i, s), low, high), down(95.0 - 10.0 * (double)s),
-                    supine_html_line(i));
-      supine_html_text(c->postures.item[i].name, file);
+                    supine_report_html_line(i));
+      supine_report_html_text(c->postures.item[i].name, file);
       (void)fprintf(file, ": %.2f %%</title></circle>\n", value(c, i, s));
     }
   }
@@ -83,11 +83,12 @@ static void profile(const supine_comparison *c, const char *title, slab_value *v
                 (LEFT + RIGHT) / 2, title);
 }
 
-void supine_html_profiles(const supine_comparison *c, FILE *file) {
+void supine_report_html_profiles(const supine_comparison *c, FILE *file) {
   (void)fputs("<p>", file);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file, "<span class=\"key\" style=\"background:%s\"></span>", supine_html_line(i));
-    supine_html_text(c->postures.item[i].name, file);
+    (void)fprintf(file, "<span class=\"key\" style=\"background:%s\"></span>",
+                  supine_report_html_line(i));
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("&#160;&#160; ", file);
   }
   (void)fputs("</p>\n<div class=\"row\">\n", file);
@@ -126,7 +127,7 @@ static void place(const double g[3], double *x, double *y) {
   *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);
 }
 
-void supine_html_map(const supine_comparison *c, FILE *file) {
+void supine_report_html_map(const supine_comparison *c, FILE *file) {
   static const char *const rolls[] = {"prone", "right", "supine", "left", "prone"};
   static const char *const tilts[] = {"inverted", "45&#176;", "level", "45&#176;", "upright"};
   (void)fprintf(file,
@@ -141,8 +142,8 @@ void supine_html_map(const supine_comparison *c, FILE *file) {
       const double rms = from_supine(c, g);
       char hex[8];
       if (!isnan(rms)) {
-        supine_html_colour(c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0,
-                           hex);
+        supine_report_html_colour(
+            c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0, hex);
         (void)fprintf(file, "<path fill=\"%s\" d=\"M%d %dh%dv%dh-%dz\"/>\n", hex,
                       MAP_LEFT + column * CELL, MAP_TOP + row * CELL, CELL, CELL, CELL);
       }
@@ -162,8 +163,8 @@ void supine_html_map(const supine_comparison *c, FILE *file) {
     (void)fprintf(file,
                   "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"6\" fill=\"%s\" stroke=\"#fff\" "
                   "stroke-width=\"2\" shape-rendering=\"auto\"><title>",
-                  x, y, supine_html_line(i));
-    supine_html_text(c->postures.item[i].name, file);
+                  x, y, supine_report_html_line(i));
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("</title></circle>\n", file);
   }
   (void)fprintf(file,

@@ -25,7 +25,7 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   }
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
     char lung_name[32];
-    supine_basis_lung_name(c->basis, lung, lung_name, sizeof lung_name);
+    supine_options_basis_lung_name(c->basis, lung, lung_name, sizeof lung_name);
     row(file, "gain", name, "rest", lung_name, posture->volume[lung], "mL");
   }
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
@@ -36,7 +36,7 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   }
 }
 
-void supine_comparison_csv(const supine_comparison *c, FILE *file) {
+void supine_report_csv(const supine_comparison *c, FILE *file) {
   const size_t count = c->postures.count;
   (void)fputs("quantity,posture,other,part,value,unit\n", file);
   for (size_t i = 0; i < count; ++i) {

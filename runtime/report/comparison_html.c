@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "runtime/render/render.h"
 #include "runtime/options/basis_input.h"
+#include "runtime/render/render.h"
 #include "runtime/report/comparison_html.h"
 
 static const char style[] =
@@ -43,7 +43,7 @@ static const char style[] =
     "--grid:#ddd}section{break-inside:avoid;border-radius:0}"
     "*{-webkit-print-color-adjust:exact;print-color-adjust:exact}main{max-width:none;padding:0}}\n";
 
-void supine_html_text(const char *text, FILE *file) {
+void supine_report_html_text(const char *text, FILE *file) {
   for (const char *c = text; *c != '\0'; ++c) {
     switch (*c) {
     case '&':
@@ -64,15 +64,15 @@ void supine_html_text(const char *text, FILE *file) {
   }
 }
 
-void supine_html_colour(double t, char hex[8]) {
+void supine_report_html_colour(double t, char hex[8]) {
   double rgb[3];
-  supine_colour(t, rgb);
+  supine_render_colour(t, rgb);
   (void)snprintf(hex, 8, "#%02x%02x%02x", (unsigned)(255.0 * rgb[0] + 0.5) & 255U,
                  (unsigned)(255.0 * rgb[1] + 0.5) & 255U, (unsigned)(255.0 * rgb[2] + 0.5) & 255U);
 }
 
 /* Told apart by people with any colour vision (M. Okabe and K. Ito, 2008). */
-const char *supine_html_line(size_t posture) {
+const char *supine_report_html_line(size_t posture) {
   static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                       "#56b4e9", "#e69f00", "#8c8c8c"};
   return lines[posture % (sizeof lines / sizeof *lines)];
@@ -85,8 +85,8 @@ static void statistics(const supine_distance_statistics *d, FILE *file) {
 
 static void name_cell(const supine_comparison *c, size_t posture, FILE *file) {
   (void)fprintf(file, "<td class=\"name\"><span class=\"key\" style=\"background:%s\"></span>",
-                supine_html_line(posture));
-  supine_html_text(c->postures.item[posture].name, file);
+                supine_report_html_line(posture));
+  supine_report_html_text(c->postures.item[posture].name, file);
   (void)fputs("</td>", file);
 }
 
@@ -94,15 +94,15 @@ static void heading(const supine_comparison *c, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   const char *slash = strrchr(c->path, '/');
   char inflation[64];
-  supine_comparison_inflation(c, inflation, sizeof inflation);
+  supine_report_inflation(c, inflation, sizeof inflation);
   (void)fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
               "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
               "<title>Postures of ",
               file);
-  supine_html_text(slash != NULL ? slash + 1 : c->path, file);
+  supine_report_html_text(slash != NULL ? slash + 1 : c->path, file);
   (void)fprintf(file, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", style);
   (void)fputs("<h1>Lungs under gravity: ", file);
-  supine_html_text(slash != NULL ? slash + 1 : c->path, file);
+  supine_report_html_text(slash != NULL ? slash + 1 : c->path, file);
   (void)fprintf(file,
                 "</h1>\n<p class=\"faint\">%zu posture%s at %s; %zu vertices, %.0f cm&#178; of "
                 "surface; supine " SUPINE_VERSION "</p>\n",
@@ -118,9 +118,9 @@ static void posture_table(const supine_comparison *c, FILE *file) {
               file);
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
     char name[32];
-    supine_basis_lung_name(c->basis, lung, name, sizeof name);
+    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
     (void)fputs("<th>", file);
-    supine_html_text(name, file);
+    supine_report_html_text(name, file);
     (void)fputs(", mL</th>", file);
   }
   (void)fputs("</tr></thead>\n<tbody>\n", file);
@@ -144,7 +144,7 @@ static void posture_table(const supine_comparison *c, FILE *file) {
 /* Black or white, whichever reads on a colour of the map. */
 static const char *ink(double t) {
   double rgb[3];
-  supine_colour(t, rgb);
+  supine_render_colour(t, rgb);
   return 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] > 0.5 ? "#101418" : "#fff";
 }
 
@@ -159,19 +159,19 @@ static void matrix(const supine_comparison *c, FILE *file) {
               file);
   for (size_t i = 0; i < count; ++i) {
     (void)fputs("<th>", file);
-    supine_html_text(c->postures.item[i].name, file);
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("</th>", file);
   }
   (void)fputs("</tr></thead>\n<tbody>\n", file);
   for (size_t i = 0; i < count; ++i) {
     (void)fputs("<tr><th>", file);
-    supine_html_text(c->postures.item[i].name, file);
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("</th>", file);
     for (size_t j = 0; j < count; ++j) {
       const double rms = c->pair[i * count + j].rms;
       const double t = largest > 0.0 ? rms / largest : 0.0;
       char hex[8];
-      supine_html_colour(t, hex);
+      supine_report_html_colour(t, hex);
       if (i == j) {
         (void)fputs("<td class=\"self\">0</td>", file);
       } else {
@@ -206,11 +206,11 @@ static void slab_section(const supine_comparison *c, FILE *file) {
               "the lowest point of both lungs. Regional expansion is what the tissue of a slab "
               "gains over its own volume.</p>\n",
               file);
-  supine_html_profiles(c, file);
+  supine_report_html_profiles(c, file);
   (void)fputs("<table>\n<thead><tr><th>height, %</th>", file);
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)fputs("<th>", file);
-    supine_html_text(c->postures.item[i].name, file);
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("</th>", file);
   }
   (void)fputs("</tr></thead>\n<tbody>\n", file);
@@ -228,7 +228,7 @@ static void slab_section(const supine_comparison *c, FILE *file) {
 static void sphere_section(const supine_comparison *c, FILE *file) {
   const supine_extremes *e = &c->extremes;
   (void)fputs("<section>\n<h2>Every direction of gravity</h2>\n", file);
-  supine_html_map(c, file);
+  supine_report_html_map(c, file);
   (void)fprintf(file,
                 "<p>The two directions that differ most, of %zu sampled and the best refined, are "
                 "(%.3f, %.3f, %.3f) and (%.3f, %.3f, %.3f): %.2f mm RMS. Farthest from supine is "
@@ -243,11 +243,11 @@ static void sphere_section(const supine_comparison *c, FILE *file) {
                 100.0 * c->constant, 100.0 * c->odd, 100.0 * c->even);
 }
 
-void supine_comparison_html(const supine_comparison *c, FILE *file) {
+void supine_report_html(const supine_comparison *c, FILE *file) {
   heading(c, file);
   posture_table(c, file);
   (void)fputs("<section>\n<h2>Where each lung moves</h2>\n", file);
-  supine_html_pictures(c, file);
+  supine_report_html_pictures(c, file);
   (void)fputs("</section>\n", file);
   if (c->postures.count > 1) {
     matrix(c, file);

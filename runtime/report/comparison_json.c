@@ -18,7 +18,7 @@ static json_t *volumes(const supine_comparison *c, size_t posture) {
   json_t *list = json_object();
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
     char name[32];
-    supine_basis_lung_name(c->basis, lung, name, sizeof name);
+    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
     (void)json_object_set_new(list, name, json_real(c->posture[posture].volume[lung]));
   }
   return list;
@@ -26,7 +26,7 @@ static json_t *volumes(const supine_comparison *c, size_t posture) {
 
 static json_t *slabs(const supine_comparison *c, size_t posture) {
   json_t *list = json_array();
-  const double total = supine_comparison_gain(c, posture);
+  const double total = supine_report_gain(c, posture);
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
     const supine_slab *slab = &c->posture[posture].slab[s];
     const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
@@ -68,7 +68,7 @@ static json_t *pairs(const supine_comparison *c) {
   return list;
 }
 
-bool supine_comparison_json(const supine_comparison *c, FILE *file) {
+bool supine_report_json(const supine_comparison *c, FILE *file) {
   const supine_extremes *e = &c->extremes;
   const bool volume = c->inflation.kind == SUPINE_INFLATION_VOLUME;
   json_t *root = json_pack(

@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "runtime/export/base64.h"
-#include "runtime/render/render.h"
 #include "runtime/options/basis_input.h"
+#include "runtime/render/render.h"
 #include "runtime/report/comparison_html.h"
 
 enum { WIDTH = 360, HEIGHT = 330, VIEWS_MAX = 1 + SUPINE_LUNGS_MAX };
@@ -24,7 +24,7 @@ static size_t choose_looks(const supine_comparison *c, look *looks) {
   looks[0] = (look){.view = SUPINE_VIEW_ANTERIOR, .title = "from the front"};
   for (size_t lung = 0; lung < lungs; ++lung) {
     char name[32];
-    supine_basis_lung_name(c->basis, lung, name, sizeof name);
+    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
     look *own = &looks[1 + lung];
     *own = (look){.view = strcmp(name, "right") == 0 ? SUPINE_VIEW_RIGHT : SUPINE_VIEW_LEFT,
                   .one_lung = true,
@@ -54,15 +54,15 @@ static supine_status picture(const supine_comparison *c, supine_renderer *render
   supine_scene scene = make_scene(c, from, posture);
   scene.value = value;
   scene.largest = largest;
-  scene.line_step = supine_bar_step(largest);
-  const supine_status status = supine_renderer_png(renderer, &scene, &png, &size, error);
+  scene.line_step = supine_render_bar_step(largest);
+  const supine_status status = supine_render_png(renderer, &scene, &png, &size, error);
   if (status == SUPINE_OK) {
     (void)fputs("<img alt=\"", file);
-    supine_html_text(c->postures.item[posture].name, file);
+    supine_report_html_text(c->postures.item[posture].name, file);
     (void)fputs(", ", file);
-    supine_html_text(from->title, file);
+    supine_report_html_text(from->title, file);
     (void)fputs("\" src=\"data:image/png;base64,", file);
-    export_base64_write(png, size, file);
+    supine_export_base64_write(png, size, file);
     (void)fputs("\"/>\n", file);
   }
   free(png);
@@ -70,13 +70,13 @@ static supine_status picture(const supine_comparison *c, supine_renderer *render
 }
 
 static void bar(double largest, FILE *file) {
-  const double step = supine_bar_step(largest);
+  const double step = supine_render_bar_step(largest);
   (void)fputs("<div style=\"max-width:520px;margin:14px auto 0\"><div class=\"bar\" "
               "style=\"background:linear-gradient(90deg",
               file);
   for (int i = 0; i <= 16; ++i) {
     char hex[8];
-    supine_html_colour(i / 16.0, hex);
+    supine_report_html_colour(i / 16.0, hex);
     (void)fprintf(file, ",%s", hex);
   }
   (void)fputs(")\"></div><div class=\"ticks\">", file);
@@ -99,14 +99,14 @@ static supine_status pictures(const supine_comparison *c, supine_renderer *rende
     const double here = c->posture[i].displacement.p95;
     p95 = here > p95 ? here : p95;
   }
-  const double largest = supine_bar_end(p95);
+  const double largest = supine_render_bar_end(p95);
   (void)fprintf(file,
                 "<div class=\"pictures\" style=\"grid-template-columns:repeat(%zu,"
                 "minmax(130px,1fr))\">\n",
                 c->postures.count);
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)fputs("<b>", file);
-    supine_html_text(c->postures.item[i].name, file);
+    supine_report_html_text(c->postures.item[i].name, file);
     (void)fputs("</b>\n", file);
   }
   for (size_t row = 0; row < count && status == SUPINE_OK; ++row) {
@@ -114,10 +114,10 @@ static supine_status pictures(const supine_comparison *c, supine_renderer *rende
     memcpy(looks[row].extent, none, sizeof none);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const supine_scene scene = make_scene(c, &looks[row], i);
-      supine_renderer_extent(renderer, &scene, looks[row].extent);
+      supine_render_extent(renderer, &scene, looks[row].extent);
     }
     (void)fputs("<span class=\"note\" style=\"grid-column:1/-1\">", file);
-    supine_html_text(looks[row].title, file);
+    supine_report_html_text(looks[row].title, file);
     (void)fputs("</span>\n", file);
     for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
       supine_compare_distances(c->compare, c->posture[i].weights, c->posture[i].scales, NULL, NULL,
@@ -130,16 +130,16 @@ static supine_status pictures(const supine_comparison *c, supine_renderer *rende
   return status;
 }
 
-void supine_html_pictures(const supine_comparison *c, FILE *file) {
+void supine_report_html_pictures(const supine_comparison *c, FILE *file) {
   supine_renderer *renderer = NULL;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   float *value = malloc(supine_basis_get_info(c->basis)->vertex_count * sizeof *value);
-  if (value == NULL || supine_renderer_create(c->basis, &renderer, &error) != SUPINE_OK ||
+  if (value == NULL || supine_render_create(c->basis, &renderer, &error) != SUPINE_OK ||
       pictures(c, renderer, value, file, &error) != SUPINE_OK) {
     (void)fputs("<p class=\"note\">No pictures: ", file);
-    supine_html_text(error.message, file);
+    supine_report_html_text(error.message, file);
     (void)fputs(".</p>\n", file);
   }
-  supine_renderer_destroy(renderer);
+  supine_render_destroy(renderer);
   free(value);
 }

@@ -25,7 +25,7 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
                 "RMS", "95 %", "largest");
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
     char name[32];
-    supine_basis_lung_name(c->basis, lung, name, sizeof name);
+    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
     (void)fprintf(file, " %9s", name);
   }
   (void)fputc('\n', file);
@@ -65,7 +65,7 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
     (void)fprintf(file, "%3zu-%-3zu %% ", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const supine_slab *slab = &c->posture[i].slab[s];
-      const double total = supine_comparison_gain(c, i);
+      const double total = supine_report_gain(c, i);
       (void)fprintf(file, "  %7.2f %6.2f",
                     slab->volume > 0.0 ? 100.0 * slab->gain / slab->volume : 0.0,
                     total != 0.0 ? 100.0 * slab->gain / total : 0.0);
@@ -77,12 +77,12 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
   }
 }
 
-void supine_comparison_text(const supine_comparison *c, FILE *file) {
+void supine_report_text(const supine_comparison *c, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   const supine_extremes *e = &c->extremes;
   const int width = widest_name(c);
   char inflation[64];
-  supine_comparison_inflation(c, inflation, sizeof inflation);
+  supine_report_inflation(c, inflation, sizeof inflation);
   (void)fprintf(file, "%s at %s: %zu vertices, %.0f cm2\n", c->path, inflation, info->vertex_count,
                 supine_compare_area(c->compare) / 100.0);
   print_postures(c, width, file);

@@ -15,16 +15,16 @@ static const struct {
     [SUPINE_F64] = {"F64", 8},
 };
 
-const char *supine_dtype_name(supine_dtype dtype) {
+const char *supine_safetensors_dtype_name(supine_dtype dtype) {
   return dtypes[dtype].name;
 }
 
-size_t supine_dtype_size(supine_dtype dtype) {
+size_t supine_safetensors_dtype_size(supine_dtype dtype) {
   return dtypes[dtype].size;
 }
 
-bool supine_tensor_size(const supine_tensor *tensor, size_t *size) {
-  *size = supine_dtype_size(tensor->dtype);
+bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
+  *size = supine_safetensors_dtype_size(tensor->dtype);
   for (size_t i = 0; i < tensor->rank; ++i) {
     if (__builtin_mul_overflow(*size, tensor->shape[i], size)) {
       return false;
@@ -34,7 +34,7 @@ bool supine_tensor_size(const supine_tensor *tensor, size_t *size) {
 }
 
 static uint64_t hash_text(const char *text, uint64_t seed) {
-  return supine_hash(text, strlen(text), seed);
+  return supine_safetensors_hash(text, strlen(text), seed);
 }
 
 uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
@@ -47,9 +47,11 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
       shape[r] = tensor->shape[r];
     }
     size_t size = 0;
-    (void)supine_tensor_size(tensor, &size);
-    const uint64_t name = hash_text(supine_dtype_name(tensor->dtype), hash_text(tensor->name, 1));
-    sum += supine_hash(tensor->data, size, supine_hash(shape, tensor->rank * sizeof *shape, name));
+    (void)supine_safetensors_tensor_size(tensor, &size);
+    const uint64_t name =
+        hash_text(supine_safetensors_dtype_name(tensor->dtype), hash_text(tensor->name, 1));
+    sum += supine_safetensors_hash(
+        tensor->data, size, supine_safetensors_hash(shape, tensor->rank * sizeof *shape, name));
   }
   for (size_t i = 0; i < metadata_count; ++i) {
     if (strcmp(metadata[i].key, "checksum") != 0) {

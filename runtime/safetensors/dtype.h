@@ -9,12 +9,12 @@
 #include <supine/safetensors.h>
 
 /** The name in the header, "F32"; `dtype` must be in range. */
-const char *supine_dtype_name(supine_dtype dtype);
+const char *supine_safetensors_dtype_name(supine_dtype dtype);
 
 /** Bytes of one element. */
-size_t supine_dtype_size(supine_dtype dtype);
+size_t supine_safetensors_dtype_size(supine_dtype dtype);
 
 /** Bytes of a tensor; false when that overflows. */
-bool supine_tensor_size(const supine_tensor *tensor, size_t *size);
+bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
 
 #endif

@@ -19,7 +19,7 @@ static void hash_block(uint64_t lanes[LANES], const unsigned char *bytes) {
   }
 }
 
-uint64_t supine_hash(const void *bytes, size_t size, uint64_t seed) {
+uint64_t supine_safetensors_hash(const void *bytes, size_t size, uint64_t seed) {
   const unsigned char *at = bytes;
   uint64_t lanes[LANES];
   for (size_t j = 0; j < LANES; ++j) {

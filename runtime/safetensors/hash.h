@@ -16,6 +16,6 @@
  * then the size and the eight lanes, in order, pass through the same step into one word that
  * begins at the seed. Each step is a bijection of the lane and of the word, so that a change
  * within any one word always shows. Guards against accidents, not against forgery. */
-uint64_t supine_hash(const void *bytes, size_t size, uint64_t seed);
+uint64_t supine_safetensors_hash(const void *bytes, size_t size, uint64_t seed);
 
 #endif

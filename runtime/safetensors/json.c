@@ -12,7 +12,7 @@ static void json_skip(json_cursor *cursor) {
   }
 }
 
-bool supine_json_take(json_cursor *cursor, char character) {
+bool supine_safetensors_json_take(json_cursor *cursor, char character) {
   json_skip(cursor);
   if (cursor->at < cursor->end && *cursor->at == character) {
     ++cursor->at;
@@ -21,12 +21,12 @@ bool supine_json_take(json_cursor *cursor, char character) {
   return false;
 }
 
-bool supine_json_at_end(json_cursor *cursor) {
+bool supine_safetensors_json_at_end(json_cursor *cursor) {
   json_skip(cursor);
   return cursor->at == cursor->end;
 }
 
-size_t supine_utf8_length(const char *text, size_t size) {
+size_t supine_safetensors_utf8_length(const char *text, size_t size) {
   const unsigned char *u = (const unsigned char *)text;
   if (size == 0) {
     return 0;
@@ -123,8 +123,8 @@ static char *json_escape(json_cursor *cursor, char *to) {
   return to + 1;
 }
 
-char *supine_json_string(json_cursor *cursor) {
-  if (!supine_json_take(cursor, '"')) {
+char *supine_safetensors_json_string(json_cursor *cursor) {
+  if (!supine_safetensors_json_take(cursor, '"')) {
     return NULL;
   }
   char *const begin = cursor->at;
@@ -147,7 +147,8 @@ char *supine_json_string(json_cursor *cursor) {
       }
       continue;
     }
-    const size_t length = supine_utf8_length(cursor->at, (size_t)(cursor->end - cursor->at));
+    const size_t length =
+        supine_safetensors_utf8_length(cursor->at, (size_t)(cursor->end - cursor->at));
     if (length == 0) {
       return NULL;
     }
@@ -158,7 +159,7 @@ char *supine_json_string(json_cursor *cursor) {
   return NULL;
 }
 
-bool supine_json_count(json_cursor *cursor, size_t *value) {
+bool supine_safetensors_json_count(json_cursor *cursor, size_t *value) {
   json_skip(cursor);
   const char *const begin = cursor->at;
   size_t number = 0;
@@ -174,19 +175,20 @@ bool supine_json_count(json_cursor *cursor, size_t *value) {
   return cursor->at > begin && (*begin != '0' || cursor->at == begin + 1);
 }
 
-bool supine_json_counts(json_cursor *cursor, size_t *values, size_t capacity, size_t *count) {
+bool supine_safetensors_json_counts(json_cursor *cursor, size_t *values, size_t capacity,
+                                    size_t *count) {
   *count = 0;
-  if (!supine_json_take(cursor, '[')) {
+  if (!supine_safetensors_json_take(cursor, '[')) {
     return false;
   }
-  if (supine_json_take(cursor, ']')) {
+  if (supine_safetensors_json_take(cursor, ']')) {
     return true;
   }
   do {
-    if (*count == capacity || !supine_json_count(cursor, &values[*count])) {
+    if (*count == capacity || !supine_safetensors_json_count(cursor, &values[*count])) {
       return false;
     }
     ++*count;
-  } while (supine_json_take(cursor, ','));
-  return supine_json_take(cursor, ']');
+  } while (supine_safetensors_json_take(cursor, ','));
+  return supine_safetensors_json_take(cursor, ']');
 }

@@ -14,22 +14,23 @@ typedef struct json_cursor {
 } json_cursor;
 
 /** Skips white space, then takes `character` when it is next; says whether it was. */
-bool supine_json_take(json_cursor *cursor, char character);
+bool supine_safetensors_json_take(json_cursor *cursor, char character);
 
 /** Skips white space and says whether the text ends there. */
-bool supine_json_at_end(json_cursor *cursor);
+bool supine_safetensors_json_at_end(json_cursor *cursor);
 
 /** Takes a string and decodes it in place, NUL-terminated UTF-8; NULL when there is none, or when
  * it holds a control character, a NUL, a bad escape or bytes that are not UTF-8. */
-char *supine_json_string(json_cursor *cursor);
+char *supine_safetensors_json_string(json_cursor *cursor);
 
 /** Takes a non-negative integer, written without sign, fraction, exponent or leading zeros. */
-bool supine_json_count(json_cursor *cursor, size_t *value);
+bool supine_safetensors_json_count(json_cursor *cursor, size_t *value);
 
 /** Takes an array of at most `capacity` counts. */
-bool supine_json_counts(json_cursor *cursor, size_t *values, size_t capacity, size_t *count);
+bool supine_safetensors_json_counts(json_cursor *cursor, size_t *values, size_t capacity,
+                                    size_t *count);
 
 /** Bytes of the UTF-8 character that `text` (of `size` bytes) begins with; 0 when malformed. */
-size_t supine_utf8_length(const char *text, size_t size);
+size_t supine_safetensors_utf8_length(const char *text, size_t size);
 
 #endif

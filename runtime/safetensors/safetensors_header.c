@@ -48,16 +48,17 @@ static supine_status no_memory(const supine_safetensors *file) {
 }
 
 static supine_status parse_metadata(supine_safetensors *file, json_cursor *cursor) {
-  if (!supine_json_take(cursor, '{')) {
+  if (!supine_safetensors_json_take(cursor, '{')) {
     return bad_json(file, cursor);
   }
-  if (supine_json_take(cursor, '}')) {
+  if (supine_safetensors_json_take(cursor, '}')) {
     return SUPINE_OK;
   }
   do {
-    const char *key = supine_json_string(cursor);
-    const char *value =
-        key != NULL && supine_json_take(cursor, ':') ? supine_json_string(cursor) : NULL;
+    const char *key = supine_safetensors_json_string(cursor);
+    const char *value = key != NULL && supine_safetensors_json_take(cursor, ':')
+                            ? supine_safetensors_json_string(cursor)
+                            : NULL;
     if (value == NULL) {
       return bad_json(file, cursor);
     }
@@ -71,13 +72,13 @@ static supine_status parse_metadata(supine_safetensors *file, json_cursor *curso
       return no_memory(file);
     }
     file->metadata[file->metadata_count++] = (supine_metadata){key, value};
-  } while (supine_json_take(cursor, ','));
-  return supine_json_take(cursor, '}') ? SUPINE_OK : bad_json(file, cursor);
+  } while (supine_safetensors_json_take(cursor, ','));
+  return supine_safetensors_json_take(cursor, '}') ? SUPINE_OK : bad_json(file, cursor);
 }
 
 static bool parse_dtype(const char *name, supine_dtype *dtype) {
   for (int i = 0; i < (int)SUPINE_DTYPE_COUNT; ++i) {
-    if (strcmp(name, supine_dtype_name((supine_dtype)i)) == 0) {
+    if (strcmp(name, supine_safetensors_dtype_name((supine_dtype)i)) == 0) {
       *dtype = (supine_dtype)i;
       return true;
     }
@@ -92,26 +93,26 @@ static supine_status parse_tensor(supine_safetensors *file, json_cursor *cursor,
   bool has_shape = false;
   bool has_offsets = false;
   const char *name = item->tensor.name;
-  if (!supine_json_take(cursor, '{')) {
+  if (!supine_safetensors_json_take(cursor, '{')) {
     return bad_json(file, cursor);
   }
   do {
-    const char *key = supine_json_string(cursor);
-    bool good = key != NULL && supine_json_take(cursor, ':');
+    const char *key = supine_safetensors_json_string(cursor);
+    bool good = key != NULL && supine_safetensors_json_take(cursor, ':');
     if (good && !has_dtype && strcmp(key, "dtype") == 0) {
-      const char *dtype = supine_json_string(cursor);
+      const char *dtype = supine_safetensors_json_string(cursor);
       good = has_dtype = dtype != NULL;
       if (good && !parse_dtype(dtype, &item->tensor.dtype)) {
         return FORMAT_ERROR(file, "tensor '%.64s': dtype '%.16s' is none of U8, U32, F32, F64",
                             name, dtype);
       }
     } else if (good && !has_shape && strcmp(key, "shape") == 0) {
-      good = has_shape = supine_json_counts(cursor, item->tensor.shape, SUPINE_TENSOR_RANK_MAX,
-                                            &item->tensor.rank);
+      good = has_shape = supine_safetensors_json_counts(cursor, item->tensor.shape,
+                                                        SUPINE_TENSOR_RANK_MAX, &item->tensor.rank);
     } else if (good && !has_offsets && strcmp(key, "data_offsets") == 0) {
       size_t offsets[2] = {0, 0};
       size_t count = 0;
-      good = has_offsets = supine_json_counts(cursor, offsets, 2, &count) && count == 2;
+      good = has_offsets = supine_safetensors_json_counts(cursor, offsets, 2, &count) && count == 2;
       item->begin = offsets[0];
       item->end = offsets[1];
     } else {
@@ -120,8 +121,8 @@ static supine_status parse_tensor(supine_safetensors *file, json_cursor *cursor,
     if (!good) {
       return bad_json(file, cursor);
     }
-  } while (supine_json_take(cursor, ','));
-  if (!supine_json_take(cursor, '}')) {
+  } while (supine_safetensors_json_take(cursor, ','));
+  if (!supine_safetensors_json_take(cursor, '}')) {
     return bad_json(file, cursor);
   }
   size_t size = 0;
@@ -129,7 +130,7 @@ static supine_status parse_tensor(supine_safetensors *file, json_cursor *cursor,
     return FORMAT_ERROR(file, "tensor '%.64s' lacks a dtype, a shape of 1 to %d axes or offsets",
                         name, SUPINE_TENSOR_RANK_MAX);
   }
-  if (!supine_tensor_size(&item->tensor, &size) || item->begin > item->end ||
+  if (!supine_safetensors_tensor_size(&item->tensor, &size) || item->begin > item->end ||
       item->end - item->begin != size) {
     return FORMAT_ERROR(file, "tensor '%.64s': its shape and its offsets disagree", name);
   }
@@ -142,11 +143,11 @@ static supine_status parse_header(supine_safetensors *file, size_t length) {
   if (file->header[0] != '{') {
     return FORMAT_ERROR(file, "not a safetensors file");
   }
-  (void)supine_json_take(&cursor, '{');
-  if (!supine_json_take(&cursor, '}')) {
+  (void)supine_safetensors_json_take(&cursor, '{');
+  if (!supine_safetensors_json_take(&cursor, '}')) {
     do {
-      const char *name = supine_json_string(&cursor);
-      if (name == NULL || !supine_json_take(&cursor, ':')) {
+      const char *name = supine_safetensors_json_string(&cursor);
+      if (name == NULL || !supine_safetensors_json_take(&cursor, ':')) {
         return bad_json(file, &cursor);
       }
       if (strcmp(name, "__metadata__") == 0) {
@@ -177,12 +178,12 @@ static supine_status parse_header(supine_safetensors *file, size_t length) {
       if (status != SUPINE_OK) {
         return status;
       }
-    } while (supine_json_take(&cursor, ','));
-    if (!supine_json_take(&cursor, '}')) {
+    } while (supine_safetensors_json_take(&cursor, ','));
+    if (!supine_safetensors_json_take(&cursor, '}')) {
       return bad_json(file, &cursor);
     }
   }
-  return supine_json_at_end(&cursor) ? SUPINE_OK : bad_json(file, &cursor);
+  return supine_safetensors_json_at_end(&cursor) ? SUPINE_OK : bad_json(file, &cursor);
 }
 
 static int entry_compare(const void *left, const void *right) {
@@ -223,7 +224,7 @@ static supine_status place_tensors(supine_safetensors *file, size_t data_begin) 
     const unsigned char *data = file->bytes + data_begin + item->begin;
     file->tensors[i] = item->tensor;
     file->tensors[i].data = data;
-    if ((uintptr_t)data % supine_dtype_size(item->tensor.dtype) != 0) {
+    if ((uintptr_t)data % supine_safetensors_dtype_size(item->tensor.dtype) != 0) {
       const size_t size = item->end - item->begin;
       file->copies[i] = malloc(size + 1);
       if (file->copies[i] == NULL) {

@@ -81,9 +81,9 @@ int main(int argc, char **argv) {
     }
     const double opened = supine_clock_seconds();
     comparison.basis = basis;
-    if (supine_posture_list_parse("compare", "supine,prone,left,right", &comparison.postures) !=
-            0 ||
-        supine_comparison_find(&comparison, &error) != SUPINE_OK) {
+    if (supine_options_posture_list_parse("compare", "supine,prone,left,right",
+                                          &comparison.postures) != 0 ||
+        supine_report_find(&comparison, &error) != SUPINE_OK) {
       (void)fprintf(stderr, "%s\n", error.message);
       return 2;
     }
@@ -102,7 +102,7 @@ int main(int argc, char **argv) {
       (void)printf("%zu vertices, %zu triangles, %zu modes of band %zu\n", info->vertex_count,
                    info->triangle_count, info->mode_count, info->band);
     }
-    supine_comparison_free(&comparison);
+    supine_report_free(&comparison);
     supine_basis_close(basis);
   }
   (void)printf("opening the file            %8.4f s\n"

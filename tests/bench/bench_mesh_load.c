@@ -15,8 +15,8 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include "sh/base/clock.h"
 #include "mesh/mesh.h"
+#include "sh/base/clock.h"
 #include "sh/base/parallel.h"
 
 enum { REPEATS = 9 };
@@ -55,13 +55,13 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
       continue;
     }
     const double loaded = supine_clock_seconds();
-    if (supine_topology_create(&mesh, &topology) == SUPINE_OK) {
+    if (supine_mesh_topology_create(&mesh, &topology) == SUPINE_OK) {
       lungs[i].vertices = mesh.vertex_count;
       lungs[i].edges = topology.edge_count;
     }
     lungs[i].load = loaded - start;
     lungs[i].topology = supine_clock_seconds() - loaded;
-    supine_topology_free(&topology);
+    supine_mesh_topology_free(&topology);
     supine_mesh_free(&mesh);
   }
 }

@@ -13,9 +13,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include "precompute/precompute.h"
 #include "sh/base/clock.h"
 #include "sh/base/parallel.h"
-#include "precompute/precompute.h"
 
 static const char *const sizes[][2] = {
     {"chaste_left_5k.obj", "chaste_right_5k.obj"},
@@ -76,7 +76,7 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   const double joined = supine_clock_seconds();
   *vertices = lungs.mesh.vertex_count;
   if (status == SUPINE_OK) {
-    const supine_precompute_options options = {.model = supine_model_default(),
+    const supine_precompute_options options = {.model = supine_physics_model_default(),
                                                .band = 3,
                                                .progress = note_write,
                                                .progress_context = &writing};

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/clock.h"
-#include "sh/base/parallel.h"
 #include "precompute/phantom/phantom.h"
 #include "precompute/projection/projection.h"
+#include "sh/base/clock.h"
+#include "sh/base/parallel.h"
 
 #include "precompute/physics/equilibrium_internal.h"
 
@@ -35,8 +35,8 @@ static double iterate(supine_equilibrium *eq, const double *norm, bool relaxatio
   *report = (supine_solve_report){0, INFINITY};
   const double begin = supine_clock_seconds();
   if (relaxation) {
-    supine_relaxation(work, report);
-  } else if (supine_conjugate_gradients(work, 200, report) != SUPINE_OK) {
+    supine_physics_relaxation(work, report);
+  } else if (supine_physics_conjugate_gradients(work, 200, report) != SUPINE_OK) {
     exit(EXIT_FAILURE);
   }
   const double seconds = supine_clock_seconds() - begin;
@@ -57,15 +57,15 @@ static void compare(const supine_lungs *lungs, size_t count, int repeats) {
   double least[2] = {INFINITY, INFINITY};
   double *force = malloc(RHS * n * sizeof *force);
   double *caught = malloc(RHS * n * sizeof *caught);
-  const supine_force_law law = supine_force_law_default();
+  const supine_force_law law = supine_physics_force_law_default();
   if (force == NULL || caught == NULL ||
-      supine_network_create(&lungs->mesh, &lungs->topology, &network) != SUPINE_OK ||
-      supine_equilibrium_create(network, count, 1, &eq) != SUPINE_OK ||
-      supine_equilibrium_set_stiffness(eq, NULL, NULL) != SUPINE_OK) {
+      supine_physics_network_create(&lungs->mesh, &lungs->topology, &network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(network, count, 1, &eq) != SUPINE_OK ||
+      supine_physics_equilibrium_set_stiffness(eq, NULL, NULL) != SUPINE_OK) {
     exit(EXIT_FAILURE);
   }
-  supine_force_columns(lungs, &law, force); /* read as n x count: any forces will do */
-  if (supine_equilibrium_solve(eq, count, force, tolerance, false, caught, NULL, NULL) !=
+  supine_physics_force_columns(lungs, &law, force); /* read as n x count: any forces will do */
+  if (supine_physics_equilibrium_solve(eq, count, force, tolerance, false, caught, NULL, NULL) !=
       SUPINE_OK) {
     exit(EXIT_FAILURE);
   }
@@ -80,20 +80,20 @@ static void compare(const supine_lungs *lungs, size_t count, int repeats) {
   (void)printf("%8zu  %3zu  %3zu steps %8.2f ms   %3zu sweeps %8.2f ms   %5.2f\n", n, count,
                report[0].iterations, 1e3 * least[0], report[1].iterations, 1e3 * least[1],
                least[1] / least[0]);
-  supine_equilibrium_destroy(eq);
-  supine_network_destroy(network);
+  supine_physics_equilibrium_destroy(eq);
+  supine_physics_network_destroy(network);
   free(force);
   free(caught);
 }
 
 static void sample(const supine_lungs *lungs) {
   enum { BAND = 7 };
-  supine_force_law law = supine_force_law_default();
+  supine_force_law law = supine_physics_force_law_default();
   supine_projection projection = {0};
   supine_error error;
   law.soften = 1.0;
   const double begin = supine_clock_seconds();
-  if (supine_project_sampled(lungs, &law, NULL, BAND, 0.0, NULL, NULL, &projection, &error) !=
+  if (supine_projection_sampled(lungs, &law, NULL, BAND, 0.0, NULL, NULL, &projection, &error) !=
       SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);
     exit(EXIT_FAILURE);

@@ -18,8 +18,8 @@
 
 #include "sh/base/clock.h"
 #include "sh/grid.h"
-#include <supine/sh.h>
 #include "sh/transform.h"
+#include <supine/sh.h>
 
 #define CHOSEN "SUPINE_BENCH_KERNELS"
 

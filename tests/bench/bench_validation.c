@@ -101,8 +101,8 @@ static void convergence(void) {
   c.links = 2.0 * links / (double)(n + f.topology.edge_count); /* of a node's clique, mean */
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
-    need(supine_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found, NULL,
-                                count_steps, &steps, NULL) == SUPINE_OK,
+    need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
+                                        NULL, count_steps, &steps, NULL) == SUPINE_OK,
          "no solution");
     add_point(&c, (double)steps, found);
   }
@@ -216,15 +216,16 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
 
 /* III-C, IV-B: largest displacement against volume. */
 static void linearity(const supine_lungs *lungs) {
-  const supine_model model = supine_model_default();
+  const supine_model model = supine_physics_model_default();
   double cubic[4][3];
   double largest[4];
   for (size_t p = 0; p < 4; ++p) {
     supine_solution solution = {0};
-    need(supine_solve(lungs, &model, postures[p], &solution, NULL) == SUPINE_OK, "no solution");
+    need(supine_physics_solve(lungs, &model, postures[p], &solution, NULL) == SUPINE_OK,
+         "no solution");
     memcpy(cubic[p], solution.cubic, sizeof cubic[p]);
-    largest[p] = supine_solution_largest(&solution);
-    supine_solution_free(&solution);
+    largest[p] = supine_physics_solution_largest(&solution);
+    supine_physics_solution_free(&solution);
   }
   FILE *csv = begin_csv("linearity", "volume_mL,supine,prone,left,right");
   double bend = 0.0;

@@ -17,7 +17,7 @@ struct full_solve {
 full_solve *full_solve_create(size_t vertices) {
   full_solve *made = calloc(1, sizeof *made);
   supine_mesh mesh = {0};
-  const supine_direction_law law = supine_direction_law_default();
+  const supine_direction_law law = supine_physics_direction_law_default();
   if (made == NULL || supine_phantom_create(vertices, 2500.0, &mesh, NULL) != SUPINE_OK ||
       supine_lungs_create(&mesh, 1, NULL, &made->lungs, NULL) != SUPINE_OK) {
     supine_mesh_free(&mesh);
@@ -32,10 +32,10 @@ full_solve *full_solve_create(size_t vertices) {
   made->positions = malloc(3 * n * sizeof *made->positions);
   if (made->force == NULL || made->caught == NULL || made->directions == NULL ||
       made->positions == NULL ||
-      supine_directions(&made->lungs, &law, made->directions, NULL) != SUPINE_OK ||
-      supine_lungs_network(&made->lungs, &made->network) != SUPINE_OK ||
-      supine_equilibrium_create(made->network, 1, 1, &made->equilibrium) != SUPINE_OK ||
-      supine_equilibrium_set_stiffness(made->equilibrium, NULL, NULL) != SUPINE_OK) {
+      supine_physics_directions(&made->lungs, &law, made->directions, NULL) != SUPINE_OK ||
+      supine_physics_lungs_network(&made->lungs, &made->network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(made->network, 1, 1, &made->equilibrium) != SUPINE_OK ||
+      supine_physics_equilibrium_set_stiffness(made->equilibrium, NULL, NULL) != SUPINE_OK) {
     full_solve_destroy(made);
     return NULL;
   }
@@ -44,8 +44,8 @@ full_solve *full_solve_create(size_t vertices) {
 
 void full_solve_destroy(full_solve *solve) {
   if (solve != NULL) {
-    supine_equilibrium_destroy(solve->equilibrium);
-    supine_network_destroy(solve->network);
+    supine_physics_equilibrium_destroy(solve->equilibrium);
+    supine_physics_network_destroy(solve->network);
     supine_lungs_free(&solve->lungs);
     free(solve->force);
     free(solve->caught);
@@ -62,17 +62,17 @@ size_t full_solve_vertex_count(const full_solve *solve) {
 void full_solve_run(void *context) {
   full_solve *solve = context;
   static const double g[3] = {0.6, 0.48, -0.64};
-  const supine_force_law law = supine_force_law_default();
+  const supine_force_law law = supine_physics_force_law_default();
   const supine_lungs *lungs = &solve->lungs;
   double low;
   double high;
-  if (supine_height_range(&lungs->mesh, 1, g, &low, &high) != SUPINE_OK) {
+  if (supine_physics_height_range(&lungs->mesh, 1, g, &low, &high) != SUPINE_OK) {
     return;
   }
-  supine_force(lungs, &law, g, low, high, solve->force);
+  supine_physics_force(lungs, &law, g, low, high, solve->force);
   /* to the accuracy that a frame needs, not the default's 1e-14 */
-  (void)supine_equilibrium_solve(solve->equilibrium, 1, solve->force, 1e-6, false, solve->caught,
-                                 NULL, NULL);
+  (void)supine_physics_equilibrium_solve(solve->equilibrium, 1, solve->force, 1e-6, false,
+                                         solve->caught, NULL, NULL);
   for (size_t i = 0; i < 3 * lungs->mesh.vertex_count; ++i) {
     solve->positions[i] = lungs->mesh.vertices[i] + solve->caught[i / 3] * solve->directions[i];
   }

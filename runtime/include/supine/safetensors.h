@@ -52,7 +52,7 @@ typedef struct supine_metadata {
  *     tensors    h(data, h(shape as 64-bit words, h(dtype name, h(tensor name, 1))))
  *     metadata   h(value, h(key, 2)), the key "checksum" left out
  *
- * where h(bytes, seed) is supine_hash (runtime/hash.h) and numbers are little-endian.
+ * where h(bytes, seed) is supine_safetensors_hash (runtime/hash.h) and numbers are little-endian.
  * Cost: one pass at about the speed of memory. */
 SUPINE_API uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
                                                 const supine_metadata *metadata,
@@ -66,9 +66,9 @@ SUPINE_API uint64_t supine_safetensors_checksum(const supine_tensor *tensors, si
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
  *                                range, or the key "checksum", which is the writer's
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
-supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
-                                       size_t tensor_count, const supine_metadata *metadata,
-                                       size_t metadata_count, supine_error *error);
+supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
+                                              size_t tensor_count, const supine_metadata *metadata,
+                                              size_t metadata_count, supine_error *error);
 
 /** An opened file. */
 typedef struct supine_safetensors supine_safetensors;
