@@ -18,7 +18,7 @@ file(WRITE "${OUTPUT}" "/* Made by embed.cmake. */
 #include \"assets.h\"
 
 ${arrays}
-const supine_export_asset supine_export_assets[] = {
+const export_asset supine_export_assets[] = {
 ${table}};
 const size_t supine_export_asset_count = ${number};
 ")
