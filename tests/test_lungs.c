@@ -108,6 +108,108 @@ static void test_lungs_given_midline_decides(void **state) {
   supine_mesh_free(&lump);
 }
 
+/* Swaps two corners of every triangle from `first` on. */
+static void turn_inwards(supine_mesh *mesh, size_t first) {
+  for (size_t t = first; t < mesh->triangle_count; ++t) {
+    const uint32_t corner = mesh->triangles[3 * t];
+    mesh->triangles[3 * t] = mesh->triangles[3 * t + 1];
+    mesh->triangles[3 * t + 1] = corner;
+  }
+}
+
+static void test_lungs_inward_are_turned_round_and_told(void **state) {
+  (void)state;
+  for (int which = 0; which < 4; ++which) { /* bit 0: the left, bit 1: the right */
+    supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
+    const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
+    for (int lung = 0; lung < 2; ++lung) {
+      if ((which >> lung & 1) != 0) {
+        turn_inwards(&lumps[lung], 0);
+        assert_true(supine_mesh_volume(&lumps[lung]) < 0.0);
+      }
+    }
+    supine_lungs lungs = {0};
+    assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
+    assert_close(supine_mesh_volume(&lungs.mesh), volume, 1e-12 * volume);
+    assert_int_equal(lungs.turned[0], which & 1);
+    assert_int_equal(lungs.turned[1], which >> 1);
+    supine_lungs_free(&lungs);
+    supine_mesh_free(&lumps[0]);
+    supine_mesh_free(&lumps[1]);
+  }
+}
+
+/* Triangles of one piece that disagree have no inside: the surface counts as open. */
+static void test_lungs_half_inward_is_not_closed(void **state) {
+  (void)state;
+  supine_mesh lump = helper_lump(5, 90.0, 3);
+  turn_inwards(&lump, lump.triangle_count / 2);
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
+  assert_false(lungs.topology.closed);
+  assert_true(lungs.topology.inconsistent_edges > 0);
+  assert_false(lungs.turned[0]);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lump);
+}
+
+static void expect_refused(const supine_mesh *meshes, size_t count, const double *midline,
+                           const char *words) {
+  supine_lungs lungs = {0};
+  supine_error error = {0};
+  assert_int_equal(supine_lungs_create(meshes, count, midline, &lungs, &error), SUPINE_ERROR_MESH);
+  if (strstr(error.message, words) == NULL) {
+    fail_msg("\"%s\" lacks \"%s\"", error.message, words);
+  }
+  assert_null(lungs.mesh.vertices);
+}
+
+static void test_lungs_given_twice_refused_at_any_resolution(void **state) {
+  (void)state;
+  supine_mesh lumps[3] = {helper_lump(20, 90.0, 3), helper_lump(6, -80.0, 4),
+                          helper_lump(20, 90.0, 3)};
+  expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
+  supine_mesh_free(&lumps[2]);
+  lumps[2] = helper_lump(30, 90.0, 3);
+  expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
+  for (size_t m = 0; m < 3; ++m) {
+    supine_mesh_free(&lumps[m]);
+  }
+}
+
+static void test_lungs_crumb_beside_a_lung_refused(void **state) {
+  (void)state;
+  supine_mesh lump = helper_lump(6, 90.0, 3);
+  double vertices[] = {-81.3, 12.0, 33.1, -80.1, 12.6, 34.0, -79.9, 13.5, 33.3};
+  uint32_t triangles[] = {0, 1, 2};
+  supine_mesh meshes[2] = {{3, vertices, 1, triangles}, lump};
+  expect_refused(meshes, 2, NULL, "surface 1 is 1.5 mm long beside");
+  meshes[1] = meshes[0];
+  meshes[0] = lump;
+  expect_refused(meshes, 2, NULL, "surface 2 is 1.5 mm long beside");
+  supine_mesh_free(&lump);
+}
+
+static void test_lungs_midline_out_of_place_refused(void **state) {
+  (void)state;
+  supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
+  double midline = 400.0;
+  expect_refused(lumps, 2, &midline, "x = 400 mm leaves both lungs on its right side");
+  midline = -400.0;
+  expect_refused(lumps, 2, &midline, "x = -400 mm leaves both lungs on its left side");
+  midline = 80.0;
+  expect_refused(lumps, 2, &midline, "x = 80 mm runs through the left lung");
+  midline = 95.0;
+  expect_refused(lumps, 1, &midline, "runs through the right lung");
+  midline = 20.0; /* a little over */
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(lumps, 2, &midline, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(lungs.lung_count, 2);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lumps[0]);
+  supine_mesh_free(&lumps[1]);
+}
+
 static void test_lungs_debris_does_not_make_a_lung(void **state) {
   (void)state;
   supine_mesh meshes[2] = {helper_lump(12, 90.0, 3), helper_lump(2, 20.0, 4)};
@@ -270,6 +372,11 @@ int main(void) {
       cmocka_unit_test(test_lungs_interleaved_file_is_grouped),
       cmocka_unit_test(test_lungs_one_file_midline_is_inner_face),
       cmocka_unit_test(test_lungs_given_midline_decides),
+      cmocka_unit_test(test_lungs_inward_are_turned_round_and_told),
+      cmocka_unit_test(test_lungs_half_inward_is_not_closed),
+      cmocka_unit_test(test_lungs_given_twice_refused_at_any_resolution),
+      cmocka_unit_test(test_lungs_crumb_beside_a_lung_refused),
+      cmocka_unit_test(test_lungs_midline_out_of_place_refused),
       cmocka_unit_test(test_lungs_debris_does_not_make_a_lung),
       cmocka_unit_test(test_lungs_flat_or_empty_surface_refused),
       cmocka_unit_test(test_phantom_pair_is_closed_and_has_its_volume),

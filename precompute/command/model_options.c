@@ -407,6 +407,12 @@ int supine_command_model_load(supine_model_options *options, const char *command
     result = supine_options_fail(command, &error);
     goto cleanup;
   }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    if (lungs->turned[lung]) {
+      supine_options_say(command, "note: the triangles of the %s lung faced inwards: turned round",
+                         supine_lungs_name(lungs, lung));
+    }
+  }
   if (!lungs->topology.closed) {
     supine_options_say(command,
                        "note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "

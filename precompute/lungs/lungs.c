@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "precompute/lungs/lungs.h"
+#include "precompute/lungs/sound.h"
 
 /* A component of fewer vertices than this share follows its side and does not make a lung. */
 static const double significant_share = 0.05;
@@ -193,7 +194,10 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
   if (midline != NULL && !isfinite(*midline)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline must be finite");
   }
-  status = join(meshes, count, &made.mesh, error);
+  status = supine_lungs_check_surfaces(meshes, count, error);
+  if (status == SUPINE_OK) {
+    status = join(meshes, count, &made.mesh, error);
+  }
   if (status != SUPINE_OK) {
     return status;
   }
@@ -219,9 +223,11 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
     goto cleanup;
   }
   const double centre = 0.5 * (made.minimum[0] + made.maximum[0]);
+  const bool sides =
+      two_sided(parts, made.topology.component_count, made.mesh.vertex_count, centre);
   if (midline != NULL) {
     made.midline = *midline;
-  } else if (two_sided(parts, made.topology.component_count, made.mesh.vertex_count, centre)) {
+  } else if (sides) {
     made.midline = centre;
   } else {
     made.midline =
@@ -233,6 +239,11 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
       goto cleanup;
     }
   }
+  status = midline == NULL ? SUPINE_OK : supine_lungs_check_midline(&made, sides, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  supine_lungs_face_outwards(&made);
   *lungs = made;
   made = (supine_lungs){0};
 cleanup:

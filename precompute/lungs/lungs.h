@@ -19,6 +19,7 @@ typedef struct supine_lungs {
   size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
   size_t triangle_begin[3]; /**< likewise its triangles */
   int side[2];              /**< +1 left, -1 right */
+  bool turned[2];           /**< its triangles faced inwards and were turned round */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double midline; /**< x of the sagittal plane that X is measured from, mm */
@@ -32,12 +33,15 @@ typedef struct supine_lungs {
  *
  * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
  * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one.
+ * and the face of the box nearest x = 0 for one. A closed lung whose triangles face inwards is
+ * turned round.
  *
  * @param meshes   [count] left as they are
  * @param midline  mm, or NULL to find it; given, it alone decides who is left and who is right
  * @param lungs    written on success; release with supine_lungs_free
- * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach
+ * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
+ *                                one lung given twice, a surface of next to nothing beside another;
+ *                                a midline through a lung, or with both lungs on one side of it
  * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
