@@ -6,6 +6,8 @@
 
 #include <gsl/gsl_errno.h>
 
+#include <supine/version.h>
+
 #include "runtime/options/command.h"
 
 static const struct {

@@ -51,7 +51,8 @@ static const void *want_shape(const check *c, const char *name, supine_dtype dty
   return tensor == NULL ? NULL : tensor->data;
 }
 
-/* Without a branch an element, so that it runs at the speed of memory: x - x is 0 or NaN. */
+/* Without a branch an element, so that it runs at the speed of memory: an exponent of ones alone is
+ * infinite or NaN. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -103,16 +104,16 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
       info->vertex_count > UINT32_MAX) {
     return refuse(c, "vertices and triangles must be [N, 3], N from 1 to 4294967295");
   }
-  basis->vertices = vertices->data;
-  basis->triangles = triangles->data;
+  basis->info.vertices = vertices->data;
+  basis->info.triangles = triangles->data;
   uint32_t highest = 0;
   for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
-    highest = basis->triangles[i] > highest ? basis->triangles[i] : highest;
+    highest = basis->info.triangles[i] > highest ? basis->info.triangles[i] : highest;
   }
   if (highest >= info->vertex_count) {
     return refuse(c, "a triangle names vertex %u of %zu", highest, info->vertex_count);
   }
-  return finite_floats(basis->vertices, 3 * info->vertex_count)
+  return finite_floats(basis->info.vertices, 3 * info->vertex_count)
              ? SUPINE_OK
              : refuse(c, "a vertex is not finite");
 }
@@ -132,19 +133,19 @@ static supine_status check_field(const check *c, supine_basis *basis) {
                   SUPINE_MODES_MAX);
   }
   info->mode_count = modes;
-  basis->coefficients = coefficients->data;
-  if (!finite_floats(basis->coefficients, n * modes * (info->vector ? 3 : 1))) {
+  basis->info.coefficients = coefficients->data;
+  if (!finite_floats(basis->info.coefficients, n * modes * (info->vector ? 3 : 1))) {
     return refuse(c, "a coefficient is not finite");
   }
   if (info->vector) {
     return SUPINE_OK;
   }
-  basis->direction = want_shape(c, "direction", SUPINE_F32, 2, (size_t[]){n, 3});
-  if (basis->direction == NULL) {
+  basis->info.direction = want_shape(c, "direction", SUPINE_F32, 2, (size_t[]){n, 3});
+  if (basis->info.direction == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  return finite_floats(basis->direction, 3 * n) ? SUPINE_OK
-                                                : refuse(c, "a direction is not finite");
+  return finite_floats(basis->info.direction, 3 * n) ? SUPINE_OK
+                                                     : refuse(c, "a direction is not finite");
 }
 
 static supine_status check_modes(const check *c, supine_basis *basis) {
@@ -160,10 +161,42 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
     return refuse(c, "modes must be [K, (L + 1)^2], K = %zu, L from 0 to %d", info->mode_count,
                   SUPINE_SH_BAND_MAX);
   }
-  basis->modes = modes->data;
-  return finite_doubles(basis->modes, info->mode_count * modes->shape[1])
+  basis->info.modes = modes->data;
+  return finite_doubles(basis->info.modes, info->mode_count * modes->shape[1])
              ? SUPINE_OK
              : refuse(c, "a mode is not finite");
+}
+
+/* "left,right" of the metadata; what it does not name is numbered. */
+static void name_lungs(const supine_safetensors *file, supine_basis *basis) {
+  const char *at = supine_safetensors_metadata(file, "lungs");
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const size_t length = at == NULL ? 0 : strcspn(at, ",");
+    if (length > 0) {
+      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%.*s", (int)length, at);
+    } else {
+      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%zu", lung);
+    }
+    at = at == NULL || at[length] == '\0' ? NULL : at + length + 1;
+    basis->name_of[lung] = basis->names[lung];
+  }
+  basis->info.lung_names = basis->name_of;
+}
+
+static void bound_lungs(supine_basis *basis) {
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    float(*box)[3] = basis->bounds[lung];
+    const float *p = basis->info.vertices + 3 * basis->lung_begin[lung];
+    memcpy(box[0], p, sizeof box[0]);
+    memcpy(box[1], p, sizeof box[1]);
+    for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i, p += 3) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        box[0][axis] = p[axis] < box[0][axis] ? p[axis] : box[0][axis];
+        box[1][axis] = p[axis] > box[1][axis] ? p[axis] : box[1][axis];
+      }
+    }
+  }
+  basis->info.bounds = basis->bounds[0][0];
 }
 
 /* Lungs come one after the other: 0 ... 0 1 ... 1 2 ... */
@@ -190,6 +223,8 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   basis->lung_begin[count] = n;
   info->lung_count = count;
   info->lung_begin = basis->lung_begin;
+  name_lungs(c->file, basis);
+  bound_lungs(basis);
   return SUPINE_OK;
 }
 
@@ -199,7 +234,8 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   const size_t k = info->mode_count;
   const size_t shape[] = {g, k, k, k};
   static const char *const names[] = {"volume_linear", "volume_quadratic", "volume_cubic"};
-  const double **const forms[] = {&basis->linear, &basis->quadratic, &basis->cubic};
+  const double **const forms[] = {&info->volume_linear, &info->volume_quadratic,
+                                  &info->volume_cubic};
   size_t present = 0;
   for (size_t i = 0; i < 3; ++i) {
     present += supine_safetensors_find(c->file, names[i]) != NULL;
@@ -228,6 +264,11 @@ static supine_status prepare(const check *c, supine_basis *basis,
   static const double error_limit = 0.005; /* mm */
   supine_storage storage = options->storage;
   supine_simd simd = options->simd;
+  if (options->size < sizeof *options) {
+    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
+                            "options of %zu bytes: set their size to sizeof(supine_basis_options)",
+                            options->size);
+  }
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
     return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "no such storage or code: %d, %d",
@@ -269,7 +310,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
-  static const supine_basis_options defaults = {SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO};
+  static const supine_basis_options defaults = {.size = sizeof defaults};
   const check c = {file, name, error};
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_basis *basis = calloc(1, sizeof *basis);
@@ -340,10 +381,14 @@ const char *supine_basis_metadata(const supine_basis *basis, const char *key) {
   return supine_safetensors_metadata(basis->file, key);
 }
 
+const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name) {
+  return supine_safetensors_find(basis->file, name);
+}
+
 const float *supine_basis_vertices(const supine_basis *basis) {
-  return basis->vertices;
+  return basis->info.vertices;
 }
 
 const uint32_t *supine_basis_triangles(const supine_basis *basis) {
-  return basis->triangles;
+  return basis->info.triangles;
 }

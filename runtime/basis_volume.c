@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Exact volumes of a basis, from its forms in the weights. */
+#include <string.h>
+
 #include <supine/volume.h>
 
 #include "runtime/internal.h"
@@ -7,8 +9,9 @@
 static void add_lung(const supine_basis *basis, size_t lung, const double *weights,
                      double cubic[3]) {
   const size_t k = basis->info.mode_count;
-  supine_volume_add(k, basis->linear + lung * k, basis->quadratic + lung * k * k,
-                    basis->cubic + lung * k * k * k, weights, cubic);
+  supine_volume_add(k, basis->info.volume_linear + lung * k,
+                    basis->info.volume_quadratic + lung * k * k,
+                    basis->info.volume_cubic + lung * k * k * k, weights, cubic);
 }
 
 static supine_status need_volume(const supine_basis *basis, supine_error *error) {
@@ -19,10 +22,23 @@ static supine_status need_volume(const supine_basis *basis, supine_error *error)
                                 "scale instead, or close the mesh");
 }
 
+void supine_basis_lung_cubic(const supine_basis *basis, size_t lung, const double *weights,
+                             double cubic[3]) {
+  memset(cubic, 0, 3 * sizeof *cubic);
+  add_lung(basis, lung, weights, cubic);
+}
+
+void supine_basis_cubic(const supine_basis *basis, const double *weights, double cubic[3]) {
+  memset(cubic, 0, 3 * sizeof *cubic);
+  for (size_t i = 0; i < basis->info.lung_count; ++i) {
+    add_lung(basis, i, weights, cubic);
+  }
+}
+
 double supine_basis_lung_volume(const supine_basis *basis, size_t lung, const double *weights,
                                 double scale) {
-  double cubic[3] = {0, 0, 0};
-  add_lung(basis, lung, weights, cubic);
+  double cubic[3];
+  supine_basis_lung_cubic(basis, lung, weights, cubic);
   return supine_volume_at(cubic, scale);
 }
 
@@ -32,10 +48,8 @@ supine_status supine_basis_scale(const supine_basis *basis, const double *weight
   if (status != SUPINE_OK) {
     return status;
   }
-  double cubic[3] = {0, 0, 0};
-  for (size_t i = 0; i < basis->info.lung_count; ++i) {
-    add_lung(basis, i, weights, cubic);
-  }
+  double cubic[3];
+  supine_basis_cubic(basis, weights, cubic);
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
@@ -49,7 +63,7 @@ supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung, co
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
                             basis->info.lung_count);
   }
-  double cubic[3] = {0, 0, 0};
-  add_lung(basis, lung, weights, cubic);
+  double cubic[3];
+  supine_basis_lung_cubic(basis, lung, weights, cubic);
   return supine_volume_scale(cubic, volume, scale, error);
 }

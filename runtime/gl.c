@@ -12,10 +12,10 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
   }
   float *to = attributes;
   for (size_t i = begin; i < end; ++i, to += SUPINE_GL_FLOATS) {
-    memcpy(to, basis->vertices + 3 * i, 3 * sizeof *to);
-    memcpy(to + 3, basis->direction + 3 * i, 3 * sizeof *to);
+    memcpy(to, basis->info.vertices + 3 * i, 3 * sizeof *to);
+    memcpy(to + 3, basis->info.direction + 3 * i, 3 * sizeof *to);
     memset(to + 6, 0, SUPINE_GL_MODES * sizeof *to);
-    memcpy(to + 6, basis->coefficients + i * modes, modes * sizeof *to);
+    memcpy(to + 6, basis->info.coefficients + i * modes, modes * sizeof *to);
   }
   return SUPINE_OK;
 }

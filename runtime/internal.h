@@ -5,7 +5,6 @@
 #define SUPINE_RUNTIME_INTERNAL_H
 
 #include <supine/runtime.h>
-#include <supine/safetensors.h>
 
 #include "runtime/kernels/tiles.h"
 
@@ -13,18 +12,16 @@
  * through the caches rather than stay there. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24 };
 
+/** Room for a lung's name. */
+enum { LUNG_NAME_SIZE = 32 };
+
 struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   supine_safetensors *file;
-  const float *vertices;     /**< [N, 3] */
-  const uint32_t *triangles; /**< [M, 3] */
-  const float *direction;    /**< [N, 3], or NULL where the kind is vector */
-  const float *coefficients; /**< [N, K], or [N, 3, K] where the kind is vector */
-  const double *modes;       /**< [K, (L+1)^2] */
-  const double *linear;      /**< [G, K], mL, or NULL; likewise: */
-  const double *quadratic;   /**< [G, K, K] */
-  const double *cubic;       /**< [G, K, K, K] */
+  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< what info.lung_names points to */
+  const char *name_of[SUPINE_LUNGS_MAX];
+  float bounds[SUPINE_LUNGS_MAX][2][3];
 
   supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
   const supine_kernels *kernels;

@@ -8,7 +8,7 @@
 void supine_normals(const supine_basis *basis, const float *xyz, float *normals) {
   memset(normals, 0, 3 * basis->info.vertex_count * sizeof *normals);
   for (size_t t = 0; t < basis->info.triangle_count; ++t) {
-    const uint32_t *corner = basis->triangles + 3 * t;
+    const uint32_t *corner = basis->info.triangles + 3 * t;
     const float *a = xyz + 3 * (size_t)corner[0];
     const float *b = xyz + 3 * (size_t)corner[1];
     const float *c = xyz + 3 * (size_t)corner[2];

@@ -36,12 +36,12 @@ static float flush(float value) {
  * of length 1 and coefficients in mm, and one unit suits all vertices; 1 where the storage is
  * exact. */
 static double direction_length(const supine_basis *basis, size_t i) {
-  if (!supine_tiles_compact(basis->tiles.storage) || basis->direction == NULL) {
+  if (!supine_tiles_compact(basis->tiles.storage) || basis->info.direction == NULL) {
     return 1;
   }
   double square = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double d = (double)basis->direction[3 * i + axis];
+    const double d = (double)basis->info.direction[3 * i + axis];
     square += d * d;
   }
   return square > 0 ? sqrt(square) : 1;
@@ -54,15 +54,17 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   const size_t left = basis->info.vertex_count - begin;
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = begin + (v < left ? v : left - 1);
-    memcpy(from->rest + 3 * v, basis->vertices + 3 * i, 3 * sizeof *from->rest);
+    memcpy(from->rest + 3 * v, basis->info.vertices + 3 * i, 3 * sizeof *from->rest);
     const double length = direction_length(basis, i);
     for (size_t axis = 0; axis < 3; ++axis) {
       from->direction[3 * v + axis] =
-          basis->direction != NULL ? (float)((double)basis->direction[3 * i + axis] / length) : 0;
+          basis->info.direction != NULL
+              ? (float)((double)basis->info.direction[3 * i + axis] / length)
+              : 0;
     }
     for (size_t row = 0; row < axes * modes; ++row) {
       from->coefficients[row * TILE + v] =
-          flush((float)(length * (double)basis->coefficients[i * axes * modes + row]));
+          flush((float)(length * (double)basis->info.coefficients[i * axes * modes + row]));
     }
   }
 }
@@ -87,7 +89,8 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
     const double length = direction_length(basis, i);
     for (size_t row = rows * i; row < rows * (i + 1); ++row) {
       for (size_t k = 0; k < modes; ++k) {
-        const float size = (float)(length * fabs((double)basis->coefficients[row * modes + k]));
+        const float size =
+            (float)(length * fabs((double)basis->info.coefficients[row * modes + k]));
         top[k] = size > top[k] ? size : top[k];
       }
     }
@@ -112,8 +115,8 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
 static void choose_units(supine_basis *basis, units *u) {
   const supine_storage storage = basis->tiles.storage;
   const bool compact = supine_tiles_compact(storage);
-  u->rest = compact ? fixed_unit(largest(basis->vertices, 3 * basis->info.vertex_count)) : 1;
-  u->direction = compact && basis->direction != NULL ? 1.0 / FIXED_TOP : 1; /* of length 1 */
+  u->rest = compact ? fixed_unit(largest(basis->info.vertices, 3 * basis->info.vertex_count)) : 1;
+  u->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1; /* of length 1 */
   basis->tiles.rest_unit = (uint32_t)ilogb(u->rest) << FLOAT_FRACTION_BITS;
   float top[SUPINE_MODES_MAX];
   largest_coefficients(basis, top);
@@ -337,6 +340,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
     measure(basis, was, is);
   }
   basis->info.storage = storage;
+  basis->info.packed = tiles->bytes;
   basis->info.bytes_per_vertex = (double)tiles->stride / TILE;
   status = SUPINE_OK;
 

@@ -15,7 +15,7 @@ supine_status supine_basis_weights(const supine_basis *basis, const double gravi
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     double sum = 0;
     for (size_t i = 0; i < count; ++i) {
-      sum += basis->modes[k * count + i] * y[i];
+      sum += basis->info.modes[k * count + i] * y[i];
     }
     weights[k] = sum;
   }

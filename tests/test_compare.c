@@ -38,7 +38,7 @@ static made make(size_t vertices, size_t modes, size_t band, size_t lungs, bool 
   made m = {.f = fixture_create(vertices, modes, band, lungs, vector, volume, 6.3, 20041)};
   size_t size = 0;
   m.bytes = fixture_bytes(m.f, &size);
-  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   assert_int_equal(supine_basis_open_memory_with(m.bytes, size, &exact, &m.basis, NULL), SUPINE_OK);
   assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
   return m;

@@ -207,7 +207,7 @@ static void check_stated_error(const supine_lungs *of, bool scalar, const char *
       SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
   assert_int_equal(supine_basis_get_info(basis)->vector, !scalar);
@@ -288,7 +288,7 @@ static void test_fit_vector_volumes_exact(void **state) {
   assert_int_equal(
       supine_precompute_fields(&lungs, &fields, &options, NULL, path, &report, NULL, NULL),
       SUPINE_OK);
-  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
   const size_t n = lungs.mesh.vertex_count;

@@ -74,7 +74,7 @@ static supine_precompute_report make_basis(const supine_lungs *lungs, size_t ban
 
 /* As the file has it: what compact storage adds is the run time's to state. */
 static supine_basis *open_basis(void) {
-  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {

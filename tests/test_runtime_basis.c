@@ -358,6 +358,75 @@ static void test_open_foreign_files_refused(void **state) {
   assert_int_equal(supine_basis_open("/tmp", &basis, &error), SUPINE_ERROR_READ);
 }
 
+/* What an open basis shows is the file's own numbers. */
+static void check_view(bool vector, bool volume) {
+  fixture *f = fixture_create(26, 3, 1, 2, vector, volume, 9, 41);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  assert_memory_equal(info->vertices, f->vertex, 3 * f->vertices * sizeof(float));
+  assert_memory_equal(info->triangles, f->triangle, 3 * f->triangles * sizeof(uint32_t));
+  assert_memory_equal(info->coefficients, f->coefficient,
+                      (vector ? 9 : 3) * f->vertices * sizeof(float));
+  assert_memory_equal(info->modes, f->mode, 3 * 4 * sizeof(double));
+  assert_true((info->direction == NULL) == vector);
+  assert_true((info->volume_linear != NULL) == volume);
+  if (!vector) {
+    assert_memory_equal(info->direction, f->direction, 3 * f->vertices * sizeof(float));
+  }
+  for (size_t lung = 0; lung < 2; ++lung) {
+    float box[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 3 * f->lung_begin[lung]; i < 3 * f->lung_begin[lung + 1]; ++i) {
+      box[i % 3] = fminf(box[i % 3], f->vertex[i]);
+      box[3 + i % 3] = fmaxf(box[3 + i % 3], f->vertex[i]);
+    }
+    assert_memory_equal(info->bounds + 6 * lung, box, sizeof box);
+    assert_string_equal(info->lung_names[lung], lung == 0 ? "0" : "1"); /* the file has no names */
+  }
+  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
+  assert_non_null(lung);
+  assert_memory_equal(lung->data, f->lung, f->vertices);
+  assert_null(supine_basis_tensor(basis, "lungs"));
+  if (volume) {
+    const double w[3] = {0.3, -1.1, 0.7};
+    double cubic[3][3];
+    supine_basis_lung_cubic(basis, 0, w, cubic[0]);
+    supine_basis_lung_cubic(basis, 1, w, cubic[1]);
+    supine_basis_cubic(basis, w, cubic[2]);
+    for (size_t j = 0; j < 3; ++j) {
+      const double sum = cubic[0][j] + cubic[1][j];
+      assert_true(fabs(cubic[2][j] - sum) <= 1e-12 * (fabs(cubic[0][j]) + fabs(cubic[1][j])));
+    }
+    const double s = 1.3;
+    const double said = supine_basis_lung_volume(basis, 1, w, s);
+    const double *c = cubic[1];
+    assert_true(fabs(s * (c[0] + s * (c[1] + s * c[2])) - said) <= 1e-12 * fabs(said));
+  }
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+static void test_view_shows_the_file(void **state) {
+  (void)state;
+  check_view(false, true);
+  check_view(true, true);
+  check_view(false, false);
+}
+
+static void test_version_of_library_is_that_of_headers(void **state) {
+  (void)state;
+  int part[3] = {0};
+  char text[32];
+  assert_string_equal(supine_version(), SUPINE_VERSION);
+  assert_int_equal(sscanf(supine_version(), "%d.%d.%d", &part[0], &part[1], &part[2]), 3);
+  assert_int_equal(10000 * part[0] + 100 * part[1] + part[2], SUPINE_VERSION_NUMBER);
+  (void)snprintf(text, sizeof text, "%d.%d.%d", part[0], part[1], part[2]);
+  assert_string_equal(text, SUPINE_VERSION);
+}
+
 static void test_weights_bad_gravity_refused(void **state) {
   (void)state;
   fixture *f = fixture_create(5, 2, 1, 1, false, false, 1, 6);
@@ -395,6 +464,8 @@ int main(void) {
       cmocka_unit_test(test_open_too_many_modes_or_bands_refused),
       cmocka_unit_test(test_open_foreign_files_refused),
       cmocka_unit_test(test_weights_bad_gravity_refused),
+      cmocka_unit_test(test_view_shows_the_file),
+      cmocka_unit_test(test_version_of_library_is_that_of_headers),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,9 +13,15 @@
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 
-#include "runtime/internal.h"
-
-enum { ENTRIES_MAX = 64, BATCH = 64, HUGE_PAGE = 1 << 21, ARITHMETIC = 2000000, ENOUGH = 2000000 };
+enum {
+  TILE = 16,
+  TILE_NUMBERS = 48, /* vertices that the evaluator takes at once */
+  ENTRIES_MAX = 64,
+  BATCH = 64,
+  HUGE_PAGE = 1 << 21,
+  ARITHMETIC = 2000000,
+  ENOUGH = 2000000
+};
 
 const char *supine_bench_storage_name(supine_storage storage) {
   static const char *const names[SUPINE_STORAGE_COUNT] = {"auto",    "exact", "float32",
@@ -179,14 +185,15 @@ static void range_copy(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   const bench *work = t->work;
   (void)thread;
-  triad(t->basis->info.simd, end - begin, work->a + begin, NULL, work->c + begin);
+  triad(supine_basis_get_info(t->basis)->simd, end - begin, work->a + begin, NULL, work->c + begin);
 }
 
 static void range_triad(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   const bench *work = t->work;
   (void)thread;
-  triad(t->basis->info.simd, end - begin, work->a + begin, work->b + begin, work->c + begin);
+  triad(supine_basis_get_info(t->basis)->simd, end - begin, work->a + begin, work->b + begin,
+        work->c + begin);
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -210,20 +217,21 @@ traffic_avx512(const unsigned char *tiles, size_t stride, size_t count, float *x
  * ordinary ones, and this is no bound. */
 static void range_traffic(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
-  const supine_tiles *tiles = &t->basis->tiles;
-  const unsigned char *tile = tiles->bytes + begin / TILE * tiles->stride;
+  const supine_basis_info *info = supine_basis_get_info(t->basis);
+  const size_t stride = (size_t)(info->bytes_per_vertex * TILE);
+  const unsigned char *tile = (const unsigned char *)info->packed + begin / TILE * stride;
   float *xyz = t->work->xyz + 3 * begin;
   const size_t count = (end - begin) / TILE;
   (void)thread;
 #if defined(__x86_64__) && defined(__GNUC__)
-  if (t->basis->info.simd == SUPINE_SIMD_AVX512) {
-    traffic_avx512(tile, tiles->stride, count, xyz);
+  if (info->simd == SUPINE_SIMD_AVX512) {
+    traffic_avx512(tile, stride, count, xyz);
     return;
   }
 #endif
-  for (size_t i = 0; i < count; ++i, tile += tiles->stride, xyz += TILE_NUMBERS) {
+  for (size_t i = 0; i < count; ++i, tile += stride, xyz += TILE_NUMBERS) {
     float sum[TILE] = {0};
-    for (size_t at = 0; at < tiles->stride; at += sizeof sum) {
+    for (size_t at = 0; at < stride; at += sizeof sum) {
       float line[TILE];
       memcpy(line, tile + at, sizeof line);
       for (size_t v = 0; v < TILE; ++v) {
@@ -278,7 +286,8 @@ static supine_status bench_open(bench *work, size_t vertices, const supine_basis
     return status;
   }
   for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
-    const supine_basis_options options = {(supine_storage)storage, SUPINE_SIMD_AUTO};
+    const supine_basis_options options = {sizeof options, (supine_storage)storage,
+                                          SUPINE_SIMD_AUTO};
     status = supine_basis_open_memory_with(work->image.bytes, work->image.size, &options,
                                            &work->bases[storage], error);
     if (status != SUPINE_OK) {
@@ -337,10 +346,10 @@ static supine_bench_row *add(list *l, bench *work, const char *what, const supin
 
 /* The evaluator's own numbers; `modes` + 3 and + 2 are those of deform.c's formula. */
 static void say_basis(supine_bench_row *row, const supine_basis *basis) {
-  row->storage = supine_bench_storage_name(basis->info.storage);
-  row->code = supine_bench_code_name(basis->info.simd);
-  row->multiplications = (double)basis->info.mode_count + 3;
-  row->additions = (double)basis->info.mode_count + 2;
+  row->storage = supine_bench_storage_name(supine_basis_get_info(basis)->storage);
+  row->code = supine_bench_code_name(supine_basis_get_info(basis)->simd);
+  row->multiplications = (double)supine_basis_get_info(basis)->mode_count + 3;
+  row->additions = (double)supine_basis_get_info(basis)->mode_count + 2;
 }
 
 static void add_all(list *l, bench *work, size_t threads) {
@@ -351,23 +360,23 @@ static void add_all(list *l, bench *work, size_t threads) {
   for (int storage = SUPINE_STORAGE_COUNT - 1; storage >= SUPINE_STORAGE_EXACT; --storage) {
     const supine_basis *basis = work->bases[storage];
     row = add(l, work, "supine", basis, threads, range_deform, n,
-              basis->info.bytes_per_vertex + output);
+              supine_basis_get_info(basis)->bytes_per_vertex + output);
     say_basis(row, basis);
   }
   for (int storage = SUPINE_STORAGE_COUNT - 1; storage >= SUPINE_STORAGE_EXACT; --storage) {
     const supine_basis *basis = work->bases[storage];
     row = add(l, work, "traffic", basis, threads, range_traffic, n,
-              basis->info.bytes_per_vertex + output);
-    row->storage = supine_bench_storage_name(basis->info.storage);
+              supine_basis_get_info(basis)->bytes_per_vertex + output);
+    row->storage = supine_bench_storage_name(supine_basis_get_info(basis)->storage);
   }
   const supine_basis *basis = work->bases[SUPINE_STORAGE_INT16];
   row = add(l, work, "supine_separate", basis, threads, range_separate, n,
-            basis->info.bytes_per_vertex + output);
+            supine_basis_get_info(basis)->bytes_per_vertex + output);
   say_basis(row, basis);
   row = add(l, work, "supine_step", basis, threads, range_step, n, 3 * output);
   row->additions = 3;
   row = add(l, work, "supine_batch64", basis, threads, range_batch, work->batch_vertices,
-            basis->info.bytes_per_vertex / BATCH + output);
+            supine_basis_get_info(basis)->bytes_per_vertex / BATCH + output);
   say_basis(row, basis);
   row->vertices = BATCH * work->batch_vertices;
   row = add(l, work, "plain_loop", basis, threads, range_plain, n, 4 * modes + 3 * output);

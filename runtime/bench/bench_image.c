@@ -10,8 +10,6 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
-#include "runtime/internal.h"
-
 enum { HEADER_BYTES = 2048, HUGE_PAGE = 1 << 21 };
 
 /* Even in [-1, 1), from the number of the value alone: splitmix64. */
@@ -32,26 +30,27 @@ static void fill_noise(float *coefficients, float *direction, float *rest, size_
   }
 }
 
-static void fill_like(const supine_basis *like, float *coefficients, float *direction, float *rest,
-                      size_t n) {
-  const size_t modes = like->info.mode_count;
-  for (size_t i = 0; i < n; i += like->info.vertex_count) {
-    const size_t count = n - i < like->info.vertex_count ? n - i : like->info.vertex_count;
+static void fill_like(const supine_basis_info *like, float *coefficients, float *direction,
+                      float *rest, size_t n) {
+  const size_t modes = like->mode_count;
+  for (size_t i = 0; i < n; i += like->vertex_count) {
+    const size_t count = n - i < like->vertex_count ? n - i : like->vertex_count;
     memcpy(coefficients + i * modes, like->coefficients, count * modes * sizeof(float));
     memcpy(direction + 3 * i, like->direction, 3 * count * sizeof(float));
     memcpy(rest + 3 * i, like->vertices, 3 * count * sizeof(float));
   }
 }
 
-supine_status supine_bench_image_create(size_t vertices, size_t modes, const supine_basis *like,
+supine_status supine_bench_image_create(size_t vertices, size_t modes, const supine_basis *basis,
                                         supine_bench_image *image, supine_error *error) {
+  const supine_basis_info *like = basis == NULL ? NULL : supine_basis_get_info(basis);
   *image = (supine_bench_image){0};
-  if (like != NULL && like->info.vector) {
+  if (like != NULL && like->vector) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                             "a basis with a vector field cannot be repeated for measuring");
   }
-  const size_t k = like != NULL ? like->info.mode_count : modes;
-  size_t harmonics = like != NULL ? supine_sh_count(like->info.band) : 0;
+  const size_t k = like != NULL ? like->mode_count : modes;
+  size_t harmonics = like != NULL ? supine_sh_count(like->band) : 0;
   for (size_t band = 0; like == NULL && harmonics < k; ++band) {
     harmonics = supine_sh_count(band);
   }

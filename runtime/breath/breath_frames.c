@@ -33,21 +33,6 @@ void supine_breath_frames_destroy(breath_frames *frames) {
   }
 }
 
-/* The volume's cubic in the scale, mL, from its values at -1, 1 and 2. */
-static void find_cubic(const supine_basis *basis, const double *weights, double cubic[3]) {
-  double at[3] = {0.0, 0.0, 0.0};
-  static const double scales[3] = {-1.0, 1.0, 2.0};
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    for (size_t i = 0; i < 3; ++i) {
-      at[i] += supine_basis_lung_volume(basis, lung, weights, scales[i]);
-    }
-  }
-  const double odd = 0.5 * (at[1] - at[0]);
-  cubic[1] = 0.5 * (at[1] + at[0]);
-  cubic[2] = (at[2] - 4.0 * cubic[1] - 2.0 * odd) / 6.0;
-  cubic[0] = odd - cubic[2];
-}
-
 static supine_status find_scales(breath_frames *frames, supine_error *error) {
   const breath_course *course = frames->course;
   for (size_t t = 0; t < course->count; ++t) {
@@ -95,7 +80,7 @@ static void find_runs(breath_frames *frames) {
       supine_basis_weights(frames->basis, course->gravity, weights) != SUPINE_OK) {
     return;
   }
-  find_cubic(frames->basis, weights, cubic);
+  supine_basis_cubic(frames->basis, weights, cubic);
   size_t first = 0;
   while (first < course->count) {
     size_t last = first;

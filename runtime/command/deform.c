@@ -189,7 +189,8 @@ int supine_command_deform(int argc, char **argv) {
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT}; /* one frame, for a file */
+  const supine_basis_options exact = {sizeof exact,
+                                      .storage = SUPINE_STORAGE_EXACT}; /* one frame, for a file */
   supine_basis *basis = NULL;
   supine_error error;
   if (supine_basis_open_with(argv[optind], &exact, &basis, &error) != SUPINE_OK) {

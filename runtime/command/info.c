@@ -6,8 +6,8 @@
 
 #include <jansson.h>
 
+#include <supine/compare.h>
 #include <supine/runtime.h>
-#include <supine/safetensors.h>
 
 #include "runtime/options/basis_input.h"
 
@@ -20,57 +20,31 @@ static const char help[] =
     "and\n"
     "its error, measured against the full solve on directions that no grid used.\n"
     "\n"
-    "Energy per band is the share of the squared displacement, over all orientations, that the\n"
-    "harmonics of each band l carry. Odd bands change sign when gravity does; the even bands "
-    "beyond\n"
-    "l = 0 are what makes prone more than the reverse of supine.\n"
+    "Energy per band is the share of the squared displacement, over the surface and all\n"
+    "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity\n"
+    "does; the even bands beyond l = 0 are what makes prone more than the reverse of supine.\n"
     "\n"
     "  --json               the same for programs\n";
 
-/* Share of the squared displacement in each band, [band + 1]: sum over the band's harmonics of
- * modes^T G modes with G = sum over vertices of |d|^2 c c^T. */
-static bool band_energy(const supine_safetensors *file, const supine_basis_info *info,
-                        double *energy) {
-  const size_t k = info->mode_count;
-  const size_t terms = (info->band + 1) * (info->band + 1);
-  const float *c = supine_safetensors_find(file, "coefficients")->data;
-  const double *modes = supine_safetensors_find(file, "modes")->data;
-  const float *d = info->vector ? NULL : supine_safetensors_find(file, "direction")->data;
-  const size_t rows = info->vertex_count * (info->vector ? 3 : 1);
-  double *gram = calloc(k * k, sizeof *gram);
-  if (gram == NULL) {
-    return false;
+/* Share of the squared displacement in each band, [band + 1]; zeros where the surface has no area.
+ */
+static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
+  supine_compare *compare = NULL;
+  const supine_status status = supine_compare_create(basis, &compare, error);
+  if (status != SUPINE_OK) {
+    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
   }
-  for (size_t i = 0; i < rows; ++i) {
-    const float *u = d + 3 * i;
-    const double weight =
-        info->vector ? 1.0 : (double)u[0] * u[0] + (double)u[1] * u[1] + (double)u[2] * u[2];
-    for (size_t a = 0; a < k; ++a) {
-      const double scaled = weight * (double)c[i * k + a];
-      for (size_t b = a; b < k; ++b) {
-        gram[a * k + b] += scaled * (double)c[i * k + b];
-      }
-    }
-  }
+  supine_compare_energy(compare, energy);
+  supine_compare_destroy(compare);
   double total = 0.0;
-  size_t t = 0;
-  for (size_t l = 0; l <= info->band; ++l) {
-    energy[l] = 0.0;
-    for (; t < (l + 1) * (l + 1); ++t) {
-      for (size_t a = 0; a < k; ++a) {
-        for (size_t b = 0; b < k; ++b) {
-          const double g = a <= b ? gram[a * k + b] : gram[b * k + a];
-          energy[l] += modes[a * terms + t] * g * modes[b * terms + t];
-        }
-      }
-    }
+  const size_t band = supine_basis_get_info(basis)->band;
+  for (size_t l = 0; l <= band; ++l) {
     total += energy[l];
   }
-  for (size_t l = 0; l <= info->band; ++l) {
-    energy[l] /= total;
+  for (size_t l = 0; l <= band; ++l) {
+    energy[l] /= total > 0.0 ? total : 1.0;
   }
-  free(gram);
-  return true;
+  return SUPINE_OK;
 }
 
 static const char *const shown[] = {
@@ -142,8 +116,8 @@ static void print_text(const char *path, const supine_basis *basis, const double
 }
 
 /* A tensor of errors in the file, or NULL. */
-static const double *error_list(const supine_safetensors *file, const char *key, size_t *count) {
-  const supine_tensor *tensor = supine_safetensors_find(file, key);
+static const double *error_list(const supine_basis *basis, const char *key, size_t *count) {
+  const supine_tensor *tensor = supine_basis_tensor(basis, key);
   if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {
     *count = 0;
     return NULL;
@@ -153,11 +127,11 @@ static const double *error_list(const supine_safetensors *file, const char *key,
 }
 
 /* Error against the number of functions of orientation, each a multiplication per vertex. */
-static void print_table(const supine_safetensors *file) {
+static void print_table(const supine_basis *basis) {
   size_t bands;
   size_t modes;
-  const double *harmonics = error_list(file, "error_harmonics", &bands);
-  const double *best = error_list(file, "error_modes", &modes);
+  const double *harmonics = error_list(basis, "error_harmonics", &bands);
+  const double *best = error_list(basis, "error_modes", &modes);
   if (harmonics == NULL || best == NULL) {
     return;
   }
@@ -186,8 +160,7 @@ static json_t *number_or_text(const char *text) {
   return supine_options_parse_number(text, &value) ? json_real(value) : json_string(text);
 }
 
-static bool print_json(const char *path, const supine_basis *basis, const supine_safetensors *file,
-                       const double *energy) {
+static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   json_t *bands = json_array();
   json_t *error = json_object();
@@ -218,7 +191,7 @@ static bool print_json(const char *path, const supine_basis *basis, const supine
   for (size_t i = 0; good && i < 2; ++i) {
     static const char *const keys[] = {"error_harmonics", "error_modes"};
     size_t count;
-    const double *values = error_list(file, keys[i], &count);
+    const double *values = error_list(basis, keys[i], &count);
     json_t *list = json_array();
     for (size_t k = 0; values != NULL && k < count; ++k) {
       (void)json_array_append_new(list, json_real(values[k]));
@@ -254,34 +227,35 @@ int supine_command_info(int argc, char **argv) {
   }
   const char *path = argv[optind];
   supine_basis *basis = NULL;
-  supine_safetensors *file = NULL;
   supine_error error;
   int result = SUPINE_EXIT_OK;
   double *energy = NULL;
-  if (supine_basis_open(path, &basis, &error) != SUPINE_OK ||
-      supine_safetensors_open(path, &file, &error) != SUPINE_OK) {
+  if (supine_basis_open(path, &basis, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
   energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
-  if (energy == NULL || !band_energy(file, supine_basis_get_info(basis), energy)) {
+  if (energy == NULL) {
     supine_options_say(name, "out of memory");
     result = SUPINE_EXIT_NUMERICAL;
     goto cleanup;
   }
-  if (json && !print_json(path, basis, file, energy)) {
+  if (band_energy(basis, energy, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  if (json && !print_json(path, basis, energy)) {
     supine_options_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
   if (!json) {
     print_text(path, basis, energy);
-    print_table(file);
+    print_table(basis);
   }
   result = supine_options_finish(name);
 cleanup:
   free(energy);
-  supine_safetensors_close(file);
   supine_basis_close(basis);
   return result;
 }

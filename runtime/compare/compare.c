@@ -12,9 +12,9 @@ static const double four_pi = 12.566370614359172954;
 
 /* Twice the area of a triangle, mm^2. */
 static double twice_area(const supine_basis *basis, const uint32_t *corner) {
-  const float *a = basis->vertices + 3 * (size_t)corner[0];
-  const float *b = basis->vertices + 3 * (size_t)corner[1];
-  const float *c = basis->vertices + 3 * (size_t)corner[2];
+  const float *a = basis->info.vertices + 3 * (size_t)corner[0];
+  const float *b = basis->info.vertices + 3 * (size_t)corner[1];
+  const float *c = basis->info.vertices + 3 * (size_t)corner[2];
   double u[3];
   double v[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -37,7 +37,7 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
   }
   double total = 0;
   for (size_t t = 0; t < basis->info.triangle_count; ++t) {
-    const uint32_t *corner = basis->triangles + 3 * t;
+    const uint32_t *corner = basis->info.triangles + 3 * t;
     const double piece = twice_area(basis, corner) / 6;
     for (int v = 0; v < 3; ++v) {
       area[corner[v]] += piece;
@@ -78,13 +78,13 @@ static void find_gram(supine_compare *compare, size_t lung) {
     const double share = (double)compare->share[i];
     if (basis->info.vector) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        add_row(basis->coefficients + (3 * i + axis) * count, share, count, gram);
+        add_row(basis->info.coefficients + (3 * i + axis) * count, share, count, gram);
       }
     } else {
-      const float *d = basis->direction + 3 * i;
+      const float *d = basis->info.direction + 3 * i;
       const double square =
           (double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2];
-      add_row(basis->coefficients + i * count, share * square, count, gram);
+      add_row(basis->info.coefficients + i * count, share * square, count, gram);
     }
   }
   for (size_t k = 0; k < count; ++k) {
@@ -199,7 +199,7 @@ void supine_compare_energy(const supine_compare *compare, double *energy) {
     for (; term < (l + 1) * (l + 1); ++term) {
       double column[SUPINE_MODES_MAX];
       for (size_t k = 0; k < count; ++k) {
-        column[k] = compare->basis->modes[k * terms + term];
+        column[k] = compare->basis->info.modes[k * terms + term];
       }
       energy[l] += supine_compare_product(compare->sum, column, column, count) / four_pi;
     }

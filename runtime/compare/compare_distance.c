@@ -24,14 +24,14 @@ static double displacement(const supine_basis *basis, const double *q, size_t i)
   double u[3];
   if (basis->info.vector) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      u[axis] = dot(q, basis->coefficients + (3 * i + axis) * count, count);
+      u[axis] = dot(q, basis->info.coefficients + (3 * i + axis) * count, count);
     }
     return length(u);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = (double)basis->direction[3 * i + axis];
+    u[axis] = (double)basis->info.direction[3 * i + axis];
   }
-  return fabs(dot(q, basis->coefficients + i * count, count)) * length(u);
+  return fabs(dot(q, basis->info.coefficients + i * count, count)) * length(u);
 }
 
 void supine_compare_distances(const supine_compare *compare, const double *weights_a,

@@ -84,8 +84,8 @@ static void place(const cutter *c, const float *point, const float *origin, doub
 static void read_triangle(const cutter *c, const supine_basis *basis, const float *xyz,
                           const uint32_t *corner, triangle *t) {
   for (int v = 0; v < 3; ++v) {
-    const float *rest = basis->vertices + 3 * (size_t)corner[v];
-    place(c, rest, basis->vertices, t->at[v]);
+    const float *rest = basis->info.vertices + 3 * (size_t)corner[v];
+    place(c, rest, basis->info.vertices, t->at[v]);
     place(c, xyz + 3 * (size_t)corner[v], rest, t->u[v]);
   }
   double e[2][3];
@@ -223,7 +223,7 @@ static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const fl
   memset(c->below, 0, sizeof c->below);
   memset(c->line, 0, sizeof c->line);
   for (size_t i = 0; i < basis->info.triangle_count; ++i) {
-    const uint32_t *corner = basis->triangles + 3 * i;
+    const uint32_t *corner = basis->info.triangles + 3 * i;
     if (corner[0] >= basis->lung_begin[lung] && corner[0] < basis->lung_begin[lung + 1]) {
       triangle t;
       read_triangle(c, basis, xyz, corner, &t);
@@ -276,7 +276,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   double highest = INFINITY;
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
     double at[3];
-    place(&c, basis->vertices + 3 * i, basis->vertices, at);
+    place(&c, basis->info.vertices + 3 * i, basis->info.vertices, at);
     highest = fmin(highest, at[2]);
     lowest = fmax(lowest, at[2]);
   }

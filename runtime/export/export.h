@@ -5,13 +5,11 @@
 #define SUPINE_EXPORT_H
 
 #include <supine/runtime.h>
-#include <supine/safetensors.h>
 
-/** An open basis with the tensors that the run-time library keeps to itself. */
+/** An open basis, and what it shows, at hand. */
 typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
-  supine_safetensors *file;
   size_t terms;              /**< (L+1)^2 */
   const float *vertices;     /**< [N, 3] */
   const uint32_t *triangles; /**< [M, 3] */

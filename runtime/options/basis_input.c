@@ -28,16 +28,7 @@ supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_m
 
 void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char *text,
                                     size_t size) {
-  const char *names = supine_basis_metadata(basis, "lungs");
-  for (size_t i = 0; names != NULL && i < lung; ++i) {
-    names = strchr(names, ',');
-    names = names != NULL ? names + 1 : NULL;
-  }
-  if (names != NULL) {
-    (void)snprintf(text, size, "%.*s", (int)strcspn(names, ","), names);
-  } else {
-    (void)snprintf(text, size, "%zu", lung);
-  }
+  (void)snprintf(text, size, "%s", supine_basis_get_info(basis)->lung_names[lung]);
 }
 
 /* The lung that a piece "NAME=ML" names, or lung_count. */

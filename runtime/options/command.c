@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/version.h>
+
 #include "runtime/options/command.h"
 #include "runtime/words.h"
 

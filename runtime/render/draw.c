@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/internal.h"
 #include "runtime/render/gl.h"
 
 /* Each pixel is the mean of 2 x 2 drawn ones, of four samples each where the driver has them. */
@@ -18,13 +17,13 @@ static const double margin = 1.03;
 static void shown_lungs(const supine_renderer *r, const supine_scene *scene, size_t *begin,
                         size_t *end) {
   *begin = scene->one_lung ? scene->lung : 0;
-  *end = scene->one_lung ? scene->lung + 1 : r->basis->info.lung_count;
+  *end = scene->one_lung ? scene->lung + 1 : r->info->lung_count;
 }
 
 /* What changes with the state: normals, values and, where the GPU cannot displace, displacements.
  */
 static void load_state(supine_renderer *r, const supine_scene *scene) {
-  const size_t n = r->basis->info.vertex_count;
+  const size_t n = r->info->vertex_count;
   float *xyz = r->scratch;
   float *normals = r->scratch + 3 * n;
   supine_deform(r->basis, scene->weights, scene->scales, xyz);
@@ -35,7 +34,7 @@ static void load_state(supine_renderer *r, const supine_scene *scene) {
                   (GLsizeiptr)(n * sizeof *scene->value), scene->value);
   if (!r->packed) {
     for (size_t i = 0; i < 3 * n; ++i) {
-      xyz[i] -= r->basis->vertices[i];
+      xyz[i] -= r->info->vertices[i];
     }
     glBindBuffer(GL_ARRAY_BUFFER, r->buffer[1]);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof *xyz), xyz, GL_DYNAMIC_DRAW);
@@ -81,9 +80,9 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   size_t last;
   supine_render_view_axes(scene->view, c.axes);
   shown_lungs(r, scene, &first, &last);
-  for (size_t i = 3 * r->basis->lung_begin[first]; i < 3 * r->basis->lung_begin[last]; ++i) {
-    low[i % 3] = fmin(low[i % 3], (double)r->basis->vertices[i]);
-    high[i % 3] = fmax(high[i % 3], (double)r->basis->vertices[i]);
+  for (size_t i = 3 * r->info->lung_begin[first]; i < 3 * r->info->lung_begin[last]; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)r->info->vertices[i]);
+    high[i % 3] = fmax(high[i % 3], (double)r->info->vertices[i]);
   }
   for (int axis = 0; axis < 3; ++axis) {
     c.centre[axis] = (low[axis] + high[axis]) / 2;
@@ -100,7 +99,7 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   size_t last;
   shown_lungs(r, scene, &first, &last);
   supine_deform(r->basis, scene->weights, scene->scales, r->scratch);
-  for (size_t i = r->basis->lung_begin[first]; i < r->basis->lung_begin[last]; ++i) {
+  for (size_t i = r->info->lung_begin[first]; i < r->info->lung_begin[last]; ++i) {
     double p[3] = {0, 0, 0};
     for (size_t row = 0; row < 3; ++row) {
       for (size_t axis = 0; axis < 3; ++axis) {

@@ -36,6 +36,7 @@ GLuint supine_render_gl_program(supine_error *error);
 
 struct supine_renderer {
   const supine_basis *basis;
+  const supine_basis_info *info; /* of it */
   supine_gl_context gl;
   GLuint program;
   GLuint array;

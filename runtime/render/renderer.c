@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/internal.h"
 #include "runtime/render/gl.h"
 
 enum { COLOURS = 256 };
@@ -35,12 +34,12 @@ static void load_colours(supine_renderer *r) {
 
 /* Triangles in the order of their lungs. */
 static void group_triangles(supine_renderer *r, uint32_t *grouped) {
-  const supine_basis_info *info = &r->basis->info;
+  const supine_basis_info *info = r->info;
   size_t count = 0;
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     r->index_begin[lung] = count;
     for (size_t t = 0; t < info->triangle_count; ++t) {
-      const uint32_t *corner = r->basis->triangles + 3 * t;
+      const uint32_t *corner = r->info->triangles + 3 * t;
       if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
         memcpy(grouped + 3 * count++, corner, 3 * sizeof *corner);
       }
@@ -51,10 +50,10 @@ static void group_triangles(supine_renderer *r, uint32_t *grouped) {
 
 /* Rest positions and, where the GPU displaces, directions and coefficients of every vertex. */
 static supine_status load_vertices(supine_renderer *r, supine_error *error) {
-  const size_t n = r->basis->info.vertex_count;
+  const size_t n = r->info->vertex_count;
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
   if (!r->packed) {
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->basis->vertices,
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->info->vertices,
                  GL_STATIC_DRAW);
     attribute(ATTRIBUTE_REST, 3, 3, 0);
     return SUPINE_OK;
@@ -76,7 +75,7 @@ static supine_status load_vertices(supine_renderer *r, supine_error *error) {
 }
 
 static supine_status load_surface(supine_renderer *r, supine_error *error) {
-  const supine_basis_info *info = &r->basis->info;
+  const supine_basis_info *info = r->info;
   const size_t n = info->vertex_count;
   uint32_t *grouped = malloc(3 * info->triangle_count * sizeof *grouped + 1);
   if (grouped == NULL) {
@@ -110,8 +109,9 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
     return supine_error_set(error, status, "out of memory");
   }
   r->basis = basis;
-  r->packed = !basis->info.vector && basis->info.mode_count <= SUPINE_GL_MODES;
-  r->scratch = calloc(basis->info.vertex_count, 7 * sizeof *r->scratch);
+  r->info = supine_basis_get_info(basis);
+  r->packed = !r->info->vector && r->info->mode_count <= SUPINE_GL_MODES;
+  r->scratch = calloc(r->info->vertex_count, 7 * sizeof *r->scratch);
   if (r->scratch == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/version.h>
+
 #include "runtime/options/basis_input.h"
 #include "runtime/render/render.h"
 #include "runtime/report/comparison_html.h"

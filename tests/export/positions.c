@@ -26,7 +26,7 @@ static bool write_positions(const supine_basis *basis, const double gravity[3], 
 }
 
 int main(int argc, char **argv) {
-  static const supine_basis_options exact = {.storage = SUPINE_STORAGE_EXACT};
+  static const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   supine_error error = {SUPINE_ERROR_ARGUMENT, "usage: positions BASIS X,Y,Z,ML..."};
   float *xyz = NULL;

@@ -7,7 +7,11 @@
  *
  * Nothing allocates, reads files or locks after opening; any number of threads may use one basis.
  * Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0),
- * prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1). */
+ * prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
+ *
+ * Structs grow without breaking a program that was compiled before: those that the library owns
+ * and shows (supine_basis_info) at their end, and options begin with their own size. All others
+ * stay as they are. */
 #ifndef SUPINE_RUNTIME_H
 #define SUPINE_RUNTIME_H
 
@@ -15,7 +19,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <supine/safetensors.h>
 #include <supine/status.h>
+#include <supine/version.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -49,13 +55,14 @@ typedef enum supine_simd {
   SUPINE_SIMD_COUNT
 } supine_simd;
 
-/** How to open a basis; zeros are the defaults. */
+/** How to open a basis; zeros after the size are the defaults. */
 typedef struct supine_basis_options {
+  size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
 } supine_basis_options;
 
-/** What a basis holds. */
+/** What a basis holds, owned by it and as in the file: nothing is copied. */
 typedef struct supine_basis_info {
   size_t vertex_count;
   size_t triangle_count;
@@ -72,13 +79,27 @@ typedef struct supine_basis_info {
    * where the largest displacement is 20 mm), over the 26 directions of the faces, edges and
    * corners of a cube. supine_basis_error gives it for any other. */
   double storage_error;
+  const char *const *lung_names; /**< [G] "left", ...; numbers from 0 where the file names none */
+  const float *bounds;   /**< [G, 2, 3] lowest and highest corner of each lung's box at rest, mm */
+  const float *vertices; /**< [N, 3] rest positions, mm, LPS */
+  const uint32_t *triangles;      /**< [M, 3] */
+  const float *direction;         /**< [N, 3] d_i, mm; NULL where the kind is vector */
+  const float *coefficients;      /**< [N, K] c_ik, or [N, 3, K], mm, where the kind is vector */
+  const double *modes;            /**< [K, (L+1)^2] */
+  const double *volume_linear;    /**< [G, K] the volumes' forms, mL, see supine_volume_add;
+                                       these three NULL where has_volume is false */
+  const double *volume_quadratic; /**< [G, K, K] */
+  const double *volume_cubic;     /**< [G, K, K, K] */
+  /** What an evaluation reads, bytes_per_vertex for each vertex in whole runs of 16 vertices: for
+   * measuring what its traffic costs. What it means changes between versions. */
+  const void *packed;
 } supine_basis_info;
 
 /** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
  * packs it for evaluation. `options` may be NULL.
  * @retval SUPINE_ERROR_READ    missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  truncated, corrupted, or not a basis file (detail in `error`)
- * @retval SUPINE_ERROR_ARGUMENT     an option out of range
+ * @retval SUPINE_ERROR_ARGUMENT     an option out of range, or options without their size
  * @retval SUPINE_ERROR_UNSUPPORTED  this processor, or this build, lacks the code asked for
  * @retval SUPINE_ERROR_MEMORY
  * Cost: a few passes over the file; memory of bytes_per_vertex besides the mapped file. */
@@ -99,6 +120,8 @@ SUPINE_API void supine_basis_close(supine_basis *basis);
 SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *basis);
 /** A metadata string ("format", "error_rms_percent", ...), or NULL. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
+/** Any tensor of the file ("error_modes", ...), or NULL. */
+SUPINE_API const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name);
 /** Rest positions [N, 3], mm, LPS. */
 SUPINE_API const float *supine_basis_vertices(const supine_basis *basis);
 /** Triangles [M, 3]. */
@@ -114,6 +137,14 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * with no pass over the vertices. Requires has_volume. */
 SUPINE_API double supine_basis_lung_volume(const supine_basis *basis, size_t lung,
                                            const double *weights, double scale);
+
+/** The cubic in the breath scale by which the volume of one lung grows, or of all together, mL (see
+ * supine/volume.h). Requires has_volume.
+ * @param cubic  [3], written */
+SUPINE_API void supine_basis_lung_cubic(const supine_basis *basis, size_t lung,
+                                        const double *weights, double cubic[3]);
+SUPINE_API void supine_basis_cubic(const supine_basis *basis, const double *weights,
+                                   double cubic[3]);
 
 /** The scale at which the lungs together gain `volume` mL (negative: lose).
  * @param scale  one number for all lungs
