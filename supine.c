@@ -10,22 +10,11 @@
 
 #include "runtime/options/command.h"
 
-static const struct {
-  const char *name;
-  supine_command_function *function;
-  const char *summary;
-} commands[] = {
-    {"phantom", supine_command_phantom, "make a pair of lungs, at any resolution"},
-    {"precompute", supine_command_precompute, "turn lung surfaces into a basis file (offline)"},
-    {"info", supine_command_info, "say what a basis file holds and how exact it is"},
-    {"deform", supine_command_deform, "deform a basis for a posture and a volume"},
-    {"compare", supine_command_compare, "how far postures differ, and who ventilates where"},
-    {"render", supine_command_render, "draw the lungs: postures side by side, as PNG"},
-    {"breathe", supine_command_breathe, "let a basis breathe, in one posture or turning"},
-    {"export", supine_command_export, "write a basis as a page or as glTF morph targets"},
-    {"bench", supine_command_bench, "measure what an evaluation costs on this machine"},
-    {"solve", supine_command_solve, "full physics for one posture: the reference"},
-    {"pv", supine_command_pv, "fit a pressure-volume relation to samples, and show one"},
+static const supine_command *const commands[] = {
+    &supine_command_phantom, &supine_command_precompute, &supine_command_info,
+    &supine_command_deform,  &supine_command_compare,    &supine_command_render,
+    &supine_command_breathe, &supine_command_export,     &supine_command_bench,
+    &supine_command_solve,   &supine_command_pv,
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
@@ -37,7 +26,7 @@ static void print_help(void) {
              "\n"
              "Commands:");
   for (size_t i = 0; i < COMMAND_COUNT; ++i) {
-    (void)printf("  %-11s %s\n", commands[i].name, commands[i].summary);
+    (void)printf("  %-11s %s\n", commands[i]->name, commands[i]->summary);
   }
   (void)puts("\n"
              "'supine COMMAND --help' teaches each. A first round, without any data:\n"
@@ -54,7 +43,7 @@ static void print_help(void) {
 /* Position of a command in the table, or COMMAND_COUNT. */
 static size_t find_command(const char *name) {
   size_t i = 0;
-  while (i < COMMAND_COUNT && strcmp(name, commands[i].name) != 0) {
+  while (i < COMMAND_COUNT && strcmp(name, commands[i]->name) != 0) {
     ++i;
   }
   return i;
@@ -63,7 +52,7 @@ static size_t find_command(const char *name) {
 static int unknown_command(const char *name) {
   const char *names[COMMAND_COUNT];
   for (size_t i = 0; i < COMMAND_COUNT; ++i) {
-    names[i] = commands[i].name;
+    names[i] = commands[i]->name;
   }
   const char *nearest = supine_options_suggest(name, names, COMMAND_COUNT);
   if (nearest != NULL) {
@@ -99,7 +88,7 @@ int main(int argc, char **argv) {
   if (help) {
     char option[] = "--help";
     char *arguments[] = {argv[2], option, NULL};
-    return commands[index].function(2, arguments);
+    return supine_options_run(commands[index], 2, arguments);
   }
-  return commands[index].function(argc - 1, argv + 1);
+  return supine_options_run(commands[index], argc - 1, argv + 1);
 }

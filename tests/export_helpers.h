@@ -28,7 +28,7 @@ static inline int export_run(const char *folder, char text[8192], const char *co
   assert_non_null(file);
   assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
   optind = 0; /* getopt starts anew */
-  const int code = supine_command_export(argc, argv);
+  const int code = supine_options_run(&supine_command_export, argc, argv);
   (void)fflush(stdout);
   (void)fflush(stderr);
   assert_true(dup2(out, STDOUT_FILENO) >= 0 && dup2(err, STDERR_FILENO) >= 0);

@@ -115,7 +115,7 @@ static int run(const char *const *words) {
   assert_non_null(file);
   assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
   optind = 0;
-  const int code = supine_command_breathe(argc, argv);
+  const int code = supine_options_run(&supine_command_breathe, argc, argv);
   (void)fflush(stdout);
   (void)fflush(stderr);
   assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
@@ -382,7 +382,7 @@ static void test_breathe_interrupted_leaves_nothing(void **state) {
     char *argv[] = {"breathe", basis, "--posture",   "supine", "--seconds",
                     "3000",    "-o",  series_folder, NULL};
     optind = 0;
-    _exit(supine_command_breathe(8, argv));
+    _exit(supine_options_run(&supine_command_breathe, 8, argv));
   }
   assert_true(child > 0);
   for (int i = 0; i < 200 && count_names("a & b.part-") == 0; ++i) {

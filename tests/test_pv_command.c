@@ -72,7 +72,7 @@ static int run(int stream, const char *const *words) {
   FILE *file = fopen(printed, "w+b");
   assert_non_null(file);
   assert_true(kept >= 0 && dup2(fileno(file), stream) == stream);
-  const int code = supine_command_pv(argc, argv);
+  const int code = supine_options_run(&supine_command_pv, argc, argv);
   (void)fflush(target);
   assert_true(dup2(kept, stream) == stream);
   (void)close(kept);
@@ -103,7 +103,7 @@ static void test_command_fit_json_has_each_field(void **state) {
   (void)state;
   assert_int_equal(RUN(STDOUT_FILENO, "fit", "--json", "--confidence", "0.5", good), 0);
   static const char *const keys[] = {"{\"confidence\": 0.5, \"inhale\": {\"samples\": 16",
-                                     "\"pressure_cmH2O\": [0, 30]",
+                                     "\"pressure_cmH2O\": [0.0, 30.0]",
                                      "\"control\": [",
                                      "\"control_interval\": [",
                                      "\"volume_interval_mL\": [",

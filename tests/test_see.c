@@ -349,7 +349,7 @@ static void test_compare_misuse_is_a_usage_error(void **state) {
   EXPECT(1, "three finite numbers", "compare lungs.safetensors --postures 1:nan:2");
   EXPECT(1, "empty name", "compare lungs.safetensors --postures supine,,prone");
   EXPECT(1, "millilitres", "compare lungs.safetensors --volume much");
-  EXPECT(1, "once", "compare lungs.safetensors --volume 5 --rms 5");
+  EXPECT(1, "not both", "compare lungs.safetensors --volume 5 --rms 5");
   EXPECT(1, ".html", "compare lungs.safetensors -o report.pdf");
   EXPECT(1, "one basis file", "compare");
   EXPECT(1, "did you mean '--postures'", "compare lungs.safetensors --posturse supine");

@@ -58,7 +58,7 @@ static void write_text(const char *content) {
 }
 
 /* Runs a command with stderr in `text` and stdout dropped. */
-static int run(supine_command_function *command, const char *const *words) {
+static int run(const supine_command *command, const char *const *words) {
   char *argv[24] = {NULL};
   int argc = 0;
   for (; words[argc] != NULL; ++argc) {
@@ -71,8 +71,7 @@ static int run(supine_command_function *command, const char *const *words) {
   FILE *dropped = fopen("/dev/null", "wb");
   assert_true(file != NULL && dropped != NULL);
   assert_true(dup2(fileno(dropped), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
-  optind = 0;
-  const int code = command(argc, argv);
+  const int code = supine_options_run(command, argc, argv);
   (void)fflush(stdout);
   (void)fflush(stderr);
   assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
@@ -91,7 +90,7 @@ static int run(supine_command_function *command, const char *const *words) {
 static int solve(const char *option, const char *value, const char *path) {
   const char *const words[] = {"solve", lungs, "--posture", "supine", "--volume", "400",
                                "-o",    path,  option,      value,    NULL};
-  return run(supine_command_solve, words);
+  return run(&supine_command_solve, words);
 }
 
 static bool same_bytes(const char *first, const char *second) {
@@ -261,7 +260,7 @@ static void write_ply(const char *path, const char *format, bool ras, double spo
 static int solve_ply(const char *mesh, const char *value, const char *path) {
   const char *const words[] = {"solve", mesh, "--posture",       "supine", "--volume", "400",
                                "-o",    path, "--expandability", value,    NULL};
-  return run(supine_command_solve, words);
+  return run(&supine_command_solve, words);
 }
 
 /* Positions of the vertices of two files, mm. */
@@ -326,7 +325,7 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
   for (int ill = 0; ill < 2; ++ill) {
     const char *const words[] = {"precompute", lungs,    "-o",        other, "--band",
                                  "5",          "--lung", shares[ill], NULL};
-    assert_int_equal(run(supine_command_precompute, words), SUPINE_EXIT_OK);
+    assert_int_equal(run(&supine_command_precompute, words), SUPINE_EXIT_OK);
     supine_basis *basis = NULL;
     supine_error error = {0};
     if (supine_basis_open(other, &basis, &error) != SUPINE_OK) {
@@ -405,7 +404,7 @@ static void test_lung_that_is_not_there_is_refused(void **state) {
   supine_mesh_free(&mesh);
   const char *const words[] = {"solve", one,      "--posture", "prone", "-o",
                                out,     "--lung", "right:0.5", NULL};
-  assert_int_equal(run(supine_command_solve, words), SUPINE_EXIT_USAGE);
+  assert_int_equal(run(&supine_command_solve, words), SUPINE_EXIT_USAGE);
   assert_non_null(strstr(text, "no right lung"));
   (void)unlink(one);
 }

@@ -8,76 +8,13 @@
 
 #include "precompute/command/model_options.h"
 
-const char supine_command_model_options_help[] =
-    "Surfaces:\n"
-    "  --axes LPS|RAS       axes of the files; default: their SPACE tag, else LPS (DICOM)\n"
-    "  --units UNIT         mm, cm, m, um or in, or millimetres per unit; default mm\n"
-    "  --midline X          x of the sagittal plane between the lungs, mm; default: the middle of\n"
-    "                       the box of two lungs, the inner face of a single lung's\n"
-    "\n"
-    "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along gravity\n"
-    "(0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the midline outwards, from\n"
-    "the back, from the apex; 0 to 1):\n"
-    "  --base B             default 0\n"
-    "  --gain G             default 1\n"
-    "  --box-force X,Y,Z    cx, cy, cz: fixed to the body; default 0,0,0\n"
-    "  --soften S           dependent tissue is softer: E exp(-S (h - 1/2)); default 0. Only then\n"
-    "                       does prone differ from supine by more than a change of sign\n"
-    "\n"
-    "Direction of displacement:\n"
-    "  --direction MODEL    box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
-    "  --direction FILE     any vectors: CSV with the columns dx,dy,dz, mm, a row a vertex in the\n"
-    "                       order that 'supine solve' writes\n"
-    "  --constants C1,...,C6  of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to\n"
-    "                       the 4-D CT landmarks of ten patients (DIR-Lab), where the law "
-    "explains\n"
-    "                       61 to 87 % of the squared displacement. (The paper's own are lost.)\n"
-    "\n"
-    "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only ratios\n"
-    "count: a = 2 beside a = 1 is twice as expandable, doubling all of them changes nothing.\n"
-    "  --expandability uniform   (default)\n"
-    "  --expandability linear:AXIS:FROM:TO, exp:AXIS:FROM:TO\n"
-    "                       a goes from FROM to TO in a straight line, or by equal ratios, along\n"
-    "                       AXIS: x from the midline outwards, y from the back to the front, z\n"
-    "                       from the apex to the base; linear:z:0.5:1.5 expands most at the base\n"
-    "  --expandability FILE a of every vertex, CSV: a header line, then one value a line in the\n"
-    "                       order of the vertices (left lung first, each as its file first names\n"
-    "                       them: the order that 'supine solve' writes), or vertex,value counted\n"
-    "                       from 0\n"
-    "  --expandability ply:PROPERTY  a of every vertex, from a property of that name of the "
-    "vertices\n"
-    "                       of the surfaces themselves, all of them PLY files\n"
-    "  --lesion X,Y,Z,RADIUS,FACTOR   a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to "
-    "half\n"
-    "                       of RADIUS (mm), less and less from there, and not at all from RADIUS\n"
-    "                       on. Above 1 stiffens: it moves less; 1 changes nothing. May be "
-    "repeated\n"
-    "  --lung SIDE:SHARE    left or right lung collapsed (pneumothorax): its resting volume, and "
-    "what\n"
-    "                       it takes of a breath, are SHARE (0 to 1) of what they were; a "
-    "breath's\n"
-    "                       volume stays exact, the other lung takes the rest\n"
-    "  --reach MM           forces spread over this length along the surface, whatever the mesh\n"
-    "                       (about exp(-r/MM)); default: over a few links, as in the paper, so "
-    "that\n"
-    "                       a finer mesh spreads less and may look torn: then try 10\n";
-
-supine_model_options supine_command_model_options_default(void) {
-  return (supine_model_options){.model = supine_physics_model_default()};
+void supine_command_model_options_begin(supine_model_options *options) {
+  options->model = supine_physics_model_default();
 }
 
-static bool parse_axes(const char *text, supine_axes *axes) {
-  if (strcasecmp(text, "LPS") == 0) {
-    *axes = SUPINE_AXES_LPS;
-  } else if (strcasecmp(text, "RAS") == 0) {
-    *axes = SUPINE_AXES_RAS;
-  } else {
-    return false;
-  }
-  return true;
-}
-
-static bool parse_units(const char *text, double *millimetres) {
+static int read_units(const char *command, const char *text, void *field) {
+  double *millimetres = field;
+  (void)command;
   static const struct {
     const char *name;
     double millimetres;
@@ -85,34 +22,37 @@ static bool parse_units(const char *text, double *millimetres) {
   for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
     if (strcmp(text, units[i].name) == 0) {
       *millimetres = units[i].millimetres;
-      return true;
+      return SUPINE_EXIT_OK;
     }
   }
-  return supine_options_parse_number(text, millimetres) && *millimetres > 0.0;
+  return supine_options_fits(supine_options_parse_number(text, millimetres) && *millimetres > 0.0);
 }
 
 /* A model's name; anything with a dot or a slash is a file of vectors. */
-static bool parse_direction(const char *text, supine_model_options *options) {
+static int read_direction(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
   static const char *const names[] = {"box", "normal", "radial"};
   options->direction = NULL;
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     if (strcmp(text, names[i]) == 0) {
       options->model.direction.model = (supine_direction_model)i;
-      return true;
+      return SUPINE_EXIT_OK;
     }
   }
   options->model.direction.model = SUPINE_DIRECTION_VECTORS;
   options->direction = text;
-  return strpbrk(text, "./") != NULL;
+  return supine_options_fits(strpbrk(text, "./") != NULL);
 }
 
-/* "linear:z:0.5:1.5"; anything without such a beginning names a file. False where the rest of it is
- * not understood. */
-static bool parse_expandability(const char *text, supine_model_options *options) {
+/* "linear:z:0.5:1.5"; anything without such a beginning names a file. */
+static int read_expandability(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
   options->expandability = NULL;
   options->law = (supine_expandability_law){0};
   if (strcmp(text, "uniform") == 0) {
-    return true;
+    return SUPINE_EXIT_OK;
   }
   if (strncmp(text, "linear:", strlen("linear:")) == 0) {
     options->law.shape = SUPINE_EXPANDABILITY_LINEAR;
@@ -120,121 +60,123 @@ static bool parse_expandability(const char *text, supine_model_options *options)
     options->law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
   } else {
     options->expandability = text;
-    return true;
+    return SUPINE_EXIT_OK;
   }
   const char *at = strchr(text, ':') + 1;
   if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
-    return false;
+    return SUPINE_OPTION_MISFIT;
   }
   options->law.axis = at[0] - 'x';
   char numbers[128];
   (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
   char *colon = strchr(numbers, ':');
   if (colon == NULL) {
-    return false;
+    return SUPINE_OPTION_MISFIT;
   }
   *colon = '\0';
-  return supine_options_parse_number(numbers, &options->law.from) &&
-         supine_options_parse_number(colon + 1, &options->law.to) && options->law.from > 0.0 &&
-         options->law.to > 0.0;
+  return supine_options_fits(supine_options_parse_number(numbers, &options->law.from) &&
+                             supine_options_parse_number(colon + 1, &options->law.to) &&
+                             options->law.from > 0.0 && options->law.to > 0.0);
 }
 
-static bool parse_lesion(const char *text, supine_model_options *options) {
+static int read_lesion(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
   double v[5];
   if (options->lesion_count == MODEL_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
       !(v[3] > 0.0) || !(v[4] > 0.0)) {
-    return false;
+    return SUPINE_OPTION_MISFIT;
   }
   options->lesions[options->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
-  return true;
+  return SUPINE_EXIT_OK;
 }
 
 /* "left:0.3" */
-static bool parse_lung(const char *text, supine_model_options *options) {
+static int read_lung(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
   const char *colon = strchr(text, ':');
   const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
   const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
   double share;
   if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
       !(share > 0.0 && share <= 1.0)) {
-    return false;
+    return SUPINE_OPTION_MISFIT;
   }
   *(left ? &options->left_share : &options->right_share) = share;
-  return true;
-}
-
-int supine_command_model_options_take(supine_model_options *options, const char *command,
-                                      int option, const char *value) {
-  supine_force_law *force = &options->model.force;
-  const char *wanted = NULL; /* set where the value is not what it should be */
-  switch (option) {
-  case OPTION_AXES:
-    wanted = parse_axes(value, &options->load.axes) ? NULL : "--axes takes LPS or RAS";
-    break;
-  case OPTION_UNITS:
-    wanted = parse_units(value, &options->load.millimetres_per_unit)
-                 ? NULL
-                 : "--units takes mm, cm, m, um, in or millimetres per unit";
-    break;
-  case OPTION_MIDLINE:
-    options->has_midline = true;
-    wanted =
-        supine_options_parse_number(value, &options->midline) ? NULL : "--midline takes an x in mm";
-    break;
-  case OPTION_BASE:
-    wanted = supine_options_parse_number(value, &force->base) ? NULL : "--base takes a number";
-    break;
-  case OPTION_GAIN:
-    wanted = supine_options_parse_number(value, &force->gain) ? NULL : "--gain takes a number";
-    break;
-  case OPTION_BOX_FORCE:
-    wanted = supine_options_parse_numbers(value, 3, force->box)
-                 ? NULL
-                 : "--box-force takes three numbers, CX,CY,CZ";
-    break;
-  case OPTION_SOFTEN:
-    wanted = supine_options_parse_number(value, &force->soften) ? NULL : "--soften takes a number";
-    break;
-  case OPTION_DIRECTION:
-    wanted = parse_direction(value, options)
-                 ? NULL
-                 : "--direction takes box, normal, radial or a CSV file of vectors";
-    break;
-  case OPTION_CONSTANTS:
-    wanted = supine_options_parse_numbers(value, 6, options->model.direction.c)
-                 ? NULL
-                 : "--constants takes six numbers, C1,C2,C3,C4,C5,C6";
-    break;
-  case OPTION_EXPANDABILITY:
-    wanted =
-        parse_expandability(value, options)
-            ? NULL
-            : "--expandability takes uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS "
-              "x, y or z and both ends above 0, ply:PROPERTY, or a file";
-    break;
-  case OPTION_LESION:
-    wanted = parse_lesion(value, options)
-                 ? NULL
-                 : "--lesion (at most 64) takes X,Y,Z,RADIUS,FACTOR, the last two above 0";
-    break;
-  case OPTION_LUNG:
-    wanted = parse_lung(value, options)
-                 ? NULL
-                 : "--lung takes left:SHARE or right:SHARE, above 0 and at most 1";
-    break;
-  case OPTION_REACH:
-    wanted = supine_options_parse_number(value, &options->reach) && options->reach > 0.0
-                 ? NULL
-                 : "--reach takes a length in mm above 0";
-    break;
-  default:
-    break;
-  }
-  if (wanted != NULL) {
-    return supine_options_usage(command, "%s, not '%s'", wanted, value);
-  }
   return SUPINE_EXIT_OK;
 }
+
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+#define FILLS(member) SUPINE_FILLS(supine_model_options, member)
+
+const supine_option supine_command_model_options[] = {
+    {.help = "Surfaces:"},
+    {"axes", 0, "LPS|RAS", "axes of the files; default: their SPACE tag, else LPS (DICOM)",
+     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {"units", 0, "UNIT", "mm, cm, m, um or in, or millimetres per unit; default mm",
+     FILLS(load.millimetres_per_unit), .read = read_units,
+     .wants = "mm, cm, m, um, in or millimetres per unit"},
+    {"midline", 0, "X",
+     "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
+     "the inner face of a single lung's",
+     FILLS(midline), SUPINE_SAYS_GIVEN(supine_model_options, has_midline), .wants = "an x in mm"},
+    {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along "
+             "gravity (0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the "
+             "midline outwards, from the back, from the apex; 0 to 1):"},
+    {"base", 0, "B", "default 0", FILLS(model.force.base)},
+    {"gain", 0, "G", "default 1", FILLS(model.force.gain)},
+    {"box-force", 0, "X,Y,Z", "cx, cy, cz: fixed to the body; default 0,0,0",
+     FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ"},
+    {"soften", 0, "S",
+     "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. Only then does prone differ "
+     "from supine by more than a change of sign",
+     FILLS(model.force.soften)},
+    {.help = "Direction of displacement:"},
+    {"direction", 0, "WHAT",
+     "box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
+     "FILE: any vectors: CSV with the columns dx,dy,dz, mm, a row a vertex in the order that "
+     "'supine solve' writes",
+     .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
+     .file = SUPINE_FILE_IN},
+    {"constants", 0, "C1,...,C6",
+     "of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to the 4-D CT landmarks of "
+     "ten patients (DIR-Lab), where the law explains 61 to 87 % of the squared displacement. (The "
+     "paper's own are lost.)",
+     FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6"},
+    {.help = "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only "
+             "ratios count: a = 2 beside a = 1 is twice as expandable, doubling all of them "
+             "changes nothing."},
+    {"expandability", 0, "WHAT",
+     "uniform (default)\n"
+     "linear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a goes from FROM to TO in a straight line, or by "
+     "equal ratios, along AXIS: x from the midline outwards, y from the back to the front, z from "
+     "the apex to the base; linear:z:0.5:1.5 expands most at the base\n"
+     "FILE: a of every vertex, CSV: a header line, then one value a line in the order of the "
+     "vertices (left lung first, each as its file first names them: the order that 'supine solve' "
+     "writes), or vertex,value counted from 0\n"
+     "ply:PROPERTY: a of every vertex, from a property of that name of the vertices of the "
+     "surfaces themselves, all of them PLY files",
+     .read = read_expandability, .file = SUPINE_FILE_IN,
+     .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
+              "above 0, ply:PROPERTY, or a file"},
+    {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
+     "a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to half of RADIUS (mm), less and less "
+     "from there, and not at all from RADIUS on. Above 1 stiffens: it moves less; 1 changes "
+     "nothing. May be repeated",
+     .read = read_lesion, .wants = "(at most 64) X,Y,Z,RADIUS,FACTOR, the last two above 0"},
+    {"lung", 0, "SIDE:SHARE",
+     "left or right lung collapsed (pneumothorax): its resting volume, and what it takes of a "
+     "breath, are SHARE (0 to 1) of what they were; a breath's volume stays exact, the other lung "
+     "takes the rest",
+     .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
+    {"reach", 0, "MM",
+     "forces spread over this length along the surface, whatever the mesh (about exp(-r/MM)); "
+     "default: over a few links, as in the paper, so that a finer mesh spreads less and may look "
+     "torn: then try 10",
+     FILLS(reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+    {.name = NULL}};
 
 typedef struct load_work {
   const supine_mesh_load_options *options;

@@ -11,42 +11,8 @@
 
 #include "runtime/options/command.h"
 
-/* Values of struct option beyond the short options'. */
-enum {
-  OPTION_AXES = 1000,
-  OPTION_UNITS,
-  OPTION_MIDLINE,
-  OPTION_BASE,
-  OPTION_GAIN,
-  OPTION_BOX_FORCE,
-  OPTION_SOFTEN,
-  OPTION_DIRECTION,
-  OPTION_CONSTANTS,
-  OPTION_EXPANDABILITY,
-  OPTION_LESION,
-  OPTION_LUNG,
-  OPTION_REACH,
-  OPTION_MODEL_END
-};
-
-#define SUPINE_MODEL_OPTIONS                                                                       \
-  {"axes", required_argument, NULL, OPTION_AXES},                                                  \
-      {"units", required_argument, NULL, OPTION_UNITS},                                            \
-      {"midline", required_argument, NULL, OPTION_MIDLINE},                                        \
-      {"base", required_argument, NULL, OPTION_BASE},                                              \
-      {"gain", required_argument, NULL, OPTION_GAIN},                                              \
-      {"box-force", required_argument, NULL, OPTION_BOX_FORCE},                                    \
-      {"soften", required_argument, NULL, OPTION_SOFTEN},                                          \
-      {"direction", required_argument, NULL, OPTION_DIRECTION},                                    \
-      {"constants", required_argument, NULL, OPTION_CONSTANTS},                                    \
-      {"expandability", required_argument, NULL, OPTION_EXPANDABILITY},                            \
-      {"lesion", required_argument, NULL, OPTION_LESION},                                          \
-      {"lung", required_argument, NULL, OPTION_LUNG}, {                                            \
-    "reach", required_argument, NULL, OPTION_REACH                                                 \
-  }
-
-/* What they add to a command's help. */
-extern const char supine_command_model_options_help[];
+/* A table of options that fills a supine_model_options: {.table = ..., SUPINE_FILLS(...)}. */
+extern const supine_option supine_command_model_options[];
 
 enum { MODEL_LESIONS_MAX = 64 };
 
@@ -66,11 +32,8 @@ typedef struct supine_model_options {
   double *stiffness;              /* what loading made of the expandability; the model's */
 } supine_model_options;
 
-supine_model_options supine_command_model_options_default(void);
-
-/* Takes one option; SUPINE_EXIT_OK, or an exit code after a message. */
-int supine_command_model_options_take(supine_model_options *options, const char *command,
-                                      int option, const char *value);
+/* The defaults, of a zeroed struct. */
+void supine_command_model_options_begin(supine_model_options *options);
 
 /* Loads the surfaces (all at once), says on stderr what was found that the user should know, joins
  * them, and sets the model's stiffness and the lungs' diseases; an exit code. */

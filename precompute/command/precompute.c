@@ -9,41 +9,59 @@
 
 static const char name[] = "precompute";
 
-static const char help[] =
-    "Usage: supine precompute MESH... -o FILE [OPTIONS]\n"
-    "\n"
-    "Solves the physics of one or two lungs for every direction of gravity at once and writes a\n"
-    "basis file, which 'supine deform' and the run-time library turn into deformed lungs in real\n"
-    "time. Both lungs may be in one file or in two; any surface that assimp reads will do (PLY,\n"
-    "OBJ, STL, OFF, ...). Closed surfaces can be asked for exact volumes later.\n"
-    "\n"
-    "  -o, --output FILE    basis file (safetensors)\n"
-    "  --band L             highest spherical-harmonic band, 0 to 64; default 23\n"
-    "  --modes K|harmonics  functions of orientation, and so multiplications per vertex, at run\n"
-    "                       time: the best K of the band (default 16, fewer where fewer do), or\n"
-    "                       the (L+1)^2 harmonics themselves. The paper's form is\n"
-    "                       --band 3 --modes harmonics\n"
-    "  --route ROUTE        linear: a few solves for all directions, exact while --soften is 0\n"
-    "                       (default there); sampled: a solve for each direction of a grid\n"
-    "  --held-out N         directions that the error is measured on; default 100 to 1000\n"
-    "\n"
-    "Instead of the built-in physics, fields that another simulator computed:\n"
-    "  --fields LIST        CSV with the columns gx,gy,gz,file: directions of gravity and the "
-    "same\n"
-    "                       surface deformed; or a safetensors file with gravity [M,3] and\n"
-    "                       displacement [M,N,3]. MESH is the rest surface. The highest band that\n"
-    "                       the directions determine and cross-validation favours is taken,\n"
-    "                       unless --band names one\n"
-    "  --kind vector|scalar keep three components (default), or magnitude x best direction, a "
-    "third\n"
-    "                       of the size, with the loss stated\n"
-    "\n";
+typedef struct request {
+  supine_model_options model;
+  supine_precompute_options basis;
+  const char *path;
+  const char *fields;
+  bool has_band;
+  unsigned kind; /* 1: scalar */
+} request;
 
-static const char examples[] =
-    "\n"
-    "Examples:\n"
-    "  supine precompute left.ply right.ply -o lungs.safetensors\n"
-    "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors\n";
+static int read_modes(const char *command, const char *text, void *field) {
+  size_t *modes = field;
+  (void)command;
+  if (strcmp(text, "harmonics") == 0) {
+    *modes = 0;
+    return SUPINE_EXIT_OK;
+  }
+  return supine_options_fits(supine_options_parse_count(text, modes) && *modes >= 1 &&
+                             *modes <= SUPINE_MODES_MADE_MAX);
+}
+
+static const char *const routes[] = {"auto", "linear", "sampled", NULL}; /* as supine_route */
+static const char *const kinds[] = {"vector", "scalar", NULL};
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "basis file (safetensors)", SUPINE_FILLS(request, path),
+     .required = true, .file = SUPINE_FILE_OUT},
+    {"band", 0, "L", "highest spherical-harmonic band, 0 to 64", SUPINE_FILLS(request, basis.band),
+     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX}},
+    {"modes", 0, "K|harmonics",
+     "functions of orientation, and so multiplications per vertex, at run time: the best K of the "
+     "band (fewer where fewer do), or the (L+1)^2 harmonics themselves. The paper's form is --band "
+     "3 --modes harmonics",
+     SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
+     .wants = "1 to 64 or 'harmonics'"},
+    {"route", 0, "ROUTE",
+     "linear: a few solves for all directions, exact while --soften is 0 (default there); "
+     "sampled: a solve for each direction of a grid",
+     SUPINE_FILLS(request, basis.route), .choices = routes},
+    {"held-out", 0, "N", "directions that the error is measured on; default 100 to 1000",
+     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}},
+    {.help = "Instead of the built-in physics, fields that another simulator computed:"},
+    {"fields", 0, "LIST",
+     "CSV with the columns gx,gy,gz,file: directions of gravity and the same surface deformed; or "
+     "a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the rest surface. "
+     "The highest band that the directions determine and cross-validation favours is taken, "
+     "unless --band names one",
+     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN},
+    {"kind", 0, "vector|scalar",
+     "keep three components, or magnitude x best direction, a third of the size, with the loss "
+     "stated",
+     SUPINE_FILLS(request, kind), .choices = kinds, .standard = "vector"},
+    {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
+    {.name = NULL}};
 
 /* Share of turned triangles that is worth a word. */
 static const double turned_over_limit = 0.01;
@@ -106,138 +124,79 @@ static void report_fit(const char *path, const supine_fields *fields, const supi
                fit->accuracy.max_mm);
 }
 
-static int compress_fields(const supine_lungs *lungs, const char *list,
-                           const supine_mesh_load_options *load, const supine_fit_options *options,
-                           const char *made_by, const char *path) {
+static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
+  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
+                                      .modes = wanted->basis.modes,
+                                      .scalar = wanted->kind == 1};
   supine_fields fields = {0};
   supine_fit_report report;
   size_t mode_count = 0;
   supine_error error;
   int result = SUPINE_EXIT_OK;
-  if (supine_fields_load(list, lungs, load, &fields, &error) != SUPINE_OK ||
-      supine_precompute_fields(lungs, &fields, options, made_by, path, &report, &mode_count,
-                               &error) != SUPINE_OK) {
+  if (supine_fields_load(wanted->fields, lungs, &wanted->model.load, &fields, &error) !=
+          SUPINE_OK ||
+      supine_precompute_fields(lungs, &fields, &options, made_by, wanted->path, &report,
+                               &mode_count, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
   } else {
-    report_fit(path, &fields, &report, mode_count, options->scalar);
+    report_fit(wanted->path, &fields, &report, mode_count, options.scalar);
     result = supine_options_finish(name);
   }
   supine_fields_free(&fields);
   return result;
 }
 
-int supine_command_precompute(int argc, char **argv) {
-  enum { BAND = OPTION_MODEL_END, MODES, ROUTE, HELD_OUT, FIELDS, KIND };
-  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                          {"band", required_argument, NULL, BAND},
-                                          {"modes", required_argument, NULL, MODES},
-                                          {"route", required_argument, NULL, ROUTE},
-                                          {"held-out", required_argument, NULL, HELD_OUT},
-                                          {"fields", required_argument, NULL, FIELDS},
-                                          {"kind", required_argument, NULL, KIND},
-                                          SUPINE_MODEL_OPTIONS,
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-  supine_model_options model = supine_command_model_options_default();
-  supine_precompute_options wanted = {.band = 23, .modes = 16};
-  supine_fit_options fit = {.band = -1};
-  const char *path = NULL;
-  const char *fields = NULL;
-  char made_by[512];
-  supine_options_describe(argc, argv, made_by, sizeof made_by);
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
-    int result = SUPINE_EXIT_OK;
-    switch (option) {
-    case 'o':
-      path = optarg;
-      break;
-    case BAND:
-      if (!supine_options_parse_count(optarg, &wanted.band) || wanted.band > SUPINE_SH_BAND_MAX) {
-        result = supine_options_usage(name, "--band takes 0 to %d, not '%s'", SUPINE_SH_BAND_MAX,
-                                      optarg);
-      }
-      fit.band = (int)wanted.band;
-      break;
-    case MODES:
-      if (strcmp(optarg, "harmonics") == 0) {
-        wanted.modes = 0;
-      } else if (!supine_options_parse_count(optarg, &wanted.modes) || wanted.modes < 1 ||
-                 wanted.modes > SUPINE_MODES_MADE_MAX) {
-        result = supine_options_usage(name, "--modes takes 1 to %d or 'harmonics', not '%s'",
-                                      SUPINE_MODES_MADE_MAX, optarg);
-      }
-      break;
-    case FIELDS:
-      fields = optarg;
-      break;
-    case KIND:
-      if (strcmp(optarg, "vector") == 0 || strcmp(optarg, "scalar") == 0) {
-        fit.scalar = optarg[0] == 's';
-      } else {
-        result = supine_options_usage(name, "--kind takes vector or scalar, not '%s'", optarg);
-      }
-      break;
-    case ROUTE:
-      if (strcmp(optarg, "linear") == 0 || strcmp(optarg, "sampled") == 0) {
-        wanted.route = optarg[0] == 'l' ? SUPINE_ROUTE_LINEAR : SUPINE_ROUTE_SAMPLED;
-      } else {
-        result = supine_options_usage(name, "--route takes linear or sampled, not '%s'", optarg);
-      }
-      break;
-    case HELD_OUT:
-      if (!supine_options_parse_count(optarg, &wanted.held_out) || wanted.held_out < 1 ||
-          wanted.held_out > 100000) {
-        result = supine_options_usage(name, "--held-out takes 1 to 100000, not '%s'", optarg);
-      }
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      (void)fputs(supine_command_model_options_help, stdout);
-      (void)fputs(examples, stdout);
-      return supine_options_finish(name);
-    case '?':
-    case ':':
-      return supine_options_bad_option(name, options, option, argv);
-    default:
-      result = supine_command_model_options_take(&model, name, option, optarg);
-    }
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
+static int compute(const supine_lungs *lungs, request *wanted, const char *made_by) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_precompute_report report;
+  supine_error error;
+  wanted->basis.model = wanted->model.model;
+  wanted->basis.made_by = made_by;
+  wanted->basis.progress = supine_options_progress_step;
+  wanted->basis.progress_context = &progress;
+  supine_options_interrupts_catch();
+  const supine_status status =
+      supine_precompute(lungs, &wanted->basis, wanted->path, &report, &error);
+  supine_options_progress_end(&progress);
+  if (status != SUPINE_OK) {
+    return supine_options_fail(name, &error);
   }
-  if (optind == argc) {
-    return supine_options_usage(name, "which surface? Name one or more mesh files");
-  }
-  if (path == NULL) {
-    return supine_options_usage(name, "-o FILE is missing");
-  }
+  report_result(wanted->path, lungs, &wanted->basis, &report);
+  return supine_options_finish(name);
+}
+
+static void begin(void *chosen) {
+  supine_command_model_options_begin(&((request *)chosen)->model);
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
   supine_lungs lungs = {0};
   int result =
-      supine_command_model_load(&model, name, argv + optind, (size_t)(argc - optind), &lungs);
-  if (result == SUPINE_EXIT_OK && fields != NULL) {
-    fit.modes = wanted.modes;
-    result = compress_fields(&lungs, fields, &model.load, &fit, made_by, path);
-  } else if (result == SUPINE_EXIT_OK) {
-    supine_progress progress = supine_options_progress_begin("precompute");
-    supine_precompute_report report;
-    supine_error error;
-    wanted.model = model.model;
-    wanted.made_by = made_by;
-    wanted.progress = supine_options_progress_step;
-    wanted.progress_context = &progress;
-    supine_options_interrupts_catch();
-    const supine_status status = supine_precompute(&lungs, &wanted, path, &report, &error);
-    supine_options_progress_end(&progress);
-    if (status != SUPINE_OK) {
-      result = supine_options_fail(name, &error);
-    } else {
-      report_result(path, &lungs, &wanted, &report);
-      result = supine_options_finish(name);
-    }
+      supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
+  if (result == SUPINE_EXIT_OK) {
+    result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)
+                                    : compute(&lungs, wanted, given->made_by);
   }
   supine_lungs_free(&lungs);
-  supine_command_model_options_free(&model);
+  supine_command_model_options_free(&wanted->model);
   return result;
 }
+
+const supine_command supine_command_precompute = {
+    name,
+    "turn lung surfaces into a basis file (offline)",
+    .usage = "MESH... -o FILE [OPTIONS]",
+    .about =
+        "Solves the physics of one or two lungs for every direction of gravity at once and writes "
+        "a basis file, which 'supine deform' and the run-time library turn into deformed lungs in "
+        "real time. Both lungs may be in one file or in two; any surface that assimp reads will do "
+        "(PLY, OBJ, STL, OFF, ...). Closed surfaces can be asked for exact volumes later.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine precompute left.ply right.ply -o lungs.safetensors\n"
+             "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors",
+    SUPINE_SURFACES,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

@@ -4,111 +4,62 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <jansson.h>
+
 #include "runtime/breath/pv.h"
 
 #include "runtime/options/command.h"
 
 static const char command[] = "pv";
 
-static const char help[] =
-    "Usage: supine pv fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
-    "       supine pv show [FILE] [--step CMH2O]\n"
-    "\n"
-    "The lung's pressure-volume relation, measured or built in, as `supine breathe --pv FILE` "
-    "uses\n"
-    "it.\n"
-    "\n"
-    "fit   finds the five control parameters of each limb from samples, and says how sure they "
-    "are\n"
-    "      and how far the curve misses the samples (RMS, in mL and as a percentage of the volume\n"
-    "      range; Venegas' and Salazar-Knowles' curves are followed to under 1 %).\n"
-    "show  prints volume and compliance against pressure as CSV; without FILE, of the built-in\n"
-    "      normal adult lung.\n"
-    "\n"
-    "SAMPLES.csv has one sample a line, in order of pressure within each limb:\n"
-    "\n"
-    "      # static manoeuvre; lines like this one are comments\n"
-    "      pressure_cmH2O,volume_mL,limb\n"
-    "      0,2250,inhale\n"
-    "      2.5,2390,inhale\n"
-    "      ...\n"
-    "      30,5980,exhale\n"
-    "\n"
-    "Without the column limb all samples are inhale. A limb needs at least 8 samples; where one "
-    "limb\n"
-    "has none it takes the other's curve. With much noise, 1 % of the volume range say, take 20 "
-    "or\n"
-    "more. Volumes may be absolute or above any reference: breathing uses differences alone.\n"
-    "\n"
-    "Options:\n"
-    "  -o, --output FILE       write the parameters (CSV, one row a limb)\n"
-    "  -c, --confidence SHARE  of the intervals printed, between 0 and 1 (default 0.95)\n"
-    "  -j, --json              print the report as JSON\n"
-    "  -s, --step CMH2O        pressure step of show (default 1)\n"
-    "  -h, --help              print this\n"
-    "\n"
-    "The model, each limb on its own: V'' = u V' over the pressures of its samples, mapped to x "
-    "from\n"
-    "-1 to 1, u = c1 P0(x) + ... + c5 P4(x) with Legendre polynomials P0 to P4. V' is the "
-    "compliance,\n"
-    "u how fast it changes: c1 < 0 stiffens towards high pressure, c2 < 0 puts the greatest\n"
-    "compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 sharpen its knees.\n"
-    "\n"
-    "Examples:\n"
-    "  supine pv fit patient.csv -o patient.pv.csv\n"
-    "  supine breathe lungs.safetensors --pv patient.pv.csv -o breath.pvd\n"
-    "  supine pv show patient.pv.csv --step 0.5 > curve.csv\n";
-
-static bool parse_positive(const char *text, double *number) {
-  return supine_options_parse_number(text, number) && *number > 0.0;
-}
-
-typedef struct options {
+typedef struct request {
   const char *output;
   double confidence;
   double step;
   bool json;
-} options;
+} request;
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "write the parameters (CSV, one row a limb)",
+     SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
+    {"confidence", 'c', "SHARE", "of the intervals printed, between 0 and 1",
+     SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
+     .wants = "a number between 0 and 1"},
+    {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
+    {"step", 's', "CMH2O", "pressure step of show", SUPINE_FILLS(request, step), .standard = "1",
+     SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
+    {.name = NULL}};
 
 /* What is not finite is null, as JSON has no word for it. */
-static void print_json_number(const char *before, double number) {
-  (void)fputs(before, stdout);
-  if (isfinite(number)) {
-    (void)printf("%.17g", number);
-  } else {
-    (void)fputs("null", stdout);
-  }
-}
-
-static void print_json_numbers(const char *before, size_t count, const double *numbers) {
+static json_t *json_numbers(size_t count, const double *numbers) {
+  json_t *list = json_array();
   for (size_t i = 0; i < count; ++i) {
-    print_json_number(i == 0 ? before : ", ", numbers[i]);
+    (void)json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
   }
-  (void)putchar(']');
+  return list;
 }
 
-static void print_json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
-  (void)printf("{\"samples\": %zu", report->samples);
-  print_json_numbers(", \"pressure_cmH2O\": [", 2, curve->pressure);
-  print_json_numbers(", \"volume_mL\": [", 2, curve->volume);
-  print_json_numbers(", \"volume_interval_mL\": [", 2, report->volume_interval);
-  print_json_numbers(", \"control\": [", SUPINE_PV_CONTROLS, curve->control);
-  print_json_numbers(", \"control_interval\": [", SUPINE_PV_CONTROLS, report->control_interval);
-  print_json_number(", \"rms_mL\": ", report->rms);
-  print_json_number(", \"rms_percent\": ", report->rms_percent);
-  print_json_number(", \"condition\": ", report->condition);
-  (void)putchar('}');
+static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
+  return json_pack("{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f}", "samples",
+                   (json_int_t)report->samples, "pressure_cmH2O", json_numbers(2, curve->pressure),
+                   "volume_mL", json_numbers(2, curve->volume), "volume_interval_mL",
+                   json_numbers(2, report->volume_interval), "control",
+                   json_numbers(SUPINE_PV_CONTROLS, curve->control), "control_interval",
+                   json_numbers(SUPINE_PV_CONTROLS, report->control_interval), "rms_mL",
+                   report->rms, "rms_percent", report->rms_percent, "condition", report->condition);
 }
 
 static void print_json(const supine_pv *pv, const supine_pv_report *reports, double confidence) {
-  (void)printf("{\"confidence\": %.17g", confidence);
+  json_t *root = json_pack("{s:f}", "confidence", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].samples > 0) {
-      (void)printf(", \"%s\": ", supine_breath_limb_name((supine_pv_limb)limb));
-      print_json_limb(&pv->limb[limb], &reports[limb]);
+      (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
+                                json_limb(&pv->limb[limb], &reports[limb]));
     }
   }
-  (void)printf("}\n");
+  (void)json_dumpf(root, stdout, JSON_REAL_PRECISION(17));
+  (void)putchar('\n');
+  json_decref(root);
 }
 
 static void print_limb(const char *name, const supine_pv_curve *curve,
@@ -130,7 +81,7 @@ static void print_limb(const char *name, const supine_pv_curve *curve,
   }
 }
 
-static int run_fit(const char *path, const options *chosen) {
+static int run_fit(const char *path, const request *chosen) {
   supine_error error = {0};
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
@@ -185,7 +136,7 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
   return SUPINE_OK;
 }
 
-static int run_show(const char *path, const options *chosen) {
+static int run_show(const char *path, const request *chosen) {
   enum { ROWS_MAX = 1000000 };
   supine_error error = {0};
   supine_pv pv = *supine_breath_normal();
@@ -210,52 +161,60 @@ static int run_show(const char *path, const options *chosen) {
                              : supine_options_fail(command, &error);
 }
 
-int supine_command_pv(int argc, char **argv) {
-  static const struct option names[] = {
-      {"output", required_argument, NULL, 'o'}, {"confidence", required_argument, NULL, 'c'},
-      {"json", no_argument, NULL, 'j'},         {"step", required_argument, NULL, 's'},
-      {"help", no_argument, NULL, 'h'},         {NULL, 0, NULL, 0}};
-  options chosen = {.output = NULL, .confidence = 0.95, .step = 1.0, .json = false};
-  int option = 0;
-  optind = 0; /* begin anew, options and words in any order */
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:c:js:h", names, NULL)) != -1) {
-    switch (option) {
-    case 'o':
-      chosen.output = optarg;
-      break;
-    case 'c':
-      if (!parse_positive(optarg, &chosen.confidence) || chosen.confidence >= 1.0) {
-        return supine_options_usage(
-            command, "--confidence wants a number between 0 and 1, not '%s'", optarg);
-      }
-      break;
-    case 'j':
-      chosen.json = true;
-      break;
-    case 's':
-      if (!parse_positive(optarg, &chosen.step)) {
-        return supine_options_usage(command, "--step wants a positive number of cmH2O, not '%s'",
-                                    optarg);
-      }
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      return supine_options_finish(command);
-    default:
-      return supine_options_bad_option(command, names, option, argv);
-    }
-  }
-  const int words = argc - optind;
-  const char *verb = words > 0 ? argv[optind] : "";
+static int run(void *chosen, const supine_arguments *given) {
+  const char *verb = given->operand[0];
+  const char *file = given->count > 1 ? given->operand[1] : NULL;
   if (strcmp(verb, "fit") == 0) {
-    return words == 2 ? run_fit(argv[optind + 1], &chosen)
-                      : supine_options_usage(command, "fit wants one file of samples");
+    return file != NULL ? run_fit(file, chosen)
+                        : supine_options_usage(command, "fit takes one file of samples");
   }
-  if (strcmp(verb, "show") == 0) {
-    return words <= 2 ? run_show(words == 2 ? argv[optind + 1] : NULL, &chosen)
-                      : supine_options_usage(command, "show wants at most one file of parameters");
-  }
-  return words > 0 ? supine_options_usage(command, "fit or show, not '%s'", verb)
-                   : supine_options_usage(command, "fit or show what?");
+  return strcmp(verb, "show") == 0 ? run_show(file, chosen)
+                                   : supine_options_usage(command, "fit or show, not '%s'", verb);
 }
+
+const supine_command supine_command_pv = {
+    command,
+    "fit a pressure-volume relation to samples, and show one",
+    .usage = "fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
+             "show [FILE] [--step CMH2O]",
+    .about =
+        "The lung's pressure-volume relation, measured or built in, as `supine breathe --pv FILE` "
+        "uses it.\n"
+        "\n"
+        "fit finds the five control parameters of each limb from samples, and says how sure they "
+        "are and how far the curve misses the samples (RMS, in mL and as a percentage of the "
+        "volume range; Venegas' and Salazar-Knowles' curves are followed to under 1 %).\n"
+        "\n"
+        "show prints volume and compliance against pressure as CSV; without FILE, of the built-in "
+        "normal adult lung.\n"
+        "\n"
+        "SAMPLES.csv has one sample a line, in order of pressure within each limb:\n"
+        "\n"
+        "      # static manoeuvre; lines like this one are comments\n"
+        "      pressure_cmH2O,volume_mL,limb\n"
+        "      0,2250,inhale\n"
+        "      2.5,2390,inhale\n"
+        "      ...\n"
+        "      30,5980,exhale\n"
+        "\n"
+        "Without the column limb all samples are inhale. A limb needs at least 8 samples; where "
+        "one limb has none it takes the other's curve. With much noise, 1 % of the volume range "
+        "say, take 20 or more. Volumes may be absolute or above any reference: breathing uses "
+        "differences alone.",
+    .options = table,
+    .notes =
+        "The model, each limb on its own: V'' = u V' over the pressures of its samples, mapped to "
+        "x from -1 to 1, u = c1 P0(x) + ... + c5 P4(x) with Legendre polynomials P0 to P4. V' is "
+        "the compliance, u how fast it changes: c1 < 0 stiffens towards high pressure, c2 < 0 "
+        "puts the greatest compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 "
+        "sharpen its knees.\n"
+        "\n"
+        "Examples:\n"
+        "  supine pv fit patient.csv -o patient.pv.csv\n"
+        "  supine breathe lungs.safetensors --pv patient.pv.csv -o breath.pvd\n"
+        "  supine pv show patient.pv.csv --step 0.5 > curve.csv",
+    .operands_least = 1,
+    .operands_most = 2,
+    .operands_missing = "fit or show what? One file at most",
+    .request_size = sizeof(request),
+    .run = run};

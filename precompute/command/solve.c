@@ -13,26 +13,6 @@
 
 static const char name[] = "solve";
 
-static const char help[] =
-    "Usage: supine solve MESH... --posture NAME -o FILE [OPTIONS]\n"
-    "\n"
-    "Runs the full physics for one direction of gravity, without any harmonics, and writes the\n"
-    "deformed surface: the reference that a basis is measured against.\n"
-    "\n"
-    "  -o, --output FILE    .ply, .obj, .stl or .vtp; PLY and VTP carry the displacement\n"
-    "  --volume ML          air above the resting volume, both lungs together; may be negative\n"
-    "  --scale MM           largest displacement instead, mm; negative: the other way. Default:\n"
-    "                       F d as it is, F what a vertex catches of the force, d in mm\n"
-    "  --unit-force VERTEX  instead of a posture: the response of every vertex to a unit force on\n"
-    "                       this one (from 0), a column of the transfer matrix T, as CSV\n"
-    "\n";
-
-static const char examples[] =
-    "\n"
-    "Examples:\n"
-    "  supine solve left.ply right.ply --posture prone --volume 500 -o prone.vtp\n"
-    "  supine solve lungs.ply --unit-force 0 -o column.csv\n";
-
 typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
@@ -41,6 +21,25 @@ typedef struct request {
   double volume, scale;
   size_t vertex;
 } request;
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
+    {"volume", 0, "ML", "air above the resting volume, both lungs together; may be negative",
+     SUPINE_FILLS(request, volume), SUPINE_SAYS_GIVEN(request, has_volume), .wants = "millilitres",
+     .rivals = "breath"},
+    {"scale", 0, "MM",
+     "largest displacement instead, mm; negative: the other way. Default: F d as it is, F what a "
+     "vertex catches of the force, d in mm",
+     SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
+     .rivals = "breath"},
+    {"unit-force", 0, "VERTEX",
+     "instead of a posture: the response of every vertex to a unit force on this one (from 0), a "
+     "column of the transfer matrix T, as CSV",
+     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex"},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
+    {.name = NULL}};
 
 /* Writes one column of T as CSV. */
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
@@ -136,15 +135,24 @@ cleanup:
   return status;
 }
 
-static int run(request *wanted, char **paths, size_t count) {
+static void begin(void *chosen) {
+  supine_command_model_options_begin(&((request *)chosen)->model);
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
   double g[3] = {0.0, 0.0, 0.0};
+  supine_lungs lungs = {0};
   int result = SUPINE_EXIT_OK;
+  if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
+    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+                                wanted->path);
+  }
   if (!wanted->has_vertex) {
     result = supine_options_orientation_finish(&wanted->orientation, name, g);
   }
-  supine_lungs lungs = {0};
   if (result == SUPINE_EXIT_OK) {
-    result = supine_command_model_load(&wanted->model, name, paths, count, &lungs);
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
   }
   if (result == SUPINE_EXIT_OK) {
     supine_error error;
@@ -157,78 +165,17 @@ static int run(request *wanted, char **paths, size_t count) {
   return result;
 }
 
-int supine_command_solve(int argc, char **argv) {
-  enum { VOLUME = OPTION_MODEL_END, SCALE, UNIT_FORCE };
-  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                          {"volume", required_argument, NULL, VOLUME},
-                                          {"scale", required_argument, NULL, SCALE},
-                                          {"unit-force", required_argument, NULL, UNIT_FORCE},
-                                          SUPINE_ORIENTATION_OPTIONS,
-                                          SUPINE_MODEL_OPTIONS,
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-  request wanted = {.model = supine_command_model_options_default()};
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
-    int result = SUPINE_EXIT_OK;
-    switch (option) {
-    case 'o':
-      wanted.path = optarg;
-      break;
-    case VOLUME:
-      wanted.has_volume = supine_options_parse_number(optarg, &wanted.volume);
-      if (!wanted.has_volume) {
-        result = supine_options_usage(name, "--volume takes millilitres, not '%s'", optarg);
-      }
-      break;
-    case SCALE:
-      wanted.has_scale = supine_options_parse_number(optarg, &wanted.scale);
-      if (!wanted.has_scale) {
-        result = supine_options_usage(name, "--scale takes millimetres, not '%s'", optarg);
-      }
-      break;
-    case UNIT_FORCE:
-      wanted.has_vertex = supine_options_parse_count(optarg, &wanted.vertex);
-      if (!wanted.has_vertex) {
-        result = supine_options_usage(name, "--unit-force takes a vertex, not '%s'", optarg);
-      }
-      break;
-    case OPTION_POSTURE:
-    case OPTION_GRAVITY:
-    case OPTION_QUATERNION:
-    case OPTION_TILT:
-      result = supine_options_orientation_take(&wanted.orientation, name, option, optarg);
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      (void)fputs(supine_options_orientation_help, stdout);
-      (void)fputc('\n', stdout);
-      (void)fputs(supine_command_model_options_help, stdout);
-      (void)fputs(examples, stdout);
-      return supine_options_finish(name);
-    case '?':
-    case ':':
-      return supine_options_bad_option(name, options, option, argv);
-    default:
-      result = supine_command_model_options_take(&wanted.model, name, option, optarg);
-    }
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
-  }
-  if (optind == argc) {
-    return supine_options_usage(name, "which surface? Name one or more mesh files");
-  }
-  if (wanted.path == NULL) {
-    return supine_options_usage(name, "-o FILE is missing");
-  }
-  if (!wanted.has_vertex && !supine_mesh_save_supports(wanted.path)) {
-    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
-                                wanted.path);
-  }
-  if (wanted.has_volume && wanted.has_scale) {
-    return supine_options_usage(name, "give --volume or --scale, not both");
-  }
-  return run(&wanted, argv + optind, (size_t)(argc - optind));
-}
+const supine_command supine_command_solve = {
+    name,
+    "full physics for one posture: the reference",
+    .usage = "MESH... --posture NAME -o FILE [OPTIONS]",
+    .about = "Runs the full physics for one direction of gravity, without any harmonics, and "
+             "writes the deformed surface: the reference that a basis is measured against.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine solve left.ply right.ply --posture prone --volume 500 -o prone.vtp\n"
+             "  supine solve lungs.ply --unit-force 0 -o column.csv",
+    SUPINE_SURFACES,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

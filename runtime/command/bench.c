@@ -11,52 +11,49 @@
 
 static const char name[] = "bench";
 
-static const char help[] =
-    "Usage: supine bench BASIS [OPTIONS]\n"
-    "\n"
-    "Measures the evaluation of a basis on this machine: its field, repeated to each number of\n"
-    "vertices, in every form of storage, beside a plain loop that a compiler makes fast and "
-    "beside\n"
-    "what the memory can do. All are run in turn, many times over, and the fastest run of each is\n"
-    "given: compare rows of one run.\n"
-    "\n"
-    "  --vertices N,N,...   sizes; default 10000,100000,1000000\n"
-    "  --threads N          measure one thread and this many; default 2\n"
-    "  --repeats N          runs of each; default 9\n"
-    "  --json               {\"rows\": [{\"what\", \"vertices\", \"threads\", \"storage\",\n"
-    "                       \"ns_per_vertex\", ...}]}\n"
-    "\n"
-    "Rows: supine (AoS output by storage, and others named in full), plain_loop (-O3, float32),\n"
-    "traffic (the same loads and stores without arithmetic: with AVX-512, memory's bound), copy\n"
-    "and triad (the memory's own speed, with stores past the caches), arithmetic (what threads\n"
-    "gain where memory plays no part). triad is the share of the triad's bandwidth that is "
-    "reached.\n"
-    "A tracked head-worn display allows 15 ms a frame: 15 ns a vertex for a million vertices.\n";
-
 enum { SIZES_MAX = 32 };
 
-/* "10000,100000" into sizes; how many, or 0 where it is anything else. */
-static size_t parse_sizes(const char *text, size_t *sizes) {
+typedef struct request {
+  supine_bench_options bench;
+  size_t sizes[SIZES_MAX];
+  bool json;
+} request;
+
+/* "10000,100000" into sizes */
+static int read_sizes(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  (void)command;
   size_t count = 0;
   for (const char *at = text; count < SIZES_MAX; ++at) {
     char number[32];
     const size_t digits = strcspn(at, ",");
-    if (digits >= sizeof number) {
-      return 0;
-    }
-    memcpy(number, at, digits);
-    number[digits] = '\0';
-    if (!supine_options_parse_count(number, &sizes[count]) || sizes[count] == 0) {
-      return 0;
+    (void)snprintf(number, sizeof number, "%.*s", (int)digits, at);
+    if (digits >= sizeof number || !supine_options_parse_count(number, &wanted->sizes[count]) ||
+        wanted->sizes[count] == 0) {
+      break;
     }
     ++count;
     at += digits;
     if (*at == '\0') {
-      return count;
+      wanted->bench.vertices = wanted->sizes;
+      wanted->bench.vertices_count = count;
+      return SUPINE_EXIT_OK;
     }
   }
-  return 0;
+  return SUPINE_OPTION_MISFIT;
 }
+
+static const supine_option table[] = {
+    {"vertices", 0, "N,N,...", "sizes", .read = read_sizes, .standard = "10000,100000,1000000",
+     .wants = "numbers, N,N,..."},
+    {"threads", 0, "N", "measure one thread and this many", SUPINE_FILLS(request, bench.threads),
+     .standard = "2", .range = {1.0, 256.0}},
+    {"repeats", 0, "N", "runs of each", SUPINE_FILLS(request, bench.repeats), .standard = "9",
+     .range = {1.0, 1e6}},
+    {"json", 0, NULL,
+     "{\"rows\": [{\"what\", \"vertices\", \"threads\", \"storage\", \"ns_per_vertex\", ...}]}",
+     SUPINE_FILLS(request, json)},
+    {.name = NULL}};
 
 static void print_row(void *context, const supine_bench_row *row) {
   (void)context;
@@ -103,55 +100,36 @@ static int measure(const supine_bench_options *options, bool json) {
   return supine_options_finish(name);
 }
 
-int supine_command_bench(int argc, char **argv) {
-  static const struct option options[] = {
-      {"vertices", required_argument, NULL, 'v'}, {"threads", required_argument, NULL, 't'},
-      {"repeats", required_argument, NULL, 'r'},  {"json", no_argument, NULL, 'j'},
-      {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0}};
-  size_t sizes[SIZES_MAX];
-  supine_bench_options wanted = {0};
-  bool json = false;
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
-    switch (option) {
-    case 'v':
-      wanted.vertices_count = parse_sizes(optarg, sizes);
-      wanted.vertices = sizes;
-      if (wanted.vertices_count == 0) {
-        return supine_options_usage(name, "--vertices takes numbers, N,N,...; not '%s'", optarg);
-      }
-      break;
-    case 't':
-      if (!supine_options_parse_count(optarg, &wanted.threads) || wanted.threads == 0) {
-        return supine_options_usage(name, "--threads takes a number from 1, not '%s'", optarg);
-      }
-      break;
-    case 'r':
-      if (!supine_options_parse_count(optarg, &wanted.repeats) || wanted.repeats == 0) {
-        return supine_options_usage(name, "--repeats takes a number from 1, not '%s'", optarg);
-      }
-      break;
-    case 'j':
-      json = true;
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      return supine_options_finish(name);
-    default:
-      return supine_options_bad_option(name, options, option, argv);
-    }
-  }
-  if (argc - optind != 1) {
-    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
-  }
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
   supine_basis *basis = NULL;
   supine_error error;
-  if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
+  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
-  wanted.like = basis;
-  const int result = measure(&wanted, json);
+  wanted->bench.like = basis;
+  const int result = measure(&wanted->bench, wanted->json);
   supine_basis_close(basis);
   return result;
 }
+
+const supine_command supine_command_bench = {
+    name,
+    "measure what an evaluation costs on this machine",
+    .usage = "BASIS [OPTIONS]",
+    .about =
+        "Measures the evaluation of a basis on this machine: its field, repeated to each number of "
+        "vertices, in every form of storage, beside a plain loop that a compiler makes fast and "
+        "beside what the memory can do. All are run in turn, many times over, and the fastest run "
+        "of each is given: compare rows of one run.",
+    .options = table,
+    .notes =
+        "Rows: supine (AoS output by storage, and others named in full), plain_loop (-O3, "
+        "float32), traffic (the same loads and stores without arithmetic: with AVX-512, memory's "
+        "bound), copy and triad (the memory's own speed, with stores past the caches), arithmetic "
+        "(what threads gain where memory plays no part). triad is the share of the triad's "
+        "bandwidth that is reached.\n"
+        "A tracked head-worn display allows 15 ms a frame: 15 ns a vertex for a million vertices.",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

@@ -11,47 +11,6 @@
 
 static const char name[] = "breathe";
 
-static const char help[] =
-    "Usage: supine breathe BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]\n"
-    "\n"
-    "Lets the lungs of a basis file breathe, in one posture or while the body turns, and writes "
-    "the\n"
-    "surface of every frame. The volume follows the pressure-volume relation and is exact in each\n"
-    "frame. Prints how long computing a frame took, beside the 15 ms of a display that must not\n"
-    "wait.\n"
-    "\n"
-    "  -o, --output OUT     NAME.pvd: that file, and a folder NAME of VTP files, for ParaView;\n"
-    "                       NAME.safetensors: one file with positions [T,N,3], triangles [M,3],\n"
-    "                       time [T], volume [T,G] and gravity [T,3]; anything else: a folder "
-    "with\n"
-    "                       breath.pvd and the VTP files. A folder must be new or empty\n"
-    "  --turn FROM:TO:SECONDS  turns gravity from one posture to another at constant speed, as\n"
-    "                       supine:left:10s; to the opposite posture over the left side\n"
-    "\n"
-    "The breath:\n"
-    "  --tidal ML           air of a breath above rest, both lungs together; default 500\n"
-    "  --rate N             breaths a minute; default 12\n"
-    "  --inhale SHARE       of the breath's time that is inhalation, between 0 and 1; default 1/3\n"
-    "  --pv FILE            pressure-volume relation, of 'supine pv fit'; default: a normal "
-    "adult's\n"
-    "  --rest-pressure P    cmH2O at the end of an exhalation; default 5\n"
-    "  --course NAME        how pressure rises and falls: cosine (default), ramp; or flow: the\n"
-    "                       volume goes in straight lines, whatever the pressure\n"
-    "  --step ML            the paper's own breath instead: constant flow of this volume a frame,\n"
-    "                       in and out; 1.5 takes 5 s to inhale 500 mL at 66.66 frames a second\n"
-    "\n"
-    "The frames:\n"
-    "  --fps N              frames a second; default 66.66, one every 15 ms\n"
-    "  --seconds S          how long; default: the turn, or one breath\n"
-    "\n";
-
-static const char examples[] =
-    "\n"
-    "Examples:\n"
-    "  supine breathe lungs.safetensors --posture prone -o prone.pvd\n"
-    "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.pvd\n"
-    "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors\n";
-
 static const double budget = 15e-3; /* s a frame */
 
 typedef struct request {
@@ -65,14 +24,15 @@ typedef struct request {
 } request;
 
 /* "supine:left:10s" */
-static int take_turn(request *wanted, const char *value) {
+static int read_turn(const char *command, const char *value, void *field) {
+  request *wanted = field;
   char text[128];
   char *colon[2];
   (void)snprintf(text, sizeof text, "%s", value);
   colon[0] = strchr(text, ':');
   colon[1] = colon[0] == NULL ? NULL : strchr(colon[0] + 1, ':');
   if (strlen(value) >= sizeof text || colon[1] == NULL) {
-    return supine_options_usage(name, "--turn takes FROM:TO:SECONDS, not '%s'", value);
+    return SUPINE_OPTION_MISFIT;
   }
   *colon[0] = *colon[1] = '\0';
   char *seconds = colon[1] + 1;
@@ -82,72 +42,54 @@ static int take_turn(request *wanted, const char *value) {
   }
   if (!supine_options_parse_number(seconds, &wanted->turn.seconds) ||
       !(wanted->turn.seconds > 0.0)) {
-    return supine_options_usage(name, "--turn takes a time above 0 s, not '%s'", value);
+    return supine_options_usage(command, "--turn takes a time above 0 s, not '%s'", value);
   }
   wanted->turns = true;
-  const int result = supine_options_orientation_posture(name, text, wanted->turn.from);
+  const int result = supine_options_orientation_posture(command, text, wanted->turn.from);
   return result == SUPINE_EXIT_OK
-             ? supine_options_orientation_posture(name, colon[0] + 1, wanted->turn.to)
+             ? supine_options_orientation_posture(command, colon[0] + 1, wanted->turn.to)
              : result;
 }
 
-static int take_positive(const char *option, const char *value, double *number) {
-  if (supine_options_parse_number(value, number) && *number > 0.0) {
-    return SUPINE_EXIT_OK;
-  }
-  return supine_options_usage(name, "--%s takes a number above 0, not '%s'", option, value);
-}
+static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
 
-static int take_course(const char *value, supine_pv_course *course) {
-  static const char *const names[] = {"cosine", "ramp", "flow"};
-  for (int i = 0; i < 3; ++i) {
-    if (strcmp(value, names[i]) == 0) {
-      *course = (supine_pv_course)i;
-      return SUPINE_EXIT_OK;
-    }
-  }
-  return supine_options_usage(name, "--course takes cosine, ramp or flow, not '%s'", value);
-}
-
-enum { TURN = OPTION_ORIENTATION_END, TIDAL, RATE, INHALE, PV, REST, COURSE, STEP, FPS, SECONDS };
-
-static int take(request *wanted, int option, const char *value) {
-  switch (option) {
-  case 'o':
-    wanted->path = value;
-    return SUPINE_EXIT_OK;
-  case TURN:
-    return take_turn(wanted, value);
-  case TIDAL:
-    return take_positive("tidal", value, &wanted->breath.tidal);
-  case RATE:
-    return take_positive("rate", value, &wanted->breath.rate);
-  case INHALE:
-    if (!supine_options_parse_number(value, &wanted->breath.inhale_fraction) ||
-        !(wanted->breath.inhale_fraction > 0.0 && wanted->breath.inhale_fraction < 1.0)) {
-      return supine_options_usage(name, "--inhale takes a share between 0 and 1, not '%s'", value);
-    }
-    return SUPINE_EXIT_OK;
-  case PV:
-    wanted->pv = value;
-    return SUPINE_EXIT_OK;
-  case REST:
-    if (!supine_options_parse_number(value, &wanted->breath.rest_pressure)) {
-      return supine_options_usage(name, "--rest-pressure takes cmH2O, not '%s'", value);
-    }
-    return SUPINE_EXIT_OK;
-  case COURSE:
-    return take_course(value, &wanted->breath.course);
-  case STEP:
-    return take_positive("step", value, &wanted->step);
-  case FPS:
-    return take_positive("fps", value, &wanted->fps);
-  case SECONDS:
-    return take_positive("seconds", value, &wanted->seconds);
-  default:
-    return supine_options_orientation_take(&wanted->orientation, name, option, value);
-  }
-}
+static const supine_option table[] = {
+    {"output", 'o', "OUT",
+     "NAME.pvd: that file, and a folder NAME of VTP files, for ParaView; NAME.safetensors: one "
+     "file with positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; "
+     "anything else: a folder with breath.pvd and the VTP files. A folder must be new or empty",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
+    {"turn", 0, "FROM:TO:SECONDS",
+     "turns gravity from one posture to another at constant speed, as supine:left:10s; to the "
+     "opposite posture over the left side",
+     .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
+    {.help = "The breath:"},
+    {"tidal", 0, "ML", "air of a breath above rest, both lungs together; default 500",
+     SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
+    {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
+     SUPINE_ABOVE_ZERO},
+    {"inhale", 0, "SHARE", "of the breath's time that is inhalation, between 0 and 1; default 1/3",
+     SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
+     .wants = "a share between 0 and 1"},
+    {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
+     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
+    {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
+     SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O"},
+    {"course", 0, "NAME",
+     "how pressure rises and falls: cosine (default), ramp; or flow: the volume goes in straight "
+     "lines, whatever the pressure",
+     SUPINE_FILLS(request, breath.course), .choices = courses},
+    {"step", 0, "ML",
+     "the paper's own breath instead: constant flow of this volume a frame, in and out; 1.5 takes "
+     "5 s to inhale 500 mL at 66.66 frames a second",
+     SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO},
+    {.help = "The frames:"},
+    {"fps", 0, "N", "frames a second, one every 15 ms", SUPINE_FILLS(request, fps),
+     SUPINE_ABOVE_ZERO, .standard = "66.66"},
+    {"seconds", 0, "S", "how long; default: the turn, or one breath",
+     SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.name = NULL}};
 
 /* Number of frames and what was left to default; an exit code. */
 static int complete(request *wanted, size_t *count) {
@@ -289,65 +231,50 @@ cleanup:
   return status;
 }
 
-int supine_command_breathe(int argc, char **argv) {
-  static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                          {"turn", required_argument, NULL, TURN},
-                                          {"tidal", required_argument, NULL, TIDAL},
-                                          {"rate", required_argument, NULL, RATE},
-                                          {"inhale", required_argument, NULL, INHALE},
-                                          {"pv", required_argument, NULL, PV},
-                                          {"rest-pressure", required_argument, NULL, REST},
-                                          {"course", required_argument, NULL, COURSE},
-                                          {"step", required_argument, NULL, STEP},
-                                          {"fps", required_argument, NULL, FPS},
-                                          {"seconds", required_argument, NULL, SECONDS},
-                                          SUPINE_ORIENTATION_OPTIONS,
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-  request wanted = {.breath = supine_breath_default(), .fps = 66.66};
-  char made_by[512];
-  supine_options_describe(argc, argv, made_by, sizeof made_by);
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
-    if (option == 'h') {
-      (void)fputs(help, stdout);
-      (void)fputs(supine_options_orientation_help, stdout);
-      (void)fputs(examples, stdout);
-      return supine_options_finish(name);
-    }
-    if (option == '?' || option == ':') {
-      return supine_options_bad_option(name, options, option, argv);
-    }
-    const int result = take(&wanted, option, optarg);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
-  }
-  if (argc - optind != 1) {
-    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
-  }
-  if (wanted.path == NULL) {
-    return supine_options_usage(name, "-o OUT is missing");
-  }
+static void begin(void *chosen) {
+  ((request *)chosen)->breath = supine_breath_default();
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  const char *path = given->operand[0];
+  supine_basis *basis = NULL;
+  supine_error error;
   size_t count = 1;
-  int result = complete(&wanted, &count);
+  int result = complete(wanted, &count);
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  supine_basis *basis = NULL;
-  supine_error error;
-  supine_status status = supine_basis_open(argv[optind], &basis, &error);
+  supine_status status = supine_basis_open(path, &basis, &error);
   if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
     status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
                               "%s: its surface is open and encloses no volume: close the mesh "
                               "before 'supine precompute'",
-                              argv[optind]);
+                              path);
   }
   if (status == SUPINE_OK) {
-    status = play(basis, &wanted, count, made_by, &error);
+    status = play(basis, wanted, count, given->made_by, &error);
   }
   result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   supine_basis_close(basis);
   return result;
 }
+
+const supine_command supine_command_breathe = {
+    name,
+    "let a basis breathe, in one posture or turning",
+    .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
+    .about =
+        "Lets the lungs of a basis file breathe, in one posture or while the body turns, and "
+        "writes the surface of every frame. The volume follows the pressure-volume relation and "
+        "is exact in each frame. Prints how long computing a frame took, beside the 15 ms of a "
+        "display that must not wait.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine breathe lungs.safetensors --posture prone -o prone.pvd\n"
+             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.pvd\n"
+             "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

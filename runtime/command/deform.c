@@ -12,26 +12,6 @@
 
 static const char name[] = "deform";
 
-static const char help[] =
-    "Usage: supine deform BASIS --posture NAME [--volume ML] -o FILE\n"
-    "\n"
-    "Deforms the lungs of a basis file for any direction of gravity and any volume and writes the\n"
-    "surface. This is what the run-time library does each frame.\n"
-    "\n"
-    "  -o, --output FILE    .ply, .obj, .stl or .vtp; PLY and VTP carry the displacement\n"
-    "  --volume ML          air above the resting volume, both lungs together: the surface grows\n"
-    "                       by exactly that; may be negative; default 500\n"
-    "  --volume left=ML,right=ML   or lung by lung\n"
-    "  --scale MM           largest displacement instead, mm: for open surfaces\n"
-    "\n";
-
-static const char examples[] =
-    "\n"
-    "Examples:\n"
-    "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
-    "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 -o "
-    "out.ply\n";
-
 typedef struct request {
   supine_orientation orientation;
   const char *path;
@@ -39,6 +19,20 @@ typedef struct request {
   bool has_scale;
   double scale;
 } request;
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
+     .endings = ".ply, .obj, .stl or .vtp"},
+    {"volume", 0, "ML",
+     "air above the resting volume, both lungs together: the surface grows by exactly that; may "
+     "be negative; default 500\nleft=ML,right=ML: lung by lung",
+     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
+     SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
+     .rivals = "breath"},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.name = NULL}};
 
 /* Positions at the given scales as doubles, for measuring and saving. */
 static supine_status deformed_mesh(const supine_basis *basis, const double *weights,
@@ -129,74 +123,36 @@ cleanup:
   return result;
 }
 
-int supine_command_deform(int argc, char **argv) {
-  enum { VOLUME = OPTION_ORIENTATION_END, SCALE };
-  static const struct option options[] = {
-      {"output", required_argument, NULL, 'o'},  {"volume", required_argument, NULL, VOLUME},
-      {"scale", required_argument, NULL, SCALE}, SUPINE_ORIENTATION_OPTIONS,
-      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
-  request wanted = {0};
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
-    int result = SUPINE_EXIT_OK;
-    switch (option) {
-    case 'o':
-      wanted.path = optarg;
-      break;
-    case VOLUME:
-      wanted.volume = optarg;
-      break;
-    case SCALE:
-      wanted.has_scale = supine_options_parse_number(optarg, &wanted.scale);
-      if (!wanted.has_scale) {
-        result = supine_options_usage(name, "--scale takes millimetres, not '%s'", optarg);
-      }
-      break;
-    case OPTION_POSTURE:
-    case OPTION_GRAVITY:
-    case OPTION_QUATERNION:
-    case OPTION_TILT:
-      result = supine_options_orientation_take(&wanted.orientation, name, option, optarg);
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      (void)fputs(supine_options_orientation_help, stdout);
-      (void)fputs(examples, stdout);
-      return supine_options_finish(name);
-    default:
-      return supine_options_bad_option(name, options, option, argv);
-    }
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
-  }
-  if (argc - optind != 1) {
-    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
-  }
-  if (wanted.path == NULL) {
-    return supine_options_usage(name, "-o FILE is missing");
-  }
-  if (!supine_mesh_save_supports(wanted.path)) {
-    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
-                                wanted.path);
-  }
-  if (wanted.volume != NULL && wanted.has_scale) {
-    return supine_options_usage(name, "give --volume or --scale, not both");
-  }
-  double gravity[3];
-  int result = supine_options_orientation_finish(&wanted.orientation, name, gravity);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
-  }
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
   const supine_basis_options exact = {sizeof exact,
                                       .storage = SUPINE_STORAGE_EXACT}; /* one frame, for a file */
   supine_basis *basis = NULL;
   supine_error error;
-  if (supine_basis_open_with(argv[optind], &exact, &basis, &error) != SUPINE_OK) {
+  double gravity[3];
+  int result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  if (supine_basis_open_with(given->operand[0], &exact, &basis, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
-  result = deform(basis, &wanted, gravity);
+  result = deform(basis, wanted, gravity);
   supine_basis_close(basis);
   return result;
 }
+
+const supine_command supine_command_deform = {
+    name,
+    "deform a basis for a posture and a volume",
+    .usage = "BASIS --posture NAME [--volume ML] -o FILE",
+    .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
+             "writes the surface. This is what the run-time library does each frame.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
+             "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 "
+             "-o out.ply",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

@@ -13,19 +13,6 @@
 
 static const char name[] = "info";
 
-static const char help[] =
-    "Usage: supine info BASIS [--json]\n"
-    "\n"
-    "Says what a basis file holds: lungs, functions of orientation, the model it was made with, "
-    "and\n"
-    "its error, measured against the full solve on directions that no grid used.\n"
-    "\n"
-    "Energy per band is the share of the squared displacement, over the surface and all\n"
-    "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity\n"
-    "does; the even bands beyond l = 0 are what makes prone more than the reverse of supine.\n"
-    "\n"
-    "  --json               the same for programs\n";
-
 /* Share of the squared displacement in each band, [band + 1]; zeros where the surface has no area.
  */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
@@ -204,28 +191,16 @@ static bool print_json(const char *path, const supine_basis *basis, const double
   return good;
 }
 
-int supine_command_info(int argc, char **argv) {
-  static const struct option options[] = {
-      {"json", no_argument, NULL, 'j'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
-  bool json = false;
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
-    switch (option) {
-    case 'j':
-      json = true;
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      return supine_options_finish(name);
-    default:
-      return supine_options_bad_option(name, options, option, argv);
-    }
-  }
-  if (argc - optind != 1) {
-    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
-  }
-  const char *path = argv[optind];
+typedef struct request {
+  bool json;
+} request;
+
+static const supine_option table[] = {
+    {"json", 0, NULL, "the same for programs", SUPINE_FILLS(request, json)}, {.name = NULL}};
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  const char *path = given->operand[0];
   supine_basis *basis = NULL;
   supine_error error;
   int result = SUPINE_EXIT_OK;
@@ -244,12 +219,12 @@ int supine_command_info(int argc, char **argv) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  if (json && !print_json(path, basis, energy)) {
+  if (wanted->json && !print_json(path, basis, energy)) {
     supine_options_say(name, "cannot print JSON");
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }
-  if (!json) {
+  if (!wanted->json) {
     print_text(path, basis, energy);
     print_table(basis);
   }
@@ -259,3 +234,20 @@ cleanup:
   supine_basis_close(basis);
   return result;
 }
+
+const supine_command supine_command_info = {
+    name,
+    "say what a basis file holds and how exact it is",
+    .usage = "BASIS [--json]",
+    .about =
+        "Says what a basis file holds: lungs, functions of orientation, the model it was made "
+        "with, and its error, measured against the full solve on directions that no grid used.\n"
+        "\n"
+        "Energy per band is the share of the squared displacement, over the surface and all "
+        "orientations, that the harmonics of each band l carry. Odd bands change sign when "
+        "gravity does; the even bands beyond l = 0 are what makes prone more than the reverse of "
+        "supine.",
+    .options = table,
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

@@ -13,36 +13,6 @@
 
 static const char name[] = "render";
 
-static const char help[] =
-    "Usage: supine render BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
-    "\n"
-    "Draws the lungs, off screen, in each posture side by side: coloured by displacement, with "
-    "lines\n"
-    "at the ticks of the colour bar and a ball that shows the body's axes (left, right, anterior,\n"
-    "posterior, head, feet) and where gravity points (the arrow; a cross points away from you).\n"
-    "\n"
-    "  --posture LIST       up to 8; --postures is the same\n"
-    "  --volume ML          air above the resting volume, default 500; or left=ML,right=ML\n"
-    "  --scale MM           largest displacement in each posture instead: for open surfaces\n"
-    "  -o, --output FILE    .png\n"
-    "  --size WxH           pixels; default: as the postures and views want\n"
-    "  --view LIST          anterior (default), posterior, left, right, lateral (from the left),\n"
-    "                       head, feet, oblique; several come below each other\n"
-    "  --colour WHAT        displacement (default: from rest), or difference:POSTURE\n"
-    "  --largest MM         end of the colour bar; default: what 95 % of the surface does not "
-    "exceed,\n"
-    "                       rounded up; a pointed end says that some values lie beyond\n"
-    "  --theme light|dark   default light\n"
-    "  --title TEXT         a heading\n"
-    "\n";
-
-static const char examples[] =
-    "\n"
-    "Examples:\n"
-    "  supine render lungs.safetensors --posture supine,prone,left,right -o postures.png\n"
-    "  supine render lungs.safetensors --posture prone --colour difference:supine \\\n"
-    "      --view anterior,lateral,posterior --theme dark -o prone.png\n";
-
 typedef struct request {
   const char *output;
   const char *postures;
@@ -54,7 +24,7 @@ typedef struct request {
   size_t width, height;
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
-  bool dark;
+  unsigned theme; /* 1: dark */
 } request;
 
 /* One posture, ready to be drawn. */
@@ -190,7 +160,7 @@ static int render(const supine_basis *basis, const request *wanted,
                             .bar_label = label,
                             .largest = wanted->largest > 0.0 ? wanted->largest
                                                              : supine_render_bar_end(p95),
-                            .dark = wanted->dark};
+                            .dark = wanted->theme == 1};
   picture.beyond = largest > picture.largest;
   choose_size(wanted, &picture);
   result = write_picture(wanted, renderer, &picture);
@@ -202,7 +172,9 @@ cleanup:
   return result;
 }
 
-static int take_size(const char *text, request *wanted) {
+static int read_size(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  (void)command;
   char width[16];
   const size_t length = strcspn(text, "x");
   if (length < sizeof width && text[length] == 'x') {
@@ -214,10 +186,11 @@ static int take_size(const char *text, request *wanted) {
       return SUPINE_EXIT_OK;
     }
   }
-  return supine_options_usage(name, "--size takes WIDTHxHEIGHT, up to 16384 each, not '%s'", text);
+  return SUPINE_OPTION_MISFIT;
 }
 
-static int take_views(const char *text, request *wanted) {
+static int read_views(const char *command, const char *text, void *field) {
+  request *wanted = field;
   wanted->view_count = 0;
   for (const char *at = text;;) {
     char word[32];
@@ -233,11 +206,11 @@ static int take_views(const char *text, request *wanted) {
     }
     if (view > SUPINE_VIEW_COUNT) {
       const char *nearest = supine_options_suggest(word, names, SUPINE_VIEW_COUNT + 1);
-      return supine_options_usage(name, "no view '%s'; did you mean '%s'?", word,
+      return supine_options_usage(command, "no view '%s'; did you mean '%s'?", word,
                                   nearest != NULL ? nearest : "anterior");
     }
     if (wanted->view_count == SUPINE_VIEWS_MAX) {
-      return supine_options_usage(name, "more than %d views", SUPINE_VIEWS_MAX);
+      return supine_options_usage(command, "more than %d views", SUPINE_VIEWS_MAX);
     }
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
@@ -248,7 +221,9 @@ static int take_views(const char *text, request *wanted) {
   }
 }
 
-static int take_colour(const char *text, request *wanted) {
+static int read_colour(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  (void)command;
   static const char difference[] = "difference:";
   if (strcmp(text, "displacement") == 0) {
     wanted->reference = NULL;
@@ -258,42 +233,44 @@ static int take_colour(const char *text, request *wanted) {
     wanted->reference = text + strlen(difference);
     return SUPINE_EXIT_OK;
   }
-  return supine_options_usage(name, "--colour takes displacement or difference:POSTURE, not '%s'",
-                              text);
+  return SUPINE_OPTION_MISFIT;
 }
 
-static int take_theme(const char *text, request *wanted) {
-  wanted->dark = strcmp(text, "dark") == 0;
-  return wanted->dark || strcmp(text, "light") == 0
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(name, "--theme takes light or dark, not '%s'", text);
-}
+static const char *const themes[] = {"light", "dark", NULL};
 
-static int take_positive(const char *option, const char *text, double *value) {
-  return supine_options_parse_number(text, value) && *value > 0.0
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(name, "--%s takes millimetres above 0, not '%s'", option, text);
-}
-
-static bool ends_in_png(const char *path) {
-  const size_t length = strlen(path);
-  return length > 4 && strcmp(path + length - 4, ".png") == 0;
-}
+static const supine_option table[] = {
+    {"posture", 0, "LIST", "up to 8; --postures is the same", SUPINE_FILLS(request, postures),
+     .alias = "postures"},
+    {"volume", 0, "ML", "air above the resting volume, default 500; or left=ML,right=ML",
+     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {"scale", 0, "MM", "largest displacement in each posture instead: for open surfaces",
+     SUPINE_FILLS(request, scale), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
+     .rivals = "breath"},
+    {"output", 'o', "FILE", ".png", SUPINE_FILLS(request, output), .required = true,
+     .file = SUPINE_FILE_OUT, .endings = ".png"},
+    {"size", 0, "WxH", "pixels; default: as the postures and views want", .read = read_size,
+     .wants = "WIDTHxHEIGHT, up to 16384 each"},
+    {"view", 0, "LIST",
+     "anterior (default), posterior, left, right, lateral (from the left), head, feet, oblique; "
+     "several come below each other",
+     .read = read_views},
+    {"colour", 0, "WHAT", "displacement (default: from rest), or difference:POSTURE",
+     .read = read_colour, .wants = "displacement or difference:POSTURE", .alias = "color"},
+    {"largest", 0, "MM",
+     "end of the colour bar; default: what 95 % of the surface does not exceed, rounded up; a "
+     "pointed end says that some values lie beyond",
+     SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0"},
+    {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
+     .standard = "light"},
+    {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title)},
+    {.help = SUPINE_POSTURE_LIST_HELP},
+    {.name = NULL}};
 
 /* The options make sense together; then the postures are read. */
-static int check(const request *wanted, int operands, supine_posture_list *postures,
+static int check(const request *wanted, supine_posture_list *postures,
                  supine_posture_list *reference) {
-  if (operands != 1) {
-    return supine_options_usage(name, "name one basis file (made by 'supine precompute')");
-  }
-  if (wanted->output == NULL || !ends_in_png(wanted->output)) {
-    return supine_options_usage(name, "give -o FILE, with a name that ends in .png");
-  }
   if (wanted->postures == NULL) {
     return supine_options_usage(name, "which posture? Give --posture supine, for example");
-  }
-  if (wanted->volume != NULL && wanted->scale > 0.0) {
-    return supine_options_usage(name, "give --volume or --scale, not both");
   }
   int result = supine_options_posture_list_parse(name, wanted->postures, postures);
   if (result == SUPINE_EXIT_OK && wanted->reference != NULL) {
@@ -310,82 +287,46 @@ static int check(const request *wanted, int operands, supine_posture_list *postu
              : supine_options_usage(name, "at most %d postures in one picture", SUPINE_PANELS_MAX);
 }
 
-int supine_command_render(int argc, char **argv) {
-  enum { POSTURE = 256, VOLUME, SCALE, SIZE, VIEW, COLOUR, LARGEST, THEME, TITLE };
-  static const struct option options[] = {{"posture", required_argument, NULL, POSTURE},
-                                          {"postures", required_argument, NULL, POSTURE},
-                                          {"volume", required_argument, NULL, VOLUME},
-                                          {"scale", required_argument, NULL, SCALE},
-                                          {"output", required_argument, NULL, 'o'},
-                                          {"size", required_argument, NULL, SIZE},
-                                          {"view", required_argument, NULL, VIEW},
-                                          {"colour", required_argument, NULL, COLOUR},
-                                          {"color", required_argument, NULL, COLOUR},
-                                          {"largest", required_argument, NULL, LARGEST},
-                                          {"theme", required_argument, NULL, THEME},
-                                          {"title", required_argument, NULL, TITLE},
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-  request wanted = {.view = {SUPINE_VIEW_ANTERIOR}, .view_count = 1};
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":o:h", options, NULL)) != -1) {
-    int result = SUPINE_EXIT_OK;
-    switch (option) {
-    case POSTURE:
-      wanted.postures = optarg;
-      break;
-    case VOLUME:
-      wanted.volume = optarg;
-      break;
-    case SCALE:
-      result = take_positive("scale", optarg, &wanted.scale);
-      break;
-    case 'o':
-      wanted.output = optarg;
-      break;
-    case SIZE:
-      result = take_size(optarg, &wanted);
-      break;
-    case VIEW:
-      result = take_views(optarg, &wanted);
-      break;
-    case COLOUR:
-      result = take_colour(optarg, &wanted);
-      break;
-    case LARGEST:
-      result = take_positive("largest", optarg, &wanted.largest);
-      break;
-    case THEME:
-      result = take_theme(optarg, &wanted);
-      break;
-    case TITLE:
-      wanted.title = optarg;
-      break;
-    case 'h':
-      (void)fputs(help, stdout);
-      (void)fputs(supine_options_posture_list_help, stdout);
-      (void)fputs(examples, stdout);
-      return supine_options_finish(name);
-    default:
-      return supine_options_bad_option(name, options, option, argv);
-    }
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
-  }
+static void begin(void *chosen) {
+  request *wanted = chosen;
+  wanted->view[0] = SUPINE_VIEW_ANTERIOR;
+  wanted->view_count = 1;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
   supine_posture_list postures = {.count = 0};
   supine_posture_list reference = {.count = 0};
-  int result = check(&wanted, argc - optind, &postures, &reference);
+  supine_basis *basis = NULL;
+  supine_error error;
+  int result = check(wanted, &postures, &reference);
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  supine_basis *basis = NULL;
-  supine_error error;
-  if (supine_basis_open(argv[optind], &basis, &error) != SUPINE_OK) {
+  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
-  result = render(basis, &wanted, &postures, reference.count == 1 ? &reference.item[0] : NULL);
+  result = render(basis, wanted, &postures, reference.count == 1 ? &reference.item[0] : NULL);
   supine_basis_close(basis);
   return result;
 }
+
+const supine_command supine_command_render = {
+    name,
+    "draw the lungs: postures side by side, as PNG",
+    .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]",
+    .about =
+        "Draws the lungs, off screen, in each posture side by side: coloured by displacement, "
+        "with lines at the ticks of the colour bar and a ball that shows the body's axes (left, "
+        "right, anterior, posterior, head, feet) and where gravity points (the arrow; a cross "
+        "points away from you).",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine render lungs.safetensors --posture supine,prone,left,right -o "
+             "postures.png\n"
+             "  supine render lungs.safetensors --posture prone --colour difference:supine \\\n"
+             "      --view anterior,lateral,posterior --theme dark -o prone.png",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

@@ -128,23 +128,3 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
   }
   return best;
 }
-
-int supine_options_bad_option(const char *command, const struct option *options, int result,
-                              char **argv) {
-  enum { NAMES_MAX = 64 };
-  const char *given = argv[optind - 1];
-  if (result == ':') {
-    return supine_options_usage(command, "option '%s' needs a value", given);
-  }
-  const char *names[NAMES_MAX];
-  size_t count = 0;
-  for (; options[count].name != NULL && count < NAMES_MAX; ++count) {
-    names[count] = options[count].name;
-  }
-  const char *nearest =
-      strncmp(given, "--", 2) == 0 ? supine_options_suggest(given + 2, names, count) : NULL;
-  if (nearest != NULL) {
-    return supine_options_usage(command, "no option '%s'; did you mean '--%s'?", given, nearest);
-  }
-  return supine_options_usage(command, "no option '%s'", given);
-}

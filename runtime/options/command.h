@@ -3,12 +3,13 @@
 #ifndef SUPINE_COMMAND_H
 #define SUPINE_COMMAND_H
 
-#include <getopt.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
 
 #include <supine/status.h>
+
+#include "runtime/options/option.h"
 
 /* Exit codes of the program. */
 enum {
@@ -20,20 +21,10 @@ enum {
   SUPINE_EXIT_NUMERICAL = 5
 };
 
-/* A command: its own name is argv[0]; returns an exit code. */
-typedef int supine_command_function(int argc, char **argv);
-
-supine_command_function supine_command_phantom;
-supine_command_function supine_command_precompute;
-supine_command_function supine_command_info;
-supine_command_function supine_command_deform;
-supine_command_function supine_command_compare;
-supine_command_function supine_command_render;
-supine_command_function supine_command_breathe;
-supine_command_function supine_command_export;
-supine_command_function supine_command_bench;
-supine_command_function supine_command_solve;
-supine_command_function supine_command_pv;
+/* The commands, in the order of the program's help. */
+extern const supine_command supine_command_phantom, supine_command_precompute, supine_command_info,
+    supine_command_deform, supine_command_compare, supine_command_render, supine_command_breathe,
+    supine_command_export, supine_command_bench, supine_command_solve, supine_command_pv;
 
 /* The exit code that a status ends the program with. */
 int supine_options_exit_code(supine_status status);
@@ -63,12 +54,6 @@ bool supine_options_parse_numbers(const char *text, size_t count, double *values
 
 /* The candidate that is fewest edits from `text`, or NULL where all are far. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
-
-/* The value that follows option `name`, or a usage error that names what is missing is printed by
- * getopt_long itself: commands pass ":" first in their short options and call this on '?' and ':'.
- */
-int supine_options_bad_option(const char *command, const struct option *options, int result,
-                              char **argv);
 
 /* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches
  * supine_progress_function; false after SIGINT or SIGTERM. */

@@ -7,19 +7,6 @@
 
 #include "runtime/options/orientation.h"
 
-const char supine_options_orientation_help[] =
-    "Where gravity points (one of the first three):\n"
-    "  --posture NAME       supine, prone, left, right (lying on that side), upright, inverted, "
-    "or\n"
-    "                       a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR\n"
-    "  --gravity X,Y,Z      a direction in body axes: x to the left, y to the back, z to the "
-    "head;\n"
-    "                       supine is 0,1,0\n"
-    "  --quaternion W,X,Y,Z rotation from body axes to a world whose z points up; 1,0,0,0 is "
-    "upright\n"
-    "  --tilt DEGREES       turns gravity in the sagittal plane from the back towards the head:\n"
-    "                       from supine, 15 is Trendelenburg, head down\n";
-
 int supine_options_orientation_posture(const char *command, const char *name, double gravity[3]) {
   enum { NAMES_MAX = 32 };
   if (supine_posture_gravity(name, gravity) == SUPINE_OK) {
@@ -40,11 +27,14 @@ int supine_options_orientation_posture(const char *command, const char *name, do
                               name);
 }
 
-static int take_gravity(supine_orientation *orientation, const char *command, const char *value) {
-  double *g = orientation->gravity;
+static int read_posture(const char *command, const char *value, void *field) {
+  return supine_options_orientation_posture(command, value, field);
+}
+
+static int read_gravity(const char *command, const char *value, void *field) {
+  double *g = field;
   if (!supine_options_parse_numbers(value, 3, g)) {
-    return supine_options_usage(command, "--gravity takes three finite numbers, X,Y,Z, not '%s'",
-                                value);
+    return SUPINE_OPTION_MISFIT;
   }
   const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
   if (largest == 0.0) {
@@ -64,32 +54,34 @@ static int take_gravity(supine_orientation *orientation, const char *command, co
   return SUPINE_EXIT_OK;
 }
 
-int supine_options_orientation_take(supine_orientation *orientation, const char *command,
-                                    int option, const char *value) {
-  if (option == OPTION_TILT) {
-    if (!supine_options_parse_number(value, &orientation->tilt)) {
-      return supine_options_usage(command, "--tilt takes degrees, not '%s'", value);
-    }
-    return SUPINE_EXIT_OK;
-  }
-  if (orientation->given) {
-    return supine_options_usage(command, "give one of --posture, --gravity and --quaternion");
-  }
-  orientation->given = true;
-  if (option == OPTION_POSTURE) {
-    return supine_options_orientation_posture(command, value, orientation->gravity);
-  }
-  if (option == OPTION_GRAVITY) {
-    return take_gravity(orientation, command, value);
-  }
+static int read_quaternion(const char *command, const char *value, void *field) {
   double q[4];
-  if (!supine_options_parse_numbers(value, 4, q) ||
-      supine_posture_quaternion(q, orientation->gravity) != SUPINE_OK) {
-    return supine_options_usage(
-        command, "--quaternion takes four finite numbers, W,X,Y,Z, not all 0; not '%s'", value);
-  }
-  return SUPINE_EXIT_OK;
+  (void)command;
+  return supine_options_fits(supine_options_parse_numbers(value, 4, q) &&
+                             supine_posture_quaternion(q, field) == SUPINE_OK);
 }
+
+#define GRAVITY                                                                                    \
+  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+      .rivals = "gravity"
+
+const supine_option supine_options_orientation[] = {
+    {.help = "Where gravity points (one of the first three):"},
+    {"posture", 0, "NAME",
+     "supine, prone, left, right (lying on that side), upright, inverted, or a DICOM patient "
+     "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR",
+     GRAVITY, .read = read_posture},
+    {"gravity", 0, "X,Y,Z",
+     "a direction in body axes: x to the left, y to the back, z to the head; supine is 0,1,0",
+     GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
+    {"quaternion", 0, "W,X,Y,Z",
+     "rotation from body axes to a world whose z points up; 1,0,0,0 is upright", GRAVITY,
+     .read = read_quaternion, .wants = "four finite numbers, W,X,Y,Z, not all 0"},
+    {"tilt", 0, "DEGREES",
+     "turns gravity in the sagittal plane from the back towards the head: from supine, 15 is "
+     "Trendelenburg, head down",
+     SUPINE_FILLS(supine_orientation, tilt), .wants = "degrees"},
+    {.name = NULL}};
 
 int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
                                       double gravity[3]) {

@@ -8,12 +8,6 @@
 #include "runtime/options/orientation.h"
 #include "runtime/options/posture_list.h"
 
-const char supine_options_posture_list_help[] =
-    "  A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient\n"
-    "  position), a name tilted by degrees towards the head (supine+15: Trendelenburg), or "
-    "gravity\n"
-    "  in body axes with colons, X:Y:Z (0.6:0:-0.8).\n";
-
 /* "0.6:0:-0.8" */
 static int parse_triple(const char *command, const char *name, double gravity[3]) {
   char text[SUPINE_POSTURE_NAME_MAX];

@@ -19,7 +19,10 @@ typedef struct supine_posture_list {
 } supine_posture_list;
 
 /* What a list may hold, for a command's help. */
-extern const char supine_options_posture_list_help[];
+#define SUPINE_POSTURE_LIST_HELP                                                                   \
+  "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
+  "position), a name tilted by degrees towards the head (supine+15: Trendelenburg), or gravity "   \
+  "in body axes with colons, X:Y:Z (0.6:0:-0.8)."
 
 /* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
 int supine_options_posture_list_parse(const char *command, const char *text,
