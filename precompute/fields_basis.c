@@ -24,7 +24,8 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
   }
   status = supine_fields_fit(fields, options, directions, &field, report, error);
   if (status == SUPINE_OK && lungs->topology.closed) {
-    status = supine_projection_compression_volume_forms(&field, lungs, directions, &forms, error);
+    status =
+        supine_projection_compression_volume_forms(&field, lungs, NULL, directions, &forms, error);
   }
   if (status == SUPINE_OK) {
     const supine_basis_content content = {.lungs = lungs,

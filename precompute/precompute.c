@@ -95,11 +95,10 @@ static supine_status project(pipeline *p, supine_error *error) {
   p->linear = options->route == SUPINE_ROUTE_LINEAR ||
               (options->route == SUPINE_ROUTE_AUTO && model->force.soften == 0.0);
   if (p->linear) {
-    return supine_projection_linear(p->lungs, &model->force, model->stiffness, options->band,
-                                    &p->projection, error);
+    return supine_projection_linear(p->lungs, model, options->band, &p->projection, error);
   }
-  return supine_projection_sampled(p->lungs, &model->force, model->stiffness, options->band, 0.0,
-                                   stage_progress, &part, &p->projection, error);
+  return supine_projection_sampled(p->lungs, model, options->band, 0.0, stage_progress, &part,
+                                   &p->projection, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
@@ -120,16 +119,17 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
     supine_status status =
         p->column_forms.linear != NULL
             ? SUPINE_OK
-            : supine_physics_volume_forms_create(p->lungs, p->directions, p->projection.columns,
-                                                 p->projection.rank, &p->column_forms, error);
+            : supine_physics_volume_forms_create(p->lungs, p->options->model.share, p->directions,
+                                                 p->projection.columns, p->projection.rank,
+                                                 &p->column_forms, error);
     if (status == SUPINE_OK) {
       status = supine_physics_volume_forms_mix(&p->column_forms, field->mix, field->mode_count,
                                                &p->forms);
     }
     return status;
   }
-  return supine_projection_compression_volume_forms(field, p->lungs, p->directions, &p->forms,
-                                                    error);
+  return supine_projection_compression_volume_forms(field, p->lungs, p->options->model.share,
+                                                    p->directions, &p->forms, error);
 }
 
 static size_t held_out_default(const pipeline *p) {
@@ -141,7 +141,7 @@ static size_t held_out_default(const pipeline *p) {
 static supine_status hold_out(pipeline *p, supine_error *error) {
   const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
   if (p->linear) {
-    return supine_accuracy_held_out_linear(p->lungs, &p->options->model.force, &p->projection,
+    return supine_accuracy_held_out_linear(p->lungs, &p->options->model, &p->projection,
                                            p->lungs->topology.closed ? &p->column_forms : NULL,
                                            count, &p->held_out, error);
   }

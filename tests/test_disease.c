@@ -21,6 +21,24 @@
 static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
 static const double supine[3] = {0.0, 1.0, 0.0};
 
+static supine_model model; /* of the test that runs */
+
+static int healthy(void **state) {
+  (void)state;
+  model = supine_physics_model_default();
+  return 0;
+}
+
+/* Factors of 1 for lesions to be multiplied into: the model's from here on. */
+static double *no_lesions(const supine_lungs *lungs) {
+  double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    factors[i] = 1.0;
+  }
+  model.lesions = factors;
+  return factors;
+}
+
 static supine_lungs lumps(void) {
   supine_mesh meshes[2] = {helper_lump(9, 80.0, 5), helper_lump(9, -75.0, 6)};
   supine_lungs lungs = {0};
@@ -31,7 +49,6 @@ static supine_lungs lumps(void) {
 }
 
 static supine_solution solve(const supine_lungs *lungs, const double g[3]) {
-  const supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   supine_error error = {0};
   if (supine_physics_solve(lungs, &model, g, &solution, &error) != SUPINE_OK) {
@@ -65,10 +82,11 @@ static void widen(double range[2], double value) {
 }
 
 /* Both breathe `volume` mL, or at one breath scale where it is 0. */
-static change change_by(supine_lungs *lungs, const supine_lesion *lesion, double volume) {
+static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
+  double *factors = no_lesions(lungs);
   size_t reached = 0;
-  assert_int_equal(supine_tissue_add_lesion(lungs, lesion, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(lungs, lesion, factors, &reached, NULL), SUPINE_OK);
   assert_true(reached > 10);
   supine_solution ill = solve(lungs, supine);
   double scale[2] = {1.0, 1.0};
@@ -88,15 +106,15 @@ static change change_by(supine_lungs *lungs, const supine_lesion *lesion, double
   }
   supine_physics_solution_free(&healthy);
   supine_physics_solution_free(&ill);
-  free(lungs->lesions);
-  lungs->lesions = NULL;
+  free(factors);
+  model.lesions = NULL;
   return found;
 }
 
-static void check_lesions(supine_lungs *lungs) {
+static void check_lesions(const supine_lungs *lungs) {
   const double *side = side_of(lungs);
   for (int reach = 0; reach < 2; ++reach) {
-    lungs->reach = reach == 0 ? 0.0 : 10.0;
+    model.reach = reach == 0 ? 0.0 : 10.0;
     static const double factors[] = {2.0, 10.0};
     for (size_t f = 0; f < 2; ++f) {
       const supine_lesion lesion = {{side[0] - 8.0, side[1], side[2]}, 25.0, factors[f]};
@@ -104,7 +122,7 @@ static void check_lesions(supine_lungs *lungs) {
       const change breathed = change_by(lungs, &lesion, 500.0);
       printf("reach %2g mm, factor %2g: inside %.3f to %.3f; 50 mm away %.6f to %.6f at one scale, "
              "%.6f to %.6f at 500 mL\n",
-             lungs->reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
+             model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
              scaled.far[1], breathed.far[0], breathed.far[1]);
       assert_true(scaled.inside[1] < 0.9);
       assert_true(breathed.inside[1] < 0.9);
@@ -121,7 +139,7 @@ static void check_lesions(supine_lungs *lungs) {
     const supine_lesion soft = {{side[0] - 8.0, side[1], side[2]}, 25.0, 0.25};
     assert_true(change_by(lungs, &soft, 500.0).inside[0] > 1.0);
   }
-  lungs->reach = 0.0;
+  model.reach = 0.0;
 }
 
 static void test_lesion_real_lungs_lowers_itself_and_leaves_the_rest(void **state) {
@@ -142,7 +160,8 @@ static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 90.0, 50.0};
   size_t reached = 0;
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  double *factors = no_lesions(&lungs);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
   assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of them */
   supine_solution ill = solve(&lungs, supine);
   for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
@@ -150,6 +169,7 @@ static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
   }
   supine_physics_solution_free(&healthy);
   supine_physics_solution_free(&ill);
+  free(factors);
   supine_lungs_free(&lungs);
 }
 
@@ -159,12 +179,14 @@ static void test_lesion_factor_one_changes_no_bit(void **state) {
   supine_solution healthy = solve(&lungs, supine);
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 40.0, 1.0};
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
+  double *factors = no_lesions(&lungs);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
   assert_memory_equal(same.cubic, healthy.cubic, sizeof same.cubic);
   supine_physics_solution_free(&healthy);
   supine_physics_solution_free(&same);
+  free(factors);
   supine_lungs_free(&lungs);
 }
 
@@ -173,12 +195,14 @@ static void test_lesion_profile_is_as_documented(void **state) {
   supine_lungs lungs = lumps();
   const double *centre = side_of(&lungs);
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, NULL, NULL), SUPINE_OK); /* multiply */
+  double *factors = no_lesions(&lungs);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL),
+                   SUPINE_OK); /* multiply */
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
-    const double value = lungs.lesions[i];
+    const double value = factors[i];
     if (r <= 0.5) {
       assert_true(fabs(value - 49.0) <= 64.0 * DBL_EPSILON * 49.0);
       ++seen[0];
@@ -192,6 +216,7 @@ static void test_lesion_profile_is_as_documented(void **state) {
     }
   }
   assert_true(seen[0] > 3 && seen[1] > 3 && seen[2] > 3);
+  free(factors);
   supine_lungs_free(&lungs);
 }
 
@@ -201,12 +226,14 @@ static void test_lesion_outside_reaches_nothing(void **state) {
   supine_solution healthy = solve(&lungs, supine);
   const supine_lesion lesion = {{900.0, 0.0, 0.0}, 40.0, 9.0};
   size_t reached = 1;
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, &reached, NULL), SUPINE_OK);
+  double *factors = no_lesions(&lungs);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
   assert_int_equal(reached, 0);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
   supine_physics_solution_free(&healthy);
   supine_physics_solution_free(&same);
+  free(factors);
   supine_lungs_free(&lungs);
 }
 
@@ -219,11 +246,11 @@ static void test_lesion_bad_numbers_refused(void **state) {
                                       {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
-    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], NULL, &error),
+    double *factors = NULL; /* refused before they are touched */
+    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "lesion at"));
   }
-  assert_null(lungs.lesions);
   supine_lungs_free(&lungs);
 }
 
@@ -249,9 +276,10 @@ static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void 
     double gains[2][2];
     double cubic[2];
     for (int ill = 0; ill < 2; ++ill) {
-      assert_int_equal(supine_tissue_collapse(&lungs, 0, ill == 1 ? share : 1.0, NULL), SUPINE_OK);
+      assert_int_equal(supine_tissue_collapse(&lungs, 0, ill == 1 ? share : 1.0, model.share, NULL),
+                       SUPINE_OK);
       supine_solution solution = solve(&lungs, directions[d]);
-      supine_tissue_rest(&lungs, rest);
+      supine_tissue_rest(&lungs, model.share, rest);
       const supine_mesh shape = {n, rest, 0, NULL};
       supine_physics_solution_apply(&solution, &shape, scale, moved);
       for (size_t lung = 0; lung < 2; ++lung) {
@@ -280,9 +308,9 @@ static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void 
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
     skip();
   }
-  assert_int_equal(supine_tissue_collapse(&lungs, 1, 0.25, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_collapse(&lungs, 1, 0.25, model.share, NULL), SUPINE_OK);
   double *rest = malloc(3 * lungs.mesh.vertex_count * sizeof *rest);
-  supine_tissue_rest(&lungs, rest);
+  supine_tissue_rest(&lungs, model.share, rest);
   double outer[2] = {0.0, 0.0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {
@@ -304,24 +332,28 @@ static void test_collapse_bad_arguments_refused(void **state) {
   supine_lungs lungs = lumps();
   static const double bad[] = {0.0, -0.5, 1.0001, NAN, INFINITY};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_tissue_collapse(&lungs, 0, bad[i], NULL), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_tissue_collapse(&lungs, 0, bad[i], model.share, NULL),
+                     SUPINE_ERROR_ARGUMENT);
   }
-  assert_int_equal(supine_tissue_collapse(&lungs, 2, 0.5, NULL), SUPINE_ERROR_ARGUMENT);
-  assert_true(lungs.share[0] == 1.0 && lungs.share[1] == 1.0);
+  assert_int_equal(supine_tissue_collapse(&lungs, 2, 0.5, model.share, NULL),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_true(model.share[0] == 1.0 && model.share[1] == 1.0);
   supine_lungs_free(&lungs);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest),
-      cmocka_unit_test(test_lesion_large_leaves_the_other_lung_to_rounding),
-      cmocka_unit_test(test_lesion_factor_one_changes_no_bit),
-      cmocka_unit_test(test_lesion_profile_is_as_documented),
-      cmocka_unit_test(test_lesion_outside_reaches_nothing),
-      cmocka_unit_test(test_lesion_bad_numbers_refused),
-      cmocka_unit_test(test_collapse_rest_and_breath_are_its_share_in_every_direction),
-      cmocka_unit_test(test_collapse_draws_towards_the_midline_within_the_healthy_box),
-      cmocka_unit_test(test_collapse_bad_arguments_refused),
+      cmocka_unit_test_setup(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest, healthy),
+      cmocka_unit_test_setup(test_lesion_large_leaves_the_other_lung_to_rounding, healthy),
+      cmocka_unit_test_setup(test_lesion_factor_one_changes_no_bit, healthy),
+      cmocka_unit_test_setup(test_lesion_profile_is_as_documented, healthy),
+      cmocka_unit_test_setup(test_lesion_outside_reaches_nothing, healthy),
+      cmocka_unit_test_setup(test_lesion_bad_numbers_refused, healthy),
+      cmocka_unit_test_setup(test_collapse_rest_and_breath_are_its_share_in_every_direction,
+                             healthy),
+      cmocka_unit_test_setup(test_collapse_draws_towards_the_midline_within_the_healthy_box,
+                             healthy),
+      cmocka_unit_test_setup(test_collapse_bad_arguments_refused, healthy),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -312,8 +312,9 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   }
   supine_volume_forms forms = {0};
   supine_volume_forms mixed = {0};
-  assert_int_equal(supine_physics_volume_forms_create(&lungs, d, columns, COLUMNS, &forms, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_physics_volume_forms_create(&lungs, NULL, d, columns, COLUMNS, &forms, NULL),
+      SUPINE_OK);
   assert_int_equal(supine_physics_volume_forms_mix(&forms, mix, MIXED, &mixed), SUPINE_OK);
   static const double weights[COLUMNS] = {0.7, -0.2, 0.9, 0.31, 0.11};
   double cubic[3];
@@ -358,7 +359,7 @@ static void test_volume_forms_open_surface_refused(void **state) {
   supine_volume_forms forms = {0};
   supine_error error;
   assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
-  assert_int_equal(supine_physics_volume_forms_create(&lungs, lungs.mesh.vertices,
+  assert_int_equal(supine_physics_volume_forms_create(&lungs, NULL, lungs.mesh.vertices,
                                                       lungs.mesh.vertices, 1, &forms, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
   assert_non_null(strstr(error.message, "3 boundary"));

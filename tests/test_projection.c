@@ -60,20 +60,21 @@ static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
   const size_t terms = supine_sh_count(BAND);
   supine_projection linear;
   supine_projection sampled;
-  const supine_force_law law = {.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
+  supine_model model = supine_physics_model_default();
+  model.force = (supine_force_law){.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
   double *stiffness = malloc(n * sizeof *stiffness);
   for (size_t i = 0; i < n; ++i) {
     stiffness[i] = exp(0.01 * lungs->mesh.vertices[3 * i + 2]);
   }
+  model.stiffness = stiffness;
   size_t latitudes;
   size_t longitudes;
   assert_int_equal(supine_sh_grid_size(BAND, 0.0, &latitudes, &longitudes), SUPINE_OK);
-  assert_int_equal(supine_projection_linear_rule(lungs, &law, stiffness, BAND, latitudes,
-                                                 longitudes, &linear, NULL),
-                   SUPINE_OK);
   assert_int_equal(
-      supine_projection_sampled(lungs, &law, stiffness, BAND, 0.0, NULL, NULL, &sampled, NULL),
+      supine_projection_linear_rule(lungs, &model, BAND, latitudes, longitudes, &linear, NULL),
       SUPINE_OK);
+  assert_int_equal(supine_projection_sampled(lungs, &model, BAND, 0.0, NULL, NULL, &sampled, NULL),
+                   SUPINE_OK);
   assert_int_equal(linear.rank, 5);
   assert_int_equal(sampled.rank, terms);
   double *a = coefficients_of(&linear);
@@ -154,16 +155,15 @@ static void test_modes_equal_dense_decomposition(void **state) {
   for (size_t i = 0; i < n; ++i) {
     weight[i] = 1.0 + fabs(lungs->mesh.vertices[3 * i]);
   }
-  supine_force_law law = supine_physics_force_law_default();
+  supine_model model = supine_physics_model_default();
   supine_projection projection;
-  assert_int_equal(supine_projection_linear(lungs, &law, NULL, 5, &projection, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_linear(lungs, &model, 5, &projection, NULL), SUPINE_OK);
   check_modes(&projection, weight, 3);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
-  law.soften = 1.0;
-  assert_int_equal(
-      supine_projection_sampled(lungs, &law, NULL, 5, 0.0, NULL, NULL, &projection, NULL),
-      SUPINE_OK);
+  model.force.soften = 1.0;
+  assert_int_equal(supine_projection_sampled(lungs, &model, 5, 0.0, NULL, NULL, &projection, NULL),
+                   SUPINE_OK);
   check_modes(&projection, weight, 7);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);

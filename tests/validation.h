@@ -265,7 +265,7 @@ typedef struct ventilation {
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
-  const supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   double low;
   double high;
@@ -432,12 +432,12 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
 }
 
 /* Displacements of a breath [N, 3], mm. */
-static inline supine_status breathe_at(supine_lungs *lungs, double reach, const double g[3],
+static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
-  const supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model_default();
   supine_solution solution = {0};
   double scale = 0.0;
-  lungs->reach = reach;
+  model.reach = reach;
   supine_status status = supine_physics_solve(lungs, &model, g, &solution, NULL);
   if (status == SUPINE_OK) {
     status = supine_volume_scale(solution.cubic, volume, &scale, NULL);
@@ -450,15 +450,16 @@ static inline supine_status breathe_at(supine_lungs *lungs, double reach, const 
 }
 
 /* Root mean square distance, by area, from a vertex over which a unit force on it spreads, mm. */
-static inline supine_status spread_of(supine_lungs *lungs, double reach, size_t vertex,
+static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   double *area = calloc(n + 1, sizeof *area);
   double *column = calloc(n, sizeof *column);
-  lungs->reach = reach;
-  supine_status status = supine_physics_lungs_network(lungs, &network);
+  supine_model model = supine_physics_model_default();
+  model.reach = reach;
+  supine_status status = supine_physics_model_network(lungs, &model, &network);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_create(network, 1, 0, &equilibrium);
   }

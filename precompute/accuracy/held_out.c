@@ -41,8 +41,7 @@ static supine_status begin(size_t count, bool closed, supine_held_out *made) {
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs,
-                                              const supine_force_law *law,
+supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs, const supine_model *model,
                                               const supine_projection *projection,
                                               const supine_volume_forms *forms, size_t count,
                                               supine_held_out *held_out, supine_error *error) {
@@ -57,8 +56,8 @@ supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs,
   status = supine_physics_height_range(&lungs->mesh, count, made.directions, range, range + count);
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
     double *row = made.functions + d * projection->rank;
-    supine_physics_force_functions(lungs, law, made.directions + 3 * d, range[d], range[count + d],
-                                   row);
+    supine_physics_force_functions(lungs, &model->force, made.directions + 3 * d, range[d],
+                                   range[count + d], row);
     if (forms != NULL) {
       supine_physics_volume_forms_contract(forms, row, made.cubic + 3 * d);
     }
@@ -90,8 +89,7 @@ supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const 
                               count);
     goto cleanup;
   }
-  status = supine_projection_sampler_create(lungs, &model->force, model->stiffness, 0.0, &sampler,
-                                            error);
+  status = supine_projection_sampler_create(lungs, model, 0.0, &sampler, error);
   if (status == SUPINE_OK) {
     status =
         supine_projection_sampler_solve(sampler, count, made.directions, made.fields, NULL, error);
@@ -99,8 +97,8 @@ supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const 
   for (size_t d = 0; d < count && closed && status == SUPINE_OK; ++d) {
     supine_volume_forms forms = {0};
     const double one = 1.0;
-    status = supine_physics_volume_forms_create(lungs, directions, made.fields + d * n, 1, &forms,
-                                                error);
+    status = supine_physics_volume_forms_create(lungs, model->share, directions,
+                                                made.fields + d * n, 1, &forms, error);
     if (status == SUPINE_OK) {
       supine_physics_volume_forms_contract(&forms, &one, made.cubic + 3 * d);
     }

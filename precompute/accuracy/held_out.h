@@ -14,8 +14,7 @@ typedef struct supine_held_out {
 
 /* The linear route: by superposition of the solved columns, which is exact. `forms` are those of
  * the projection's columns; NULL: open surface. */
-supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs,
-                                              const supine_force_law *law,
+supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs, const supine_model *model,
                                               const supine_projection *projection,
                                               const supine_volume_forms *forms, size_t count,
                                               supine_held_out *held_out, supine_error *error);

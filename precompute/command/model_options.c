@@ -175,7 +175,7 @@ const supine_option supine_command_model_options[] = {
      "forces spread over this length along the surface, whatever the mesh (about exp(-r/MM)); "
      "default: over a few links, as in the paper, so that a finer mesh spreads less and may look "
      "torn: then try 10",
-     FILLS(reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+     FILLS(model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {.name = NULL}};
 
 typedef struct load_work {
@@ -273,12 +273,25 @@ static supine_status set_directions(supine_model_options *options, const supine_
   return supine_physics_directions_load(options->direction, n, options->vectors, error);
 }
 
-static supine_status set_lesions(const supine_model_options *options, const char *command,
-                                 supine_lungs *lungs, supine_error *error) {
+static supine_status set_lesions(supine_model_options *options, const char *command,
+                                 const supine_lungs *lungs, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->lesion_count == 0) {
+    return SUPINE_OK;
+  }
+  options->factors = malloc(n * sizeof *options->factors);
+  if (options->factors == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    options->factors[i] = 1.0;
+  }
+  options->model.lesions = options->factors;
   for (size_t l = 0; l < options->lesion_count; ++l) {
     const supine_lesion *lesion = &options->lesions[l];
     size_t reached = 0;
-    const supine_status status = supine_tissue_add_lesion(lungs, lesion, &reached, error);
+    const supine_status status =
+        supine_tissue_add_lesion(lungs, lesion, options->factors, &reached, error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -293,7 +306,7 @@ static supine_status set_lesions(const supine_model_options *options, const char
   return SUPINE_OK;
 }
 
-static supine_status set_shares(const supine_model_options *options, supine_lungs *lungs,
+static supine_status set_shares(supine_model_options *options, const supine_lungs *lungs,
                                 supine_error *error) {
   static const char *const names[] = {"left", "right"};
   const double shares[] = {options->left_share, options->right_share};
@@ -309,7 +322,8 @@ static supine_status set_shares(const supine_model_options *options, supine_lung
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
                               names[side], names[side]);
     }
-    const supine_status status = supine_tissue_collapse(lungs, lung, shares[side], error);
+    const supine_status status =
+        supine_tissue_collapse(lungs, lung, shares[side], options->model.share, error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -320,10 +334,13 @@ static supine_status set_shares(const supine_model_options *options, supine_lung
 void supine_command_model_options_free(supine_model_options *options) {
   free(options->stiffness);
   free(options->vectors);
+  free(options->factors);
   options->stiffness = NULL;
   options->vectors = NULL;
+  options->factors = NULL;
   options->model.direction.vectors = NULL;
   options->model.stiffness = NULL;
+  options->model.lesions = NULL;
 }
 
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
@@ -362,7 +379,6 @@ int supine_command_model_load(supine_model_options *options, const char *command
                        lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
                        lungs->topology.inconsistent_edges);
   }
-  lungs->reach = options->reach;
   if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||

@@ -26,9 +26,9 @@ typedef struct supine_model_options {
   size_t lesion_count;
   supine_lesion lesions[MODEL_LESIONS_MAX];
   double left_share, right_share; /* 0: not given */
-  double reach;                   /* mm; 0: the paper's */
   const char *direction;          /* a file of vectors, or NULL: the law */
   double *vectors;                /* what loading made of it; the model's */
+  double *factors;                /* of the lesions; the model's */
   double *stiffness;              /* what loading made of the expandability; the model's */
 } supine_model_options;
 

@@ -86,7 +86,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
         "the surface looks torn: %.3g %% of its triangles turn over at %g mL in the worst of "
         "six\npostures. %s\n",
         100.0 * report->turned_over, accuracy->volume,
-        lungs->reach == 0.0
+        options->model.reach == 0.0
             ? "The paper's forces spread over a few links, however short they are;\n"
               "--reach 10 spreads them over 10 mm and leaves next to none"
             : "A longer --reach spreads forces further");

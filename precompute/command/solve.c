@@ -50,7 +50,8 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   supine_output output = {0};
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (column == NULL || supine_physics_lungs_network(lungs, &network) != SUPINE_OK ||
+  if (column == NULL ||
+      supine_physics_model_network(lungs, &wanted->model.model, &network) != SUPINE_OK ||
       supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
@@ -114,7 +115,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_tissue_rest(lungs, rest.vertices);
+  supine_tissue_rest(lungs, wanted->model.model.share, rest.vertices);
   supine_physics_solution_apply(&solution, &rest, scale, deformed.vertices);
   const supine_mesh_save_options save = {.rest = rest.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);

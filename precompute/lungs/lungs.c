@@ -189,7 +189,7 @@ static supine_status group(supine_lungs *lungs, const component *parts, supine_e
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
   component *parts = NULL;
-  supine_lungs made = {.share = {1.0, 1.0}};
+  supine_lungs made = {0};
   supine_status status = SUPINE_OK;
   if (midline != NULL && !isfinite(*midline)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline must be finite");
@@ -255,7 +255,6 @@ cleanup:
 void supine_lungs_free(supine_lungs *lungs) {
   supine_mesh_free(&lungs->mesh);
   supine_mesh_topology_free(&lungs->topology);
-  free(lungs->lesions);
   *lungs = (supine_lungs){0};
 }
 

@@ -23,10 +23,6 @@ typedef struct supine_lungs {
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double midline; /**< x of the sagittal plane that X is measured from, mm */
-  /* As made: healthy, and the paper's transfer. See disease.h and supine_physics_lungs_network. */
-  double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
-  double *lesions; /**< [N] factors on the stiffness, or NULL: 1 everywhere */
-  double reach;    /**< spreading length, mm; 0: the paper's, a fixed number of links */
 } supine_lungs;
 
 /** Joins surfaces into a model.

@@ -56,10 +56,6 @@ supine_status supine_physics_network_create(const supine_mesh *mesh,
                                             const supine_topology *topology,
                                             supine_network **network);
 
-/** The network of lungs as they are, with their lesions and their reach: what solves are set up
- * with. The number of steps of a solve grows as R over the links' length.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_lungs_network(const supine_lungs *lungs, supine_network **network);
 void supine_physics_network_destroy(supine_network *network);
 size_t supine_physics_network_vertex_count(const supine_network *network);
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Links whose spreading has a length in mm: what supine_physics_lungs_network makes of the reach.
+/* Links whose spreading has a length in mm: what supine_physics_model_network makes of the reach.
  */
 #include <math.h>
 #include <stdlib.h>
 
+#include "precompute/physics/model.h"
 #include "precompute/physics/network.h"
 
 /* Slot of the link from internal vertex i to j. */
@@ -100,18 +101,19 @@ supine_status supine_physics_network_set_reach(supine_network *network, const su
   return SUPINE_OK;
 }
 
-supine_status supine_physics_lungs_network(const supine_lungs *lungs, supine_network **network) {
+supine_status supine_physics_model_network(const supine_lungs *lungs, const supine_model *model,
+                                           supine_network **network) {
   supine_network *made = NULL;
   *network = NULL;
   supine_status status = supine_physics_network_create(&lungs->mesh, &lungs->topology, &made);
-  if (status == SUPINE_OK && lungs->reach > 0.0) {
-    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology, lungs->reach);
+  if (status == SUPINE_OK && model->reach > 0.0) {
+    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology, model->reach);
   }
-  if (status == SUPINE_OK && lungs->lesions != NULL) {
+  if (status == SUPINE_OK && model->lesions != NULL) {
     made->lesions = malloc(made->vertex_count * sizeof *made->lesions);
     status = made->lesions == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
     for (size_t i = 0; i < made->vertex_count && status == SUPINE_OK; ++i) {
-      made->lesions[i] = lungs->lesions[i];
+      made->lesions[i] = model->lesions[i];
     }
   }
   if (status != SUPINE_OK) {

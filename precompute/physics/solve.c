@@ -8,8 +8,9 @@
 #include "precompute/tissue/disease.h"
 
 supine_model supine_physics_model_default(void) {
-  return (supine_model){supine_physics_force_law_default(), supine_physics_direction_law_default(),
-                        NULL};
+  return (supine_model){.force = supine_physics_force_law_default(),
+                        .direction = supine_physics_direction_law_default(),
+                        .share = {1.0, 1.0}};
 }
 
 void supine_physics_solution_free(supine_solution *solution) {
@@ -33,7 +34,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   made.directions = malloc(3 * n * sizeof *made.directions);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
-      supine_physics_lungs_network(lungs, &network) != SUPINE_OK ||
+      supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
       supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
       supine_physics_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
@@ -56,14 +57,14 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   }
   if (made.has_volume) {
     const double one = 1.0;
-    status =
-        supine_physics_volume_forms_create(lungs, made.directions, made.catch_, 1, &forms, error);
+    status = supine_physics_volume_forms_create(lungs, model->share, made.directions, made.catch_,
+                                                1, &forms, error);
     if (status != SUPINE_OK) {
       goto cleanup;
     }
     supine_physics_volume_forms_contract(&forms, &one, made.cubic);
   }
-  supine_tissue_rest_directions(lungs, made.directions);
+  supine_tissue_rest_directions(lungs, model->share, made.directions);
   *solution = made;
   made = (supine_solution){0};
 cleanup:

@@ -39,6 +39,7 @@ static double determinant(const double *a, const double *b, const double *c) {
 
 typedef struct forms_work {
   const supine_lungs *lungs;
+  const double *share; /* of each lung; NULL: 1 */
   const double *directions, *columns;
   size_t count, first; /* columns; first triangle of this lung */
   double centre[3];
@@ -131,7 +132,7 @@ static void forms_range_vector(void *context, size_t begin, size_t end, size_t t
 static void forms_collect(const forms_work *work, size_t threads, size_t lung,
                           supine_volume_forms *forms) {
   const size_t n = work->count;
-  const double unit = millilitres / 6.0 * work->lungs->share[lung];
+  const double unit = millilitres / 6.0 * (work->share == NULL ? 1.0 : work->share[lung]);
   double *linear = forms->linear + lung * n;
   double *quadratic = forms->quadratic + lung * n * n;
   double *cubic = forms->cubic + lung * n * n * n;
@@ -154,11 +155,12 @@ static void forms_collect(const forms_work *work, size_t threads, size_t lung,
   }
 }
 
-static supine_status create(const supine_lungs *lungs, const double *directions,
-                            const double *columns, size_t count, supine_volume_forms *forms,
-                            supine_error *error) {
+static supine_status create(const supine_lungs *lungs, const double *share,
+                            const double *directions, const double *columns, size_t count,
+                            supine_volume_forms *forms, supine_error *error) {
   const size_t threads = supine_thread_count();
-  forms_work work = {.lungs = lungs, .directions = directions, .columns = columns, .count = count};
+  forms_work work = {
+      .lungs = lungs, .share = share, .directions = directions, .columns = columns, .count = count};
   supine_volume_forms made = {0};
   supine_status status = SUPINE_OK;
   if (!lungs->topology.closed) {
@@ -199,18 +201,18 @@ cleanup:
   return status;
 }
 
-supine_status supine_physics_volume_forms_create(const supine_lungs *lungs,
+supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error) {
-  return create(lungs, directions, columns, count, forms, error);
+  return create(lungs, share, directions, columns, count, forms, error);
 }
 
 supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
                                                         const double *columns, size_t count,
                                                         supine_volume_forms *forms,
                                                         supine_error *error) {
-  return create(lungs, NULL, columns, count, forms, error);
+  return create(lungs, NULL, NULL, columns, count, forms, error);
 }
 
 /* out[a, j, b] = sum over i of in[a, i, b] mix[i, j]. */

@@ -33,7 +33,7 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms);
  * Cost: count^3 multiplications a triangle. Uses all cores.
  * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_volume_forms_create(const supine_lungs *lungs,
+supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);

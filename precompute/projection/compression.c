@@ -129,11 +129,9 @@ void supine_projection_compression_weights(const supine_compression *compression
   }
 }
 
-supine_status supine_projection_compression_volume_forms(const supine_compression *compression,
-                                                         const supine_lungs *lungs,
-                                                         const double *directions,
-                                                         supine_volume_forms *forms,
-                                                         supine_error *error) {
+supine_status supine_projection_compression_volume_forms(
+    const supine_compression *compression, const supine_lungs *lungs, const double *share,
+    const double *directions, supine_volume_forms *forms, supine_error *error) {
   const size_t count = compression->mode_count;
   const size_t values = compression->vertex_count * count;
   double *columns = malloc(values * sizeof *columns);
@@ -146,7 +144,8 @@ supine_status supine_projection_compression_volume_forms(const supine_compressio
   }
   const supine_status status =
       directions != NULL
-          ? supine_physics_volume_forms_create(lungs, directions, columns, count, forms, error)
+          ? supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms,
+                                               error)
           : supine_physics_volume_forms_create_vector(lungs, columns, count, forms, error);
   free(columns);
   return status;

@@ -24,10 +24,8 @@ void supine_projection_compression_weights(const supine_compression *compression
                                            double *weights);
 
 /* Volume forms of the coefficients as they are stored. directions [N, 3]; NULL: a vector field. */
-supine_status supine_projection_compression_volume_forms(const supine_compression *compression,
-                                                         const supine_lungs *lungs,
-                                                         const double *directions,
-                                                         supine_volume_forms *forms,
-                                                         supine_error *error);
+supine_status supine_projection_compression_volume_forms(
+    const supine_compression *compression, const supine_lungs *lungs, const double *share,
+    const double *directions, supine_volume_forms *forms, supine_error *error);
 
 #endif

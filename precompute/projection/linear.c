@@ -69,20 +69,20 @@ cleanup:
   return status;
 }
 
-supine_status supine_projection_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                       const double *stiffness, size_t band,
-                                       supine_projection *projection, supine_error *error) {
+supine_status supine_projection_linear(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_projection *projection,
+                                       supine_error *error) {
   size_t latitudes = LATITUDES_PER_BAND * (band + 1);
   latitudes = latitudes < LATITUDES_MIN ? LATITUDES_MIN : latitudes;
-  return supine_projection_linear_rule(lungs, law, stiffness, band, latitudes, 2 * latitudes,
-                                       projection, error);
+  return supine_projection_linear_rule(lungs, model, band, latitudes, 2 * latitudes, projection,
+                                       error);
 }
 
-supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
-                                            const double *stiffness, size_t band, size_t latitudes,
-                                            size_t longitudes, supine_projection *projection,
-                                            supine_error *error) {
+supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_model *model,
+                                            size_t band, size_t latitudes, size_t longitudes,
+                                            supine_projection *projection, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
+  const supine_force_law *law = &model->force;
   const size_t rank = supine_physics_force_column_count(law);
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
@@ -97,7 +97,7 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu is above %d", band,
                             SUPINE_SH_BAND_MAX);
   }
-  supine_status status = supine_physics_lungs_network(lungs, &network);
+  supine_status status = supine_physics_model_network(lungs, model, &network);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_create(network, rank, 0, &equilibrium);
   }
@@ -108,7 +108,7 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, error);
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

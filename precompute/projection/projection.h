@@ -9,8 +9,7 @@
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
-#include "precompute/physics/equilibrium.h"
-#include "precompute/physics/force.h"
+#include "precompute/physics/model.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -38,16 +37,15 @@ typedef bool supine_progress_function(void *context, double fraction);
  * @param stiffness  [N] or NULL
  * @retval SUPINE_ERROR_ARGUMENT  soften is not 0, a band above SUPINE_SH_BAND_MAX, bad stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_projection_linear(const supine_lungs *lungs, const supine_force_law *law,
-                                       const double *stiffness, size_t band,
-                                       supine_projection *projection, supine_error *error);
+supine_status supine_projection_linear(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_projection *projection,
+                                       supine_error *error);
 
 /** The same with a rule of latitudes x longitudes directions instead of the default, which is eight
  * times finer than the band. */
-supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_force_law *law,
-                                            const double *stiffness, size_t band, size_t latitudes,
-                                            size_t longitudes, supine_projection *projection,
-                                            supine_error *error);
+supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_model *model,
+                                            size_t band, size_t latitudes, size_t longitudes,
+                                            supine_projection *projection, supine_error *error);
 
 /** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
  * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
@@ -56,8 +54,8 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
  * @param progress   optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_force_law *law,
-                                        const double *stiffness, size_t band, double tolerance,
+supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_model *model,
+                                        size_t band, double tolerance,
                                         supine_progress_function *progress, void *context,
                                         supine_projection *projection, supine_error *error);
 

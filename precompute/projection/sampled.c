@@ -13,8 +13,7 @@
 
 struct supine_sampler {
   const supine_lungs *lungs;
-  const supine_force_law *law;
-  const double *stiffness;
+  const supine_model *model;
   double tolerance;
   size_t threads;
   supine_network *network;
@@ -45,8 +44,7 @@ void supine_projection_sampler_destroy(supine_sampler *sampler) {
   free(sampler);
 }
 
-supine_status supine_projection_sampler_create(const supine_lungs *lungs,
-                                               const supine_force_law *law, const double *stiffness,
+supine_status supine_projection_sampler_create(const supine_lungs *lungs, const supine_model *model,
                                                double tolerance, supine_sampler **sampler,
                                                supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -56,15 +54,14 @@ supine_status supine_projection_sampler_create(const supine_lungs *lungs,
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to sample the field");
   }
   made->lungs = lungs;
-  made->law = law;
-  made->stiffness = stiffness;
+  made->model = model;
   made->tolerance = tolerance;
   made->threads = supine_thread_count();
   made->equilibria = calloc(made->threads, sizeof(supine_equilibrium *));
   made->force = calloc(made->threads, sizeof(double *));
   made->softened = calloc(made->threads, sizeof(double *));
   bool whole = made->equilibria != NULL && made->force != NULL && made->softened != NULL &&
-               supine_physics_lungs_network(lungs, &made->network) == SUPINE_OK;
+               supine_physics_model_network(lungs, model, &made->network) == SUPINE_OK;
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < made->threads && whole; ++t) {
     made->force[t] = malloc(n * sizeof(double));
@@ -73,7 +70,8 @@ supine_status supine_projection_sampler_create(const supine_lungs *lungs,
         made->force[t] != NULL && made->softened[t] != NULL &&
         supine_physics_equilibrium_create(made->network, 1, 1, &made->equilibria[t]) == SUPINE_OK;
     if (whole) { /* stays so unless the law softens; also finds bad stiffness before the work */
-      status = supine_physics_equilibrium_set_stiffness(made->equilibria[t], stiffness, error);
+      status =
+          supine_physics_equilibrium_set_stiffness(made->equilibria[t], model->stiffness, error);
       if (status != SUPINE_OK) {
         break;
       }
@@ -109,17 +107,18 @@ static void sample_range(void *context, size_t begin, size_t end, size_t thread)
   supine_equilibrium *equilibrium = sampler->equilibria[thread];
   for (size_t d = begin; d < end && work->statuses[thread] == SUPINE_OK; ++d) {
     const double *g = work->directions + 3 * d;
-    if (sampler->law->soften != 0.0) {
-      supine_physics_force_stiffness(sampler->lungs, sampler->law, sampler->stiffness, g,
-                                     work->minimum[d], work->maximum[d], sampler->softened[thread]);
+    if (sampler->model->force.soften != 0.0) {
+      supine_physics_force_stiffness(sampler->lungs, &sampler->model->force,
+                                     sampler->model->stiffness, g, work->minimum[d],
+                                     work->maximum[d], sampler->softened[thread]);
       work->statuses[thread] = supine_physics_equilibrium_set_stiffness(
           equilibrium, sampler->softened[thread], &work->errors[thread]);
       if (work->statuses[thread] != SUPINE_OK) {
         return;
       }
     }
-    supine_physics_force(sampler->lungs, sampler->law, g, work->minimum[d], work->maximum[d],
-                         sampler->force[thread]);
+    supine_physics_force(sampler->lungs, &sampler->model->force, g, work->minimum[d],
+                         work->maximum[d], sampler->force[thread]);
     supine_solve_report report;
     work->statuses[thread] = supine_physics_equilibrium_solve(
         equilibrium, 1, sampler->force[thread], sampler->tolerance, d > begin, work->fields + d * n,
@@ -170,8 +169,8 @@ cleanup:
   return status;
 }
 
-supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_force_law *law,
-                                        const double *stiffness, size_t band, double tolerance,
+supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_model *model,
+                                        size_t band, double tolerance,
                                         supine_progress_function *progress, void *context,
                                         supine_projection *projection, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -183,8 +182,7 @@ supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_
   double *directions = NULL;
   double *ring = NULL;
   supine_solve_report worst = {0};
-  supine_status status =
-      supine_projection_sampler_create(lungs, law, stiffness, tolerance, &sampler, error);
+  supine_status status = supine_projection_sampler_create(lungs, model, tolerance, &sampler, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

@@ -9,8 +9,7 @@
 typedef struct supine_sampler supine_sampler;
 
 /* The arguments must outlive the sampler. tolerance: relative residual, 0: the solver's default. */
-supine_status supine_projection_sampler_create(const supine_lungs *lungs,
-                                               const supine_force_law *law, const double *stiffness,
+supine_status supine_projection_sampler_create(const supine_lungs *lungs, const supine_model *model,
                                                double tolerance, supine_sampler **sampler,
                                                supine_error *error);
 void supine_projection_sampler_destroy(supine_sampler *sampler);

@@ -19,8 +19,8 @@ static bool positive(double value) {
   return value > 0.0 && isfinite(value);
 }
 
-supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
-                                       size_t *reached, supine_error *error) {
+supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
+                                       double *factors, size_t *reached, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double *c = lesion->centre;
   if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) || !positive(lesion->radius) ||
@@ -30,22 +30,13 @@ supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion 
                             "and factor positive",
                             c[0], c[1], c[2], lesion->radius, lesion->factor);
   }
-  if (lungs->lesions == NULL) {
-    lungs->lesions = malloc(n * sizeof *lungs->lesions);
-    if (lungs->lesions == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-    }
-    for (size_t i = 0; i < n; ++i) {
-      lungs->lesions[i] = 1.0;
-    }
-  }
   size_t found = 0;
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
     const double w =
         lesion_weight(hypot(hypot(p[0] - c[0], p[1] - c[1]), p[2] - c[2]), lesion->radius);
     if (w > 0.0) {
-      lungs->lesions[i] *= pow(lesion->factor, w);
+      factors[i] *= pow(lesion->factor, w);
       ++found;
     }
   }
@@ -55,8 +46,8 @@ supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion 
   return SUPINE_OK;
 }
 
-supine_status supine_tissue_collapse(supine_lungs *lungs, size_t lung, double share,
-                                     supine_error *error) {
+supine_status supine_tissue_collapse(const supine_lungs *lungs, size_t lung, double share,
+                                     double shares[2], supine_error *error) {
   if (lung >= lungs->lung_count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
                             lungs->lung_count);
@@ -66,7 +57,7 @@ supine_status supine_tissue_collapse(supine_lungs *lungs, size_t lung, double sh
                             "a %s lung of share %g: it must be above 0 and at most 1",
                             supine_lungs_name(lungs, lung), share);
   }
-  lungs->share[lung] = share;
+  shares[lung] = share;
   return SUPINE_OK;
 }
 
@@ -99,13 +90,13 @@ static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) 
   }
 }
 
-void supine_tissue_rest(const supine_lungs *lungs, double *vertices) {
+void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices) {
   memcpy(vertices, lungs->mesh.vertices, 3 * lungs->mesh.vertex_count * sizeof *vertices);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->share[lung] == 1.0) {
+    if (share[lung] == 1.0) {
       continue;
     }
-    const double length = cbrt(lungs->share[lung]);
+    const double length = cbrt(share[lung]);
     double hilum[3];
     find_hilum(lungs, lung, hilum);
     for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
@@ -116,12 +107,13 @@ void supine_tissue_rest(const supine_lungs *lungs, double *vertices) {
   }
 }
 
-void supine_tissue_rest_directions(const supine_lungs *lungs, double *directions) {
+void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
+                                   double *directions) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->share[lung] == 1.0) {
+    if (share[lung] == 1.0) {
       continue;
     }
-    const double length = cbrt(lungs->share[lung]);
+    const double length = cbrt(share[lung]);
     for (size_t at = 3 * lungs->lung_begin[lung]; at < 3 * lungs->lung_begin[lung + 1]; ++at) {
       directions[at] *= length;
     }

@@ -2,7 +2,7 @@
 /** @file
  * Diseased lungs ([Santhanam2008] VI): tumours that stiffen what is around them, and collapse.
  *
- * Both are properties of the lungs and stay with them; lungs.h says what they are as made: healthy.
+ * Both are written down in the model (model.h): as factors on the stiffness, and as shares.
  */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
@@ -25,17 +25,18 @@ typedef struct supine_lesion {
   double factor;    /**< > 0; above 1 stiffer, below 1 softer, 1 changes nothing */
 } supine_lesion;
 
-/** Adds a lesion to the lungs. It acts after stiffness was scaled to geometric mean 1: scaling with
- * the lesion in it would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the
- * vertices, however far away. So at one breath scale tissue away from the lesion moves as before;
- * at one volume it also takes, everywhere in the same proportion, what the lesion no longer does.
+/** Multiplies a lesion into `factors` [N], which start as 1 everywhere. It acts after stiffness was
+ * scaled to geometric mean 1: scaling with the lesion in it would soften all other tissue, by 4 %
+ * for a lesion of factor 10 over 2 % of the vertices, however far away. So at one breath scale
+ * tissue away from the lesion moves as before; at one volume it also takes, everywhere in the same
+ * proportion, what the lesion no longer does.
  *
  * @param reached  optional: how many vertices are nearer than the radius; 0: it changes nothing
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *                                positive and finite
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion *lesion,
-                                       size_t *reached, supine_error *error);
+ */
+supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
+                                       double *factors, size_t *reached, supine_error *error);
 
 /** Collapses a lung (pneumothorax) to a share of its volume and of its breath.
  *
@@ -51,15 +52,16 @@ supine_status supine_tissue_add_lesion(supine_lungs *lungs, const supine_lesion 
  * @param lung   0 to lung_count - 1
  * @param share  0 < share <= 1; 1 changes nothing
  * @retval SUPINE_ERROR_ARGUMENT */
-supine_status supine_tissue_collapse(supine_lungs *lungs, size_t lung, double share,
-                                     supine_error *error);
+supine_status supine_tissue_collapse(const supine_lungs *lungs, size_t lung, double share,
+                                     double shares[2], supine_error *error);
 
 /** The surface at rest, [N, 3] mm: the healthy lungs' with collapsed ones drawn together. `mesh` of
  * the lungs itself keeps the healthy shape, which forces, heights and links are taken from. */
-void supine_tissue_rest(const supine_lungs *lungs, double *vertices);
+void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices);
 
 /** Turns directions d [N, 3] of the healthy shape into those of the surface at rest, in place. */
-void supine_tissue_rest_directions(const supine_lungs *lungs, double *directions);
+void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
+                                   double *directions);
 
 #ifdef __cplusplus
 }

@@ -48,6 +48,19 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy) {
   }
 }
 
+/* How much of the lungs lesions changed, and how far. */
+static void add_lesions(entries *list, size_t count, const double *factors) {
+  size_t changed = 0;
+  double low = 1.0;
+  double high = 1.0;
+  for (size_t i = 0; i < count; ++i) {
+    changed += factors[i] != 1.0;
+    low = fmin(low, factors[i]);
+    high = fmax(high, factors[i]);
+  }
+  add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
+}
+
 static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model) {
   static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
@@ -61,19 +74,12 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
         c[2], c[3], c[4], c[5]);
   }
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
-}
-
-/* How much of the lungs lesions changed, and how far. */
-static void add_lesions(entries *list, const supine_lungs *lungs) {
-  size_t changed = 0;
-  double low = 1.0;
-  double high = 1.0;
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    changed += lungs->lesions[i] != 1.0;
-    low = fmin(low, lungs->lesions[i]);
-    high = fmax(high, lungs->lesions[i]);
+  if (model->lesions != NULL) {
+    add_lesions(list, lungs->mesh.vertex_count, model->lesions);
   }
-  add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
+  if (model->reach > 0.0) {
+    add(list, "reach_mm", "%.9g", model->reach);
+  }
 }
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
@@ -84,7 +90,7 @@ static void add_fit(entries *list, const supine_fit_report *fit) {
   add(list, "error_method", "leave-one-out");
 }
 
-static void add_lungs(entries *list, const supine_lungs *lungs) {
+static void add_lungs(entries *list, const supine_lungs *lungs, const double share[2]) {
   if (lungs->lung_count == 2) {
     add(list, "lungs", "left,right");
   } else {
@@ -98,22 +104,16 @@ static void add_lungs(entries *list, const supine_lungs *lungs) {
                                 lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
                                 lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
       used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
-                       1e-3 * lungs->share[lung] * supine_mesh_volume(&part));
+                       1e-3 * share[lung] * supine_mesh_volume(&part));
     }
     add(list, "rest_volume_ml", "%s", text);
   }
-  if (lungs->share[0] != 1.0 || lungs->share[1] != 1.0) {
+  if (share[0] != 1.0 || share[1] != 1.0) {
     if (lungs->lung_count == 2) {
-      add(list, "lung_share", "%.9g,%.9g", lungs->share[0], lungs->share[1]);
+      add(list, "lung_share", "%.9g,%.9g", share[0], share[1]);
     } else {
-      add(list, "lung_share", "%.9g", lungs->share[0]);
+      add(list, "lung_share", "%.9g", share[0]);
     }
-  }
-  if (lungs->lesions != NULL) {
-    add_lesions(list, lungs);
-  }
-  if (lungs->reach > 0.0) {
-    add(list, "reach_mm", "%.9g", lungs->reach);
   }
 }
 
@@ -136,17 +136,19 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   supine_status status = SUPINE_OK;
   entries *list = calloc(1, sizeof *list);
   const bool vector = content->directions == NULL;
+  static const double healthy[2] = {1.0, 1.0};
+  const double *share = content->model != NULL ? content->model->share : healthy;
   float *vertices = NULL;
   float *directions = NULL;
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
   if (rest != NULL) { /* the surface at rest, then its directions */
-    supine_tissue_rest(lungs, rest);
+    supine_tissue_rest(lungs, share, rest);
     vertices = to_float(rest, 3 * n);
   }
   if (rest != NULL && !vector) {
     memcpy(rest, content->directions, 3 * n * sizeof *rest);
-    supine_tissue_rest_directions(lungs, rest);
+    supine_tissue_rest_directions(lungs, share, rest);
     directions = to_float(rest, 3 * n);
   }
   if (list == NULL || vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
@@ -166,7 +168,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   add(list, "route", "%s", content->route);
   add(list, "units", "mm");
   add(list, "axes", "LPS");
-  add_lungs(list, lungs);
+  add_lungs(list, lungs, share);
   if (content->model != NULL) {
     add_model(list, lungs, content->model);
   }

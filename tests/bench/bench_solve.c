@@ -88,12 +88,12 @@ static void compare(const supine_lungs *lungs, size_t count, int repeats) {
 
 static void sample(const supine_lungs *lungs) {
   enum { BAND = 7 };
-  supine_force_law law = supine_physics_force_law_default();
+  supine_model model = supine_physics_model_default();
   supine_projection projection = {0};
   supine_error error;
-  law.soften = 1.0;
+  model.force.soften = 1.0;
   const double begin = supine_clock_seconds();
-  if (supine_projection_sampled(lungs, &law, NULL, BAND, 0.0, NULL, NULL, &projection, &error) !=
+  if (supine_projection_sampled(lungs, &model, BAND, 0.0, NULL, NULL, &projection, &error) !=
       SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);
     exit(EXIT_FAILURE);

@@ -17,7 +17,7 @@ struct full_solve {
 full_solve *full_solve_create(size_t vertices) {
   full_solve *made = calloc(1, sizeof *made);
   supine_mesh mesh = {0};
-  const supine_direction_law law = supine_physics_direction_law_default();
+  const supine_model model = supine_physics_model_default();
   if (made == NULL || supine_phantom_create(vertices, 2500.0, &mesh, NULL) != SUPINE_OK ||
       supine_lungs_create(&mesh, 1, NULL, &made->lungs, NULL) != SUPINE_OK) {
     supine_mesh_free(&mesh);
@@ -32,8 +32,9 @@ full_solve *full_solve_create(size_t vertices) {
   made->positions = malloc(3 * n * sizeof *made->positions);
   if (made->force == NULL || made->caught == NULL || made->directions == NULL ||
       made->positions == NULL ||
-      supine_physics_directions(&made->lungs, &law, made->directions, NULL) != SUPINE_OK ||
-      supine_physics_lungs_network(&made->lungs, &made->network) != SUPINE_OK ||
+      supine_physics_directions(&made->lungs, &model.direction, made->directions, NULL) !=
+          SUPINE_OK ||
+      supine_physics_model_network(&made->lungs, &model, &made->network) != SUPINE_OK ||
       supine_physics_equilibrium_create(made->network, 1, 1, &made->equilibrium) != SUPINE_OK ||
       supine_physics_equilibrium_set_stiffness(made->equilibrium, NULL, NULL) != SUPINE_OK) {
     full_solve_destroy(made);
