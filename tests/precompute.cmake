@@ -5,5 +5,9 @@ supine_test(lungs supine_precompute supine_phantom supine_mesh_read)
 supine_test(precompute supine_precompute supine_phantom supine_mesh_read umfpack)
 supine_test(program supine_sh_basis)
 target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
+# Whole outputs of every command, as text files.
+add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
+  $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
+set_tests_properties(command_output PROPERTIES TIMEOUT 300)
 supine_test(projection supine_precompute supine_phantom supine_mesh_read supine_gsl)
 supine_test(fields supine_precompute supine_phantom supine_mesh_read supine_mesh_save supine_safetensors_write)

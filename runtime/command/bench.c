@@ -49,7 +49,7 @@ static const supine_option table[] = {
     {"threads", 0, "N", "measure one thread and this many", SUPINE_FILLS(request, bench.threads),
      .standard = "2", .range = {1.0, 256.0}},
     {"repeats", 0, "N", "runs of each", SUPINE_FILLS(request, bench.repeats), .standard = "9",
-     .range = {1.0, 1e6}},
+     .range = {1.0, INFINITY}, .wants = "a number from 1"},
     {"json", 0, NULL,
      "{\"rows\": [{\"what\", \"vertices\", \"threads\", \"storage\", \"ns_per_vertex\", ...}]}",
      SUPINE_FILLS(request, json)},

@@ -1,0 +1,53 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What commands print, whole: test_command_output.sh PROGRAM FOLDER
+#
+# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by what it prints on both streams
+# and, where that is not 0, its exit code. Sessions run in a folder with lungs.ply, a phantom of
+# about 500 vertices, and lungs.safetensors, its basis. Digits beyond what processors agree on are
+# taken off by the filter `rounded`; times and residuals are masked by sed, both in the session
+# itself. To take what is printed now:
+#
+#   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
+set -u
+program=$1
+golden=$2
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+mkdir "$work/bin"
+ln -s "$program" "$work/bin/supine"
+cat >"$work/bin/rounded" <<'END'
+#!/usr/bin/awk -f
+{ # four digits of each decimal number; 0 for what is rounding alone
+  line = $0
+  out = ""
+  while (match(line, /-?[0-9]+(\.[0-9]+(e[-+]?[0-9]+)?|e[-+]?[0-9]+)/)) {
+    number = substr(line, RSTART, RLENGTH) + 0
+    out = out substr(line, 1, RSTART - 1) sprintf("%.4g", number * number < 1e-14 ? 0 : number)
+    line = substr(line, RSTART + RLENGTH)
+  }
+  print out line
+}
+END
+chmod +x "$work/bin/rounded"
+PATH="$work/bin:$PATH"
+mkdir "$work/here"
+cd "$work/here" || exit 1
+supine phantom --vertices 500 -o lungs.ply >/dev/null || exit 1
+supine precompute lungs.ply --band 3 -o lungs.safetensors >/dev/null || exit 1
+
+failed=0
+for session in "$golden"/*.txt; do
+  grep '^\$ ' "$session" | while IFS= read -r line; do
+    printf '%s\n' "$line"
+    sh -c "${line#\$ }" 2>&1 </dev/null
+    code=$?
+    [ $code -eq 0 ] || echo "exit code $code"
+  done >"$work/now.txt"
+  if [ -n "${SUPINE_GOLDEN_UPDATE-}" ]; then
+    cmp -s "$work/now.txt" "$session" || { cp "$work/now.txt" "$session" && echo "updated $session"; }
+  elif ! diff -u "$session" "$work/now.txt"; then
+    failed=1
+  fi
+done
+exit $failed
