@@ -178,7 +178,7 @@ static void run_shader(const gl_api *gl, GLuint program, const float *attributes
   uintptr_t offset = 0;
   for (GLuint i = 0; i < 6; ++i) {
     gl->EnableVertexAttribArray(i);
-    gl->VertexAttribPointer(i, sizes[i], GL_FLOAT, GL_FALSE, stride, (const char *)NULL + offset);
+    gl->VertexAttribPointer(i, sizes[i], GL_FLOAT, GL_FALSE, stride, (const void *)offset);
     offset += (size_t)sizes[i] * sizeof(float);
   }
   gl->BindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, buffers[1]);

@@ -12,7 +12,7 @@
 #include <supine/safetensors.h>
 
 #include "runtime/command/breath_output.h"
-#include "runtime/report/comparison_html.h"
+#include "runtime/template/template.h"
 
 struct breath_output {
   const supine_mesh *rest;
@@ -221,7 +221,7 @@ static supine_status write_index(const breath_output *output, const char *path, 
     frame_name(t, name);
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
                   output->course->time[t]);
-    supine_report_html_text(folder, file.file);
+    supine_template_escape(folder, file.file);
     (void)fprintf(file.file, "%s%s\"/>\n", folder[0] == '\0' ? "" : "/", name);
   }
   (void)fputs("</Collection>\n</VTKFile>\n", file.file);

@@ -6,7 +6,7 @@
 
 #include "runtime/export/glb.h"
 
-enum { CHUNK_ALIGNMENT = 4, SHORT_STRIDE = 8 };
+enum { CHUNK_ALIGNMENT = 4 };
 static const uint32_t magic = 0x46546C67, version = 2, json_chunk = 0x4E4F534A,
                       binary_chunk = 0x004E4942;
 
@@ -20,31 +20,6 @@ typedef struct glb {
   int16_t *short4; /* [N, 4], where quantised */
   glb_plan plan;
 } glb;
-
-size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
-                                  int target, size_t axes, const double *low, const double *high) {
-  const size_t size = component == GLTF_SHORT ? SHORT_STRIDE : 4 * axes;
-  const json_int_t length = (json_int_t)count * (json_int_t)size;
-  json_t *view = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)plan->bytes,
-                           "byteLength", length);
-  if (target != GLTF_NO_TARGET) {
-    (void)json_object_set_new(view, "target", json_integer(target));
-  }
-  if (component == GLTF_SHORT) {
-    (void)json_object_set_new(view, "byteStride", json_integer(SHORT_STRIDE));
-  }
-  json_t *accessor =
-      json_pack("{s:I, s:i, s:I, s:s}", "bufferView", (json_int_t)json_array_size(plan->views),
-                "componentType", component, "count", (json_int_t)count, "type", type);
-  if (low != NULL && high != NULL) {
-    (void)json_object_set_new(accessor, "min", supine_export_glb_numbers(low, axes));
-    (void)json_object_set_new(accessor, "max", supine_export_glb_numbers(high, axes));
-  }
-  (void)json_array_append_new(plan->views, view);
-  (void)json_array_append_new(plan->accessors, accessor);
-  plan->bytes += count * size;
-  return json_array_size(plan->accessors) - 1;
-}
 
 /* Bounds of `count` points, as they will stand in the file. */
 static void find_bounds(const float *xyz, size_t count, bool rounded, double low[3],

@@ -8,14 +8,6 @@
 
 enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
 
-json_t *supine_export_glb_numbers(const double *values, size_t count) {
-  json_t *array = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(array, json_real(values[i]));
-  }
-  return array;
-}
-
 /* "Y_1_-1" where the modes are the harmonics themselves, else "mode_3". */
 static json_t *target_names(const export_source *source, const export_targets *targets) {
   const char *modes = supine_basis_metadata(source->basis, "modes");

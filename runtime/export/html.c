@@ -1,55 +1,26 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The page: page.html with its other sources and the basis put in where {{...}} names them. */
+/* The page: page.html with its other sources and the basis. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/output.h"
-#include <jansson.h>
 
-#include "runtime/export/assets.h"
 #include "runtime/export/base64.h"
 #include "runtime/export/export.h"
+#include "runtime/template/template.h"
+
+extern const supine_asset supine_export_assets[]; /* page/, put in by the build */
 
 typedef struct page {
   const export_source *source;
   const export_breath *breath;
   const char *title;
-  FILE *file;
 } page;
 
-/* Text between tags. */
-static void write_escaped(const char *text, FILE *file) {
-  for (const char *c = text; *c != '\0'; ++c) {
-    switch (*c) {
-    case '<':
-      (void)fputs("&lt;", file);
-      break;
-    case '&':
-      (void)fputs("&amp;", file);
-      break;
-    default:
-      (void)fputc(*c, file);
-    }
-  }
-}
-
-/* JSON within a script element: no "<" may stand there, which only strings could hold. */
-static void write_json(const json_t *value, FILE *file) {
-  char *text = json_dumps(value, JSON_COMPACT);
-  for (const char *c = text; c != NULL && *c != '\0'; ++c) {
-    if (*c == '<') {
-      (void)fputs("\\u003c", file);
-    } else {
-      (void)fputc(*c, file);
-    }
-  }
-  free(text);
-}
-
-static void write_tensor(const page *p, const char *name, const void *bytes, size_t size) {
-  (void)fprintf(p->file, "<script type=\"text/plain\" id=\"tensor-%s\">", name);
-  supine_export_base64_write(bytes, size, p->file);
-  (void)fputs("</script>\n", p->file);
+static void write_tensor(FILE *file, const char *name, const void *bytes, size_t size) {
+  (void)fprintf(file, "<script type=\"text/plain\" id=\"tensor-%s\">", name);
+  supine_export_base64_write(bytes, size, file);
+  (void)fputs("</script>\n", file);
 }
 
 /* Sizes and metadata. */
@@ -89,64 +60,24 @@ static json_t *describe(const page *p) {
                    title != NULL ? title : json_string("lungs"));
 }
 
-static void write_basis(const page *p) {
-  const export_source *s = p->source;
+/* {{tensors}} */
+static void write_tensors(const void *context, const char *name, FILE *file) {
+  const export_source *s = context;
+  if (strcmp(name, "tensors") != 0) {
+    return;
+  }
   const size_t n = s->info->vertex_count;
   const size_t k = s->info->mode_count;
   const size_t g = s->info->lung_count;
-  json_t *description = describe(p);
-  (void)fputs("<script type=\"application/json\" id=\"basis\">", p->file);
-  write_json(description, p->file);
-  (void)fputs("</script>\n", p->file);
-  json_decref(description);
-  write_tensor(p, "vertices", s->vertices, 3 * n * sizeof *s->vertices);
-  write_tensor(p, "direction", s->direction, 3 * n * sizeof *s->direction);
-  write_tensor(p, "coefficients", s->coefficients, n * k * sizeof *s->coefficients);
-  write_tensor(p, "triangles", s->triangles, 3 * s->info->triangle_count * sizeof *s->triangles);
-  write_tensor(p, "modes", s->modes, k * s->terms * sizeof *s->modes);
+  write_tensor(file, "vertices", s->vertices, 3 * n * sizeof *s->vertices);
+  write_tensor(file, "direction", s->direction, 3 * n * sizeof *s->direction);
+  write_tensor(file, "coefficients", s->coefficients, n * k * sizeof *s->coefficients);
+  write_tensor(file, "triangles", s->triangles, 3 * s->info->triangle_count * sizeof *s->triangles);
+  write_tensor(file, "modes", s->modes, k * s->terms * sizeof *s->modes);
   if (s->info->has_volume) {
-    write_tensor(p, "linear", s->linear, g * k * sizeof *s->linear);
-    write_tensor(p, "quadratic", s->quadratic, g * k * k * sizeof *s->quadratic);
-    write_tensor(p, "cubic", s->cubic, g * k * k * k * sizeof *s->cubic);
-  }
-}
-
-static const export_asset *find_asset(const char *name, size_t length) {
-  for (size_t i = 0; i < supine_export_asset_count; ++i) {
-    if (strlen(supine_export_assets[i].name) == length &&
-        memcmp(supine_export_assets[i].name, name, length) == 0) {
-      return &supine_export_assets[i];
-    }
-  }
-  return NULL;
-}
-
-/* What stands in the page for {{name}}: "title", "basis", or a source's file name. */
-static void write_named(const page *p, const char *name, size_t length) {
-  const export_asset *asset = find_asset(name, length);
-  if (asset != NULL) {
-    (void)fwrite(asset->bytes, 1, asset->size, p->file);
-  } else if (length == strlen("basis") && memcmp(name, "basis", length) == 0) {
-    write_basis(p);
-  } else {
-    write_escaped(p->title, p->file);
-  }
-}
-
-static void write_page(const page *p) {
-  const export_asset *frame = find_asset("page.html", strlen("page.html"));
-  const char *at = (const char *)frame->bytes;
-  const char *end = at + frame->size;
-  for (;;) {
-    const char *open = memmem(at, (size_t)(end - at), "{{", 2);
-    const char *close = open == NULL ? NULL : memmem(open, (size_t)(end - open), "}}", 2);
-    if (close == NULL) {
-      (void)fwrite(at, 1, (size_t)(end - at), p->file);
-      return;
-    }
-    (void)fwrite(at, 1, (size_t)(open - at), p->file);
-    write_named(p, open + 2, (size_t)(close - open) - 2);
-    at = close + 2;
+    write_tensor(file, "linear", s->linear, g * k * sizeof *s->linear);
+    write_tensor(file, "quadratic", s->quadratic, g * k * k * sizeof *s->quadratic);
+    write_tensor(file, "cubic", s->cubic, g * k * k * k * sizeof *s->cubic);
   }
 }
 
@@ -166,8 +97,16 @@ supine_status supine_export_html_write(const char *path, const export_source *so
   if (status != SUPINE_OK) {
     return status;
   }
-  const page p = {source, breath, title, output.file};
-  write_page(&p);
+  const page p = {source, breath, title};
+  json_t *description = describe(&p);
+  char *text = json_dumps(description, JSON_COMPACT);
+  json_t *data =
+      json_pack("{s:O, s:s}", "title", json_object_get(description, "title"), "basis", text);
+  const supine_template page_template = {supine_export_assets, data, write_tensors, source};
+  supine_template_fill(&page_template, "page.html", output.file);
+  free(text);
+  json_decref(data);
+  json_decref(description);
   status = supine_output_commit(&output, error);
   supine_output_abandon(&output);
   return status;

@@ -152,7 +152,7 @@ static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {
     glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), 4, weights);
     glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[lung + 1] - r->index_begin[lung])),
                    GL_UNSIGNED_INT,
-                   (const char *)NULL + 3 * r->index_begin[lung] * sizeof(uint32_t));
+                   (const void *)(uintptr_t)(3 * r->index_begin[lung] * sizeof(uint32_t)));
   }
 }
 

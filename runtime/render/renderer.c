@@ -10,7 +10,7 @@ enum { COLOURS = 256 };
 static void attribute(GLuint location, GLint count, size_t stride, size_t offset) {
   glEnableVertexAttribArray(location);
   glVertexAttribPointer(location, count, GL_FLOAT, GL_FALSE, (GLsizei)(stride * sizeof(float)),
-                        (const char *)NULL + offset * sizeof(float));
+                        (const void *)(uintptr_t)(offset * sizeof(float)));
 }
 
 static void load_colours(supine_renderer *r) {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Charts of the HTML report, as SVG in the page, so that they follow its theme. */
+/* Charts of the HTML report: where their lines and dots go, in page/profile.html and page/map.html.
+ */
 #include <math.h>
 
 #include "runtime/render/render.h"
-#include "runtime/report/comparison_html.h"
+#include "runtime/report/comparison_parts.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -20,7 +21,7 @@ static double share(const supine_comparison *c, size_t posture, size_t slab) {
   return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
 }
 
-/* The plot's box in the drawing of 420 x 330. */
+/* The plot's box in page/profile.html. */
 enum { LEFT = 46, RIGHT = 404, TOP = 14, BOTTOM = 286 };
 
 static double across(double value, double low, double high) {
@@ -31,7 +32,7 @@ static double down(double height) {
   return BOTTOM - (BOTTOM - TOP) * height / 100.0;
 }
 
-static void profile(const supine_comparison *c, const char *title, slab_value *value, FILE *file) {
+static json_t *profile(const supine_comparison *c, const char *title, slab_value *value) {
   double low = 0.0;
   double high = 0.0;
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -43,58 +44,39 @@ static void profile(const supine_comparison *c, const char *title, slab_value *v
   const double step = supine_render_bar_step(high - low);
   low = step * floor(low / step);
   high = step * fmax(1.0 + low / step, ceil(high / step));
-  (void)fputs("<figure><svg viewBox=\"0 0 420 330\" role=\"img\" aria-label=\"", file);
-  (void)fprintf(file, "%s\">\n", title);
+  json_t *heights = json_array();
+  json_t *ticks = json_array();
+  json_t *lines = json_array();
   for (int height = 0; height <= 100; height += 20) {
-    (void)fprintf(file,
-                  "<line class=\"grid\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>"
-                  "<text class=\"faint\" x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%d</text>\n",
-                  LEFT, down(height), RIGHT, down(height), LEFT - 8, down(height) + 4, height);
+    (void)json_array_append_new(
+        heights, json_pack("{s:o, s:o, s:i}", "y", json_sprintf("%.1f", down(height)), "below",
+                           json_sprintf("%.1f", down(height) + 4), "height", height));
   }
   for (int i = 0; low + i * step <= high + 1e-9 * step; ++i) {
-    const double x = across(low + i * step, low, high);
-    (void)fprintf(file,
-                  "<line class=\"grid\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/>"
-                  "<text class=\"faint\" x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>\n",
-                  x, TOP, x, BOTTOM, x, BOTTOM + 17, low + i * step);
+    (void)json_array_append_new(
+        ticks, json_pack("{s:o, s:o}", "x", json_sprintf("%.1f", across(low + i * step, low, high)),
+                         "value", json_sprintf("%g", low + i * step)));
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file,
-                  "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"2.5\" "
-                  "stroke-linejoin=\"round\"%s points=\"",
-                  supine_report_html_line(i), i >= 7 ? " stroke-dasharray=\"6 4\"" : "");
+    json_t *dots = json_array();
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-      (void)fprintf(file, "%s%.1f,%.1f", s > 0 ? " " : "", across(value(c, i, s), low, high),
-                    down(95.0 - 10.0 * (double)s));
+      (void)json_array_append_new(
+          dots,
+          json_pack("{s:o, s:o, s:o}", "x", json_sprintf("%.1f", across(value(c, i, s), low, high)),
+                    "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
+                    json_sprintf("%.2f", value(c, i, s))));
     }
-    (void)fputs("\"/>\n", file);
-    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-      (void)fprintf(file, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"><title>",
-                    across(value(c, i, s), low, high), down(95.0 - 10.0 * (double)s),
-                    supine_report_html_line(i));
-      supine_report_html_text(c->postures.item[i].name, file);
-      (void)fprintf(file, ": %.2f %%</title></circle>\n", value(c, i, s));
-    }
+    (void)json_array_append_new(
+        lines, json_pack("{s:s, s:s, s:b, s:o}", "line", supine_report_line(i), "name",
+                         c->postures.item[i].name, "dashed", (int)(i >= 7), "dots", dots));
   }
-  (void)fprintf(file,
-                "<text x=\"%d\" y=\"322\" text-anchor=\"middle\">%s</text>"
-                "<text transform=\"translate(13 150) rotate(-90)\" text-anchor=\"middle\">height, "
-                "%%</text>\n</svg></figure>\n",
-                (LEFT + RIGHT) / 2, title);
+  return json_pack("{s:s, s:o, s:o, s:o}", "title", title, "heights", heights, "ticks", ticks,
+                   "lines", lines);
 }
 
-void supine_report_html_profiles(const supine_comparison *c, FILE *file) {
-  (void)fputs("<p>", file);
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file, "<span class=\"key\" style=\"background:%s\"></span>",
-                  supine_report_html_line(i));
-    supine_report_html_text(c->postures.item[i].name, file);
-    (void)fputs("&#160;&#160; ", file);
-  }
-  (void)fputs("</p>\n<div class=\"row\">\n", file);
-  profile(c, "regional expansion, %", expansion, file);
-  profile(c, "share of the volume gained, %", share, file);
-  (void)fputs("</div>\n", file);
+json_t *supine_report_profiles(const supine_comparison *c) {
+  return json_pack("[o, o]", profile(c, "regional expansion, %", expansion),
+                   profile(c, "share of the volume gained, %", share));
 }
 
 /* RMS distance from supine in mm, or NaN where the inflation cannot be reached. */
@@ -116,6 +98,7 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
   return supine_compare_rms(c->compare, weights[0], scales[0], weights[1], scales[1]);
 }
 
+/* The map of page/map.html. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
 /* The map's place of a direction: across, rolling from right over supine and left to prone; down,
@@ -127,50 +110,50 @@ static void place(const double g[3], double *x, double *y) {
   *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);
 }
 
-void supine_report_html_map(const supine_comparison *c, FILE *file) {
-  static const char *const rolls[] = {"prone", "right", "supine", "left", "prone"};
-  static const char *const tilts[] = {"inverted", "45&#176;", "level", "45&#176;", "upright"};
-  (void)fprintf(file,
-                "<figure><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"distance from supine "
-                "for every direction of gravity\" shape-rendering=\"crispEdges\">\n",
-                MAP_LEFT + COLUMNS * CELL + 30, MAP_TOP + ROWS * CELL + 28);
+static json_t *map_cells(const supine_comparison *c) {
+  json_t *cells = json_array();
   for (int row = 0; row < ROWS; ++row) {
     for (int column = 0; column < COLUMNS; ++column) {
       const double roll = 2.0 * pi * ((column + 0.5) / COLUMNS - 0.5);
       const double tilt = pi * (0.5 - (row + 0.5) / ROWS);
       const double g[3] = {cos(tilt) * sin(roll), cos(tilt) * cos(roll), sin(tilt)};
       const double rms = from_supine(c, g);
-      char hex[8];
       if (!isnan(rms)) {
-        supine_report_html_colour(
-            c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0, hex);
-        (void)fprintf(file, "<path fill=\"%s\" d=\"M%d %dh%dv%dh-%dz\"/>\n", hex,
-                      MAP_LEFT + column * CELL, MAP_TOP + row * CELL, CELL, CELL, CELL);
+        (void)json_array_append_new(
+            cells,
+            json_pack("{s:o, s:i, s:i}", "hex",
+                      supine_report_hex(
+                          c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0),
+                      "x", MAP_LEFT + column * CELL, "y", MAP_TOP + row * CELL));
       }
     }
   }
+  return cells;
+}
+
+json_t *supine_report_map(const supine_comparison *c) {
+  static const char *const rolls[] = {"prone", "right", "supine", "left", "prone"};
+  static const char *const tilts[] = {"inverted", "45°", "level", "45°", "upright"};
+  json_t *across_names = json_array();
+  json_t *down_names = json_array();
+  json_t *dots = json_array();
   for (int i = 0; i < 5; ++i) {
-    (void)fprintf(file,
-                  "<text class=\"faint\" x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>"
-                  "<text class=\"faint\" x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>\n",
-                  MAP_LEFT + i * COLUMNS * CELL / 4, MAP_TOP + ROWS * CELL + 18, rolls[i],
-                  MAP_LEFT - 6, MAP_TOP + 8 + i * (ROWS * CELL - 8) / 4, tilts[i]);
+    (void)json_array_append_new(
+        across_names,
+        json_pack("{s:i, s:s}", "x", MAP_LEFT + i * COLUMNS * CELL / 4, "name", rolls[i]));
+    (void)json_array_append_new(
+        down_names,
+        json_pack("{s:i, s:s}", "y", MAP_TOP + 8 + i * (ROWS * CELL - 8) / 4, "name", tilts[i]));
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
     double x;
     double y;
     place(c->postures.item[i].gravity, &x, &y);
-    (void)fprintf(file,
-                  "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"6\" fill=\"%s\" stroke=\"#fff\" "
-                  "stroke-width=\"2\" shape-rendering=\"auto\"><title>",
-                  x, y, supine_report_html_line(i));
-    supine_report_html_text(c->postures.item[i].name, file);
-    (void)fputs("</title></circle>\n", file);
+    (void)json_array_append_new(dots,
+                                json_pack("{s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", x), "y",
+                                          json_sprintf("%.1f", y), "line", supine_report_line(i),
+                                          "name", c->postures.item[i].name));
   }
-  (void)fprintf(file,
-                "</svg><figcaption>RMS distance from supine at the same inflation, from 0 (dark) "
-                "to %.1f mm (yellow), for every direction of gravity: rolling about the long axis "
-                "across, head down to feet down from top to bottom. Dots are the postures "
-                "compared.</figcaption></figure>\n",
-                c->extremes.farthest_rms);
+  return json_pack("{s:o, s:o, s:o, s:o}", "cells", map_cells(c), "rolls", across_names, "tilts",
+                   down_names, "dots", dots);
 }

@@ -6,7 +6,7 @@
 #include "runtime/export/base64.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/render/render.h"
-#include "runtime/report/comparison_html.h"
+#include "runtime/report/comparison_parts.h"
 
 enum { WIDTH = 360, HEIGHT = 330, VIEWS_MAX = 1 + SUPINE_LUNGS_MAX };
 
@@ -46,100 +46,101 @@ static supine_scene make_scene(const supine_comparison *c, const look *from, siz
                         .extent = from->extent};
 }
 
-static supine_status picture(const supine_comparison *c, supine_renderer *renderer,
-                             const look *from, size_t posture, double largest, const float *value,
-                             FILE *file, supine_error *error) {
+/* A file's bytes as base64; NULL when memory is short. */
+static json_t *encoded(const void *bytes, size_t size) {
+  char *text = NULL;
+  size_t length = 0;
+  FILE *file = open_memstream(&text, &length);
+  if (file == NULL) {
+    return NULL;
+  }
+  supine_export_base64_write(bytes, size, file);
+  json_t *made = fclose(file) == 0 ? json_stringn_nocheck(text, length) : NULL;
+  free(text);
+  return made;
+}
+
+static json_t *picture(const supine_comparison *c, supine_renderer *renderer, const look *from,
+                       size_t posture, double largest, float *value, supine_error *error) {
+  const supine_compared_posture *shown = &c->posture[posture];
   unsigned char *png = NULL;
   size_t size = 0;
   supine_scene scene = make_scene(c, from, posture);
+  supine_compare_distances(c->compare, shown->weights, shown->scales, NULL, NULL, value);
   scene.value = value;
   scene.largest = largest;
   scene.line_step = supine_render_bar_step(largest);
-  const supine_status status = supine_render_png(renderer, &scene, &png, &size, error);
-  if (status == SUPINE_OK) {
-    (void)fputs("<img alt=\"", file);
-    supine_report_html_text(c->postures.item[posture].name, file);
-    (void)fputs(", ", file);
-    supine_report_html_text(from->title, file);
-    (void)fputs("\" src=\"data:image/png;base64,", file);
-    supine_export_base64_write(png, size, file);
-    (void)fputs("\"/>\n", file);
+  json_t *made = NULL;
+  if (supine_render_png(renderer, &scene, &png, &size, error) == SUPINE_OK) {
+    made =
+        json_pack("{s:s, s:o}", "name", c->postures.item[posture].name, "png", encoded(png, size));
   }
   free(png);
-  return status;
+  return made;
 }
 
-static void bar(double largest, FILE *file) {
+/* One look at every posture, all to one scale; NULL on failure. */
+static json_t *row(const supine_comparison *c, supine_renderer *renderer, look *from,
+                   double largest, float *value, supine_error *error) {
+  static const double none[4] = SUPINE_EXTENT_NONE;
+  json_t *images = json_array();
+  memcpy(from->extent, none, sizeof none);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const supine_scene scene = make_scene(c, from, i);
+    supine_render_extent(renderer, &scene, from->extent);
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    if (json_array_append_new(images, picture(c, renderer, from, i, largest, value, error)) != 0) {
+      json_decref(images);
+      return NULL;
+    }
+  }
+  return json_pack("{s:s, s:o}", "view", from->title, "images", images);
+}
+
+/* The bar of colours below them. */
+static void add_bar(double largest, json_t *pictures) {
+  enum { STOPS = 16 };
   const double step = supine_render_bar_step(largest);
-  (void)fputs("<div style=\"max-width:520px;margin:14px auto 0\"><div class=\"bar\" "
-              "style=\"background:linear-gradient(90deg",
-              file);
-  for (int i = 0; i <= 16; ++i) {
-    char hex[8];
-    supine_report_html_colour(i / 16.0, hex);
-    (void)fprintf(file, ",%s", hex);
+  json_t *stops = json_array();
+  json_t *ticks = json_array();
+  for (int i = 0; i <= STOPS; ++i) {
+    (void)json_array_append_new(stops, supine_report_hex(i / (double)STOPS));
   }
-  (void)fputs(")\"></div><div class=\"ticks\">", file);
   for (int i = 0; i * step <= largest * (1.0 + 1e-9); ++i) {
-    (void)fprintf(file, "<span>%g</span>", i * step);
+    (void)json_array_append_new(ticks, json_sprintf("%g", i * step));
   }
-  (void)fputs(
-      "</div><p class=\"note\" style=\"text-align:center\">displacement from rest, mm; lines "
-      "at the ticks; the last colour also shows what lies beyond</p></div>\n",
-      file);
+  (void)json_object_set_new(pictures, "stops", stops);
+  (void)json_object_set_new(pictures, "ticks", ticks);
 }
 
-static supine_status pictures(const supine_comparison *c, supine_renderer *renderer, float *value,
-                              FILE *file, supine_error *error) {
+json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
   look looks[VIEWS_MAX];
   const size_t count = choose_looks(c, looks);
   double p95 = 0.0;
-  supine_status status = SUPINE_OK;
+  supine_renderer *renderer = NULL;
+  json_t *rows = json_array();
+  json_t *pictures = NULL;
+  float *value = malloc(supine_basis_get_info(c->basis)->vertex_count * sizeof *value);
+  *error = (supine_error){SUPINE_ERROR_MEMORY, "out of memory"};
+  if (value == NULL || supine_render_create(c->basis, &renderer, error) != SUPINE_OK) {
+    goto cleanup;
+  }
   for (size_t i = 0; i < c->postures.count; ++i) {
     const double here = c->posture[i].displacement.p95;
     p95 = here > p95 ? here : p95;
   }
   const double largest = supine_render_bar_end(p95);
-  (void)fprintf(file,
-                "<div class=\"pictures\" style=\"grid-template-columns:repeat(%zu,"
-                "minmax(130px,1fr))\">\n",
-                c->postures.count);
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fputs("<b>", file);
-    supine_report_html_text(c->postures.item[i].name, file);
-    (void)fputs("</b>\n", file);
-  }
-  for (size_t row = 0; row < count && status == SUPINE_OK; ++row) {
-    static const double none[4] = SUPINE_EXTENT_NONE;
-    memcpy(looks[row].extent, none, sizeof none);
-    for (size_t i = 0; i < c->postures.count; ++i) {
-      const supine_scene scene = make_scene(c, &looks[row], i);
-      supine_render_extent(renderer, &scene, looks[row].extent);
-    }
-    (void)fputs("<span class=\"note\" style=\"grid-column:1/-1\">", file);
-    supine_report_html_text(looks[row].title, file);
-    (void)fputs("</span>\n", file);
-    for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
-      supine_compare_distances(c->compare, c->posture[i].weights, c->posture[i].scales, NULL, NULL,
-                               value);
-      status = picture(c, renderer, &looks[row], i, largest, value, file, error);
+  for (size_t i = 0; i < count; ++i) {
+    if (json_array_append_new(rows, row(c, renderer, &looks[i], largest, value, error)) != 0) {
+      goto cleanup;
     }
   }
-  (void)fputs("</div>\n", file);
-  bar(largest, file);
-  return status;
-}
-
-void supine_report_html_pictures(const supine_comparison *c, FILE *file) {
-  supine_renderer *renderer = NULL;
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  float *value = malloc(supine_basis_get_info(c->basis)->vertex_count * sizeof *value);
-  if (value == NULL || supine_render_create(c->basis, &renderer, &error) != SUPINE_OK ||
-      pictures(c, renderer, value, file, &error) != SUPINE_OK) {
-    (void)fputs("<p class=\"note\">No pictures: ", file);
-    supine_report_html_text(error.message, file);
-    (void)fputs(".</p>\n", file);
-  }
+  pictures = json_pack("{s:I, s:O}", "columns", (json_int_t)c->postures.count, "rows", rows);
+  add_bar(largest, pictures);
+cleanup:
+  json_decref(rows);
   supine_render_destroy(renderer);
   free(value);
+  return pictures;
 }

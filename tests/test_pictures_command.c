@@ -21,7 +21,7 @@
 
 #include <supine/status.h>
 
-static char folder[] = "/tmp/supine-see-XXXXXX";
+static char folder[] = "/tmp/supine-pictures-XXXXXX";
 static char printed[65536]; /* by the last run, stdout and stderr together */
 
 /* Runs "ENVIRONMENT supine ARGUMENTS" in the folder; its exit code, or -1 where a signal or the

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Templates: names, sections, escapes. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "runtime/template/template.h"
+
+static void write_large(const void *context, const char *name, FILE *file) {
+  (void)fprintf(file, "[%s %s]", (const char *)context, name);
+}
+
+/* What a template makes of data, the other assets being fixed. */
+static void check(const char *text, const char *json, const char *expected) {
+  const supine_asset assets[] = {{"main.html", text, strlen(text)},
+                                 {"part.html", "<i>{{title}}</i>", 16},
+                                 {"style.css", "a{{title}}", 10},
+                                 {0}};
+  char *made = NULL;
+  size_t size = 0;
+  json_t *data = json_loads(json, 0, NULL);
+  FILE *file = open_memstream(&made, &size);
+  assert_non_null(data);
+  assert_non_null(file);
+  const supine_template filling = {assets, data, write_large, "large"};
+  supine_template_fill(&filling, "main.html", file);
+  assert_int_equal(fclose(file), 0);
+  assert_string_equal(made, expected);
+  free(made);
+  json_decref(data);
+}
+
+static void test_names_are_escaped_text(void **state) {
+  (void)state;
+  check("x {{title}} y", "{\"title\": \"<b a=\\\"1\\\">&'\"}",
+        "x &lt;b a=&quot;1&quot;&gt;&amp;' y");
+  check("{{n}} {{r}}", "{\"n\": -12, \"r\": 0.1}", "-12 0.1");
+  check("é {{title}}", "{\"title\": \"ü\"}", "é ü");
+}
+
+static void test_other_files_are_put_in(void **state) {
+  (void)state;
+  check("{{part.html}}{{style.css}}", "{\"title\": \"&\"}", "<i>&amp;</i>a{{title}}");
+}
+
+static void test_what_is_no_data_is_asked_for(void **state) {
+  (void)state;
+  check("a{{tensors}}b", "{}", "a[large tensors]b");
+}
+
+static void test_sections_repeat_and_nest(void **state) {
+  (void)state;
+  check("{{#rows}}\n<r>{{name}}:{{#cells}}{{.}}{{unit}},{{/cells}}</r>\n{{/rows}}\nend",
+        "{\"unit\": \"mm\", \"rows\": [{\"name\": \"a\", \"cells\": [1, 2]},"
+        "{\"name\": \"b\", \"cells\": []}]}",
+        "<r>a:1mm,2mm,</r>\n<r>b:</r>\nend");
+}
+
+static void test_sections_ask_whether_there_is_something(void **state) {
+  (void)state;
+  static const char text[] = "{{#a}}yes{{b}}{{/a}}{{^a}}no{{/a}}";
+  check(text, "{\"a\": {\"b\": 3}}", "yes3");
+  check(text, "{\"a\": true, \"b\": 4}", "yes4");
+  check(text, "{\"a\": false}", "no");
+  check(text, "{\"a\": null}", "no");
+  check(text, "{\"a\": []}", "no");
+  check(text, "{}", "no");
+}
+
+static void test_inner_names_come_first(void **state) {
+  (void)state;
+  check("{{#a}}{{x}}{{#a}}{{x}}{{/a}}{{/a}}{{x}}",
+        "{\"x\": 1, \"a\": {\"x\": 2, \"a\": {\"x\": 3}}}", "231");
+}
+
+/* What is left open goes to the end; nothing is read beyond it. */
+static void test_unclosed_tags_end_with_the_text(void **state) {
+  (void)state;
+  check("{{#a}}x{{b}}", "{\"a\": [{\"b\": 1}, {\"b\": 2}]}", "x1x2");
+  check("x{{a", "{\"a\": 1}", "x{{a");
+  check("x{{/a}}y", "{\"a\": 1}", "xy");
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_names_are_escaped_text),
+      cmocka_unit_test(test_other_files_are_put_in),
+      cmocka_unit_test(test_what_is_no_data_is_asked_for),
+      cmocka_unit_test(test_sections_repeat_and_nest),
+      cmocka_unit_test(test_sections_ask_whether_there_is_something),
+      cmocka_unit_test(test_inner_names_come_first),
+      cmocka_unit_test(test_unclosed_tags_end_with_the_text),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
