@@ -258,6 +258,29 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Volumes that count from the file's surface: at rest, and in the scan. */
+static supine_status check_rest(const check *c, supine_basis *basis) {
+  static const size_t terms = RESTING_TERMS;
+  const char *scan = supine_safetensors_metadata(c->file, "scan_volume_ml");
+  if (scan != NULL) {
+    char *end = NULL;
+    basis->info.scan_volume = strtod(scan, &end);
+    if (end == scan || *end != '\0' || !isfinite(basis->info.scan_volume)) {
+      return refuse(c, "scan_volume_ml is no number: %.16s", scan);
+    }
+  }
+  if (supine_safetensors_find(c->file, "resting_volume") == NULL) {
+    return SUPINE_OK;
+  }
+  basis->info.resting_volume = want_shape(c, "resting_volume", SUPINE_F64, 1, &terms);
+  if (basis->info.resting_volume == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  return finite_doubles(basis->info.resting_volume, terms)
+             ? SUPINE_OK
+             : refuse(c, "resting_volume is not finite");
+}
+
 /* Chooses the code and packs: AUTO is the smallest storage that is accurate enough. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
@@ -322,7 +345,7 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface, check_field, check_modes, check_lungs, check_volume};
+      check_surface, check_field, check_modes, check_lungs, check_volume, check_rest};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }

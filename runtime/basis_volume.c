@@ -2,6 +2,7 @@
 /* Exact volumes of a basis, from its forms in the weights. */
 #include <string.h>
 
+#include <supine/sh.h>
 #include <supine/volume.h>
 
 #include "runtime/internal.h"
@@ -66,4 +67,16 @@ supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung, co
   double cubic[3];
   supine_basis_lung_cubic(basis, lung, weights, cubic);
   return supine_volume_scale(cubic, volume, scale, error);
+}
+
+supine_status supine_basis_resting_volume(const supine_basis *basis, const double gravity[3],
+                                          double *volume) {
+  double y[RESTING_TERMS];
+  const supine_status status = supine_sh_evaluate(2, gravity, y);
+  *volume = 0.0;
+  for (size_t t = 0; status == SUPINE_OK && basis->info.resting_volume != NULL && t < RESTING_TERMS;
+       ++t) {
+    *volume += basis->info.resting_volume[t] * y[t];
+  }
+  return status;
 }

@@ -10,6 +10,9 @@
 
 /** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
  * through the caches rather than stay there. */
+/** Harmonics of bands 0 to 2. */
+enum { RESTING_TERMS = 9 };
+
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24 };
 
 /** Room for a lung's name. */

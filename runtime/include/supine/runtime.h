@@ -93,6 +93,10 @@ typedef struct supine_basis_info {
   /** What an evaluation reads, bytes_per_vertex for each vertex in whole runs of 16 vertices: for
    * measuring what its traffic costs. What it means changes between versions. */
   const void *packed;
+  const double
+      *resting_volume; /**< [9] see supine_basis_resting_volume; NULL where none is known */
+  double scan_volume;  /**< mL that the scan held beyond the file's surface, negative where it held
+                            less; 0 where they are one */
 } supine_basis_info;
 
 /** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
@@ -157,6 +161,17 @@ SUPINE_API supine_status supine_basis_scale(const supine_basis *basis, const dou
 SUPINE_API supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung,
                                                  const double *weights, double volume,
                                                  double *scale, supine_error *error);
+
+/** The volume at the end of a quiet expiration for gravity along `gravity` (any length but 0), mL
+ * beyond the file's surface, negative below it:
+ *
+ *     sum over l <= 2 and m of resting_volume[l*l + l + m] Y_lm(g)
+ *
+ * 0 where the file knows of no rest (info's resting_volume is NULL): its surface is the rest.
+ * @param volume  mL, all lungs together; as supine_basis_scale takes it
+ * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
+SUPINE_API supine_status supine_basis_resting_volume(const supine_basis *basis,
+                                                     const double gravity[3], double *volume);
 
 /** Bound, in mm, on the distance of any deformed vertex from exact arithmetic on the numbers of the
  * file: what storage and rounding may cost at these weights and scales. */
