@@ -80,8 +80,8 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   if (format == NULL || strcmp(format, "supine-basis") != 0) {
     return refuse(c, "a safetensors file, but not a Supine basis: make one with supine precompute");
   }
-  if (version == NULL || strcmp(version, "1") != 0) {
-    return refuse(c, "basis version %.16s; this program reads version 1",
+  if (version == NULL || (strcmp(version, "1") != 0 && strcmp(version, "2") != 0)) {
+    return refuse(c, "basis version %.16s; this program reads versions 1 and 2",
                   version == NULL ? "unknown" : version);
   }
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {

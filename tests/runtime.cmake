@@ -7,6 +7,13 @@ target_link_libraries(runtime_fixture
   PUBLIC supine_runtime supine_safetensors_write)
 
 supine_test(safetensors runtime_fixture)
+supine_test(golden supine_runtime)
+target_compile_definitions(test_golden PRIVATE SUPINE_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/golden")
+find_package(Python3 COMPONENTS Interpreter)
+if(Python3_FOUND)
+  add_test(NAME checksum_python COMMAND ${Python3_EXECUTABLE}
+    ${CMAKE_CURRENT_SOURCE_DIR}/test_checksum.py ${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_2.safetensors)
+endif()
 supine_test(posture runtime_fixture)
 supine_test(volume runtime_fixture)
 supine_test(runtime_basis runtime_fixture)

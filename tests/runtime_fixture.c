@@ -10,8 +10,7 @@
 
 #include <cmocka.h>
 
-#include <supine/safetensors.h>
-
+#include "precompute/writer/safetensors_write.h"
 #include "runtime_fixture.h"
 
 void *fixture_allocate(size_t count, size_t size) {
@@ -186,7 +185,7 @@ void fixture_write(const fixture *f, const char *path) {
   }
   const supine_metadata metadata[] = {
       {"format", "supine-basis"},
-      {"version", "1"},
+      {"version", "2"},
       {"kind", f->vector ? "vector" : "scalar"},
       {"units", "mm"},
   };

@@ -18,6 +18,8 @@
 #include "sh/grid.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
+
+#include "precompute/writer/safetensors_write.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

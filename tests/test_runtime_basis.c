@@ -14,6 +14,8 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
+#include "precompute/writer/safetensors_write.h"
+
 #include "runtime_fixture.h"
 
 /* Opens from a copy of exactly that size, so that a sanitizer sees any read past it. */
@@ -244,7 +246,7 @@ static parts sound(void) {
                              {"volume_quadratic", SUPINE_F64, 3, {1, 1, 1}, zeros64},
                              {"volume_cubic", SUPINE_F64, 4, {1, 1, 1, 1}, zeros64}},
                  .tensor_count = 9,
-                 .metadata = {{"format", "supine-basis"}, {"version", "1"}, {"kind", "scalar"}},
+                 .metadata = {{"format", "supine-basis"}, {"version", "2"}, {"kind", "scalar"}},
                  .metadata_count = 3};
 }
 

@@ -13,6 +13,9 @@
 
 #include <supine/safetensors.h>
 
+#include "precompute/writer/safetensors_write.h"
+#include "runtime/safetensors/checksum.h"
+
 #include "runtime_fixture.h"
 
 /* A file in memory of exactly its size, so that the address sanitizer sees any read past it. */
@@ -342,12 +345,19 @@ static void test_checksum_any_bit_or_order_noticed(void **state) {
               supine_safetensors_checksum(&flat, 1, pairs, 1));
 }
 
-/* Pins the format: a change of the hash would refuse every file that exists. */
+/* Pins the format: a change of either hash would refuse every file that exists. */
 static void test_checksum_sample_literal(void **state) {
   (void)state;
   const supine_tensor tensor = {"four", SUPINE_F32, 2, {2, 2}, four};
   const supine_metadata pair = {"key", "value"};
-  assert_true(supine_safetensors_checksum(&tensor, 1, &pair, 1) == UINT64_C(0xA0C3581784E54CAE));
+  char text[CHECKSUM_SIZE];
+  assert_true(supine_safetensors_checksum(&tensor, 1, &pair, 1) == UINT64_C(0xE8C275EED575467E));
+  supine_safetensors_checksum_text(NULL, &tensor, 1, &pair, 1, text);
+  assert_string_equal(text, "xxh64:e8c275eed575467e");
+  supine_safetensors_checksum_text("xxh64:0", &tensor, 1, &pair, 1, text);
+  assert_string_equal(text, "xxh64:e8c275eed575467e");
+  supine_safetensors_checksum_text("0", &tensor, 1, &pair, 1, text); /* of version 1 */
+  assert_string_equal(text, "a0c3581784e54cae");
 }
 
 int main(void) {

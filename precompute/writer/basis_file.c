@@ -6,31 +6,49 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/tissue/disease.h"
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "precompute/tissue/disease.h"
 #include "precompute/writer/basis_file.h"
+#include "precompute/writer/safetensors_write.h"
 
-enum { ENTRIES_MAX = 48, TEXT_SIZE = 1024 };
-
-/* Metadata under construction: each value is formatted into its own space. */
+/* Metadata under construction. */
 typedef struct entries {
   size_t count;
-  supine_metadata metadata[ENTRIES_MAX];
-  char text[ENTRIES_MAX][TEXT_SIZE];
+  supine_metadata *metadata; /* [count], in room for a power of two; values are allocated */
+  bool failed;               /* out of memory */
 } entries;
 
 SUPINE_PRINTF(3, 4)
 static void add(entries *list, const char *key, const char *format, ...) {
-  if (list->count < ENTRIES_MAX) {
-    va_list arguments;
-    va_start(arguments, format);
-    (void)vsnprintf(list->text[list->count], TEXT_SIZE, format, arguments);
-    va_end(arguments);
-    list->metadata[list->count] = (supine_metadata){key, list->text[list->count]};
-    ++list->count;
+  char *text = NULL;
+  va_list arguments;
+  va_start(arguments, format);
+  const int length = vasprintf(&text, format, arguments);
+  va_end(arguments);
+  if (length < 0) {
+    list->failed = true;
+    return;
   }
+  if ((list->count & (list->count - 1)) == 0) { /* 0 or a power of two: full */
+    const size_t room = list->count == 0 ? 1 : 2 * list->count;
+    supine_metadata *grown = realloc(list->metadata, room * sizeof *grown);
+    if (grown == NULL) {
+      free(text);
+      list->failed = true;
+      return;
+    }
+    list->metadata = grown;
+  }
+  list->metadata[list->count++] = (supine_metadata){key, text};
+}
+
+static void entries_free(entries *list) {
+  for (size_t i = 0; i < list->count; ++i) {
+    free((char *)list->metadata[i].value);
+  }
+  free(list->metadata);
 }
 
 static void add_accuracy(entries *list, const supine_accuracy *accuracy) {
@@ -134,7 +152,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
   supine_status status = SUPINE_OK;
-  entries *list = calloc(1, sizeof *list);
+  entries list = {0};
   const bool vector = content->directions == NULL;
   static const double healthy[2] = {1.0, 1.0};
   const double *share = content->model != NULL ? content->model->share : healthy;
@@ -151,7 +169,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     supine_tissue_rest_directions(lungs, share, rest);
     directions = to_float(rest, 3 * n);
   }
-  if (list == NULL || vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
+  if (vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
                               path, n);
     goto cleanup;
@@ -159,27 +177,31 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   for (size_t i = 0; i < n; ++i) {
     lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
   }
-  add(list, "format", "supine-basis");
-  add(list, "version", "1");
-  add(list, "kind", "%s", vector ? "vector" : "scalar");
-  add(list, "band", "%zu", field->band);
-  add(list, "modes", "%s", content->harmonics ? "harmonics" : "best");
-  add(list, "mode_count", "%zu", k);
-  add(list, "route", "%s", content->route);
-  add(list, "units", "mm");
-  add(list, "axes", "LPS");
-  add_lungs(list, lungs, share);
+  add(&list, "format", "supine-basis");
+  add(&list, "version", "2");
+  add(&list, "kind", "%s", vector ? "vector" : "scalar");
+  add(&list, "band", "%zu", field->band);
+  add(&list, "modes", "%s", content->harmonics ? "harmonics" : "best");
+  add(&list, "mode_count", "%zu", k);
+  add(&list, "route", "%s", content->route);
+  add(&list, "units", "mm");
+  add(&list, "axes", "LPS");
+  add_lungs(&list, lungs, share);
   if (content->model != NULL) {
-    add_model(list, lungs, content->model);
+    add_model(&list, lungs, content->model);
   }
   if (content->fit != NULL) {
-    add_fit(list, content->fit);
+    add_fit(&list, content->fit);
   }
-  add_accuracy(list, content->accuracy);
+  add_accuracy(&list, content->accuracy);
   if (content->turned_over != NULL) {
-    add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
+    add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
-  add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  add(&list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  if (list.failed) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    goto cleanup;
+  }
   supine_tensor tensors[11] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
@@ -209,10 +231,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     tensors[count++] =
         (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
   }
-  status =
-      supine_writer_safetensors_write(path, tensors, count, list->metadata, list->count, error);
+  status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:
-  free(list);
+  entries_free(&list);
   free(rest);
   free(vertices);
   free(directions);

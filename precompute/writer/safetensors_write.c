@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Writing safetensors files. */
-#include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
-#include <supine/safetensors.h>
-
+#include "precompute/writer/safetensors_write.h"
+#include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/dtype.h"
 #include "runtime/safetensors/json.h"
+#include "sh/base/output.h"
 
 /* The header while it grows, and copies of every string in clean UTF-8. */
 typedef struct writer {
@@ -158,10 +157,9 @@ static bool writer_open(writer *w, const supine_tensor *tensors, size_t tensor_c
 }
 
 static void put_header(writer *w, size_t tensor_count, size_t metadata_count) {
-  char checksum[17];
-  (void)snprintf(
-      checksum, sizeof checksum, "%016" PRIx64,
-      supine_safetensors_checksum(w->tensors, tensor_count, w->metadata, metadata_count));
+  char checksum[CHECKSUM_SIZE];
+  supine_safetensors_checksum_text(NULL, w->tensors, tensor_count, w->metadata, metadata_count,
+                                   checksum);
   put_text(w, "{\"__metadata__\":{");
   for (size_t i = 0; i < metadata_count; ++i) {
     put_string(w, w->metadata[i].key);

@@ -88,7 +88,7 @@ supine_status supine_bench_image_create(size_t vertices, size_t modes, const sup
       {"lung", SUPINE_U8, 1, {vertices}, lung},
   };
   const supine_metadata metadata[] = {
-      {"format", "supine-basis"}, {"version", "1"}, {"kind", "scalar"}};
+      {"format", "supine-basis"}, {"version", "2"}, {"kind", "scalar"}};
   const size_t at[] = {0,
                        k * harmonics * sizeof *mode,
                        (size_t)((unsigned char *)direction - bytes) - HEADER_BYTES,
@@ -100,8 +100,8 @@ supine_status supine_bench_image_create(size_t vertices, size_t modes, const sup
   char header[HEADER_BYTES - 8 + 1];
   (void)snprintf(
       header, sizeof header,
-      "{\"__metadata__\":{\"format\":\"supine-basis\",\"version\":\"1\",\"kind\":"
-      "\"scalar\",\"checksum\":\"%016" PRIx64 "\"},"
+      "{\"__metadata__\":{\"format\":\"supine-basis\",\"version\":\"2\",\"kind\":"
+      "\"scalar\",\"checksum\":\"xxh64:%016" PRIx64 "\"},"
       "\"modes\":{\"dtype\":\"F64\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
       "\"coefficients\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
       "\"direction\":{\"dtype\":\"F32\",\"shape\":[%zu,3],\"data_offsets\":[%zu,%zu]},"

@@ -11,6 +11,8 @@
 #include "sh/base/output.h"
 #include <supine/safetensors.h>
 
+#include "precompute/writer/safetensors_write.h"
+
 #include "runtime/command/breath_output.h"
 #include "runtime/template/template.h"
 

@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Element types of safetensors files, and the checksum over tensors and metadata. */
-#include <string.h>
-
+/* Element types of safetensors files. */
 #include "runtime/safetensors/dtype.h"
-#include "runtime/safetensors/hash.h"
 
 static const struct {
   const char *name;
@@ -31,32 +28,4 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
     }
   }
   return true;
-}
-
-static uint64_t hash_text(const char *text, uint64_t seed) {
-  return supine_safetensors_hash(text, strlen(text), seed);
-}
-
-uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
-                                     const supine_metadata *metadata, size_t metadata_count) {
-  uint64_t sum = 0;
-  for (size_t i = 0; i < tensor_count; ++i) {
-    const supine_tensor *tensor = &tensors[i];
-    uint64_t shape[SUPINE_TENSOR_RANK_MAX] = {0};
-    for (size_t r = 0; r < tensor->rank; ++r) {
-      shape[r] = tensor->shape[r];
-    }
-    size_t size = 0;
-    (void)supine_safetensors_tensor_size(tensor, &size);
-    const uint64_t name =
-        hash_text(supine_safetensors_dtype_name(tensor->dtype), hash_text(tensor->name, 1));
-    sum += supine_safetensors_hash(
-        tensor->data, size, supine_safetensors_hash(shape, tensor->rank * sizeof *shape, name));
-  }
-  for (size_t i = 0; i < metadata_count; ++i) {
-    if (strcmp(metadata[i].key, "checksum") != 0) {
-      sum += hash_text(metadata[i].value, hash_text(metadata[i].key, 2));
-    }
-  }
-  return sum;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A 64-bit hash at the speed of memory. */
+/* The 64-bit hash of version 1. */
 #include <string.h>
 
 #include "runtime/safetensors/hash.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The 64-bit hash behind a basis file's checksum. */
+ * The 64-bit hash behind the checksum of basis files of version 1, which are read for ever. */
 #ifndef SUPINE_HASH_H
 #define SUPINE_HASH_H
 
@@ -15,7 +15,7 @@
  *
  * then the size and the eight lanes, in order, pass through the same step into one word that
  * begins at the seed. Each step is a bijection of the lane and of the word, so that a change
- * within any one word always shows. Guards against accidents, not against forgery. */
+ * within any one word always shows. */
 uint64_t supine_safetensors_hash(const void *bytes, size_t size, uint64_t seed);
 
 #endif

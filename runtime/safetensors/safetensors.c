@@ -2,14 +2,13 @@
 /* Safetensors files: mapping them, and asking what they hold. */
 #include <errno.h>
 #include <fcntl.h>
-#include <inttypes.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/safetensors_file.h"
 
 /* Takes the bytes, mapped or not, whatever comes of it. */
@@ -125,10 +124,9 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no checksum: not written by Supine",
                             file->name);
   }
-  char found[17];
-  (void)snprintf(found, sizeof found, "%016" PRIx64,
-                 supine_safetensors_checksum(file->tensors, file->tensor_count, file->metadata,
-                                             file->metadata_count));
+  char found[CHECKSUM_SIZE];
+  supine_safetensors_checksum_text(stated, file->tensors, file->tensor_count, file->metadata,
+                                   file->metadata_count, found);
   return strcmp(stated, found) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,

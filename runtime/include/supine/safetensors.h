@@ -49,26 +49,22 @@ typedef struct supine_metadata {
 
 /** A 64-bit checksum of everything but the layout: the sum, modulo 2^64, over
  *
- *     tensors    h(data, h(shape as 64-bit words, h(dtype name, h(tensor name, 1))))
- *     metadata   h(value, h(key, 2)), the key "checksum" left out
+ *     tensors    h(data, h("F32 [20000,3]", h(name, 0)))         element type and shape, thus
+ * written metadata   h(value, h(key, 1))                             the key "checksum" left out
  *
- * where h(bytes, seed) is supine_safetensors_hash (runtime/hash.h) and numbers are little-endian.
- * Cost: one pass at about the speed of memory. */
+ * where h(bytes, seed) is XXH64 (as in xxHash's libraries for other languages), text is UTF-8 and
+ * numbers are little-endian. In Python, with `import xxhash`:
+ *
+ *     h = xxhash.xxh64_intdigest
+ *     total = sum(h(data, h(f"{dtype} [{','.join(map(str, shape))}]", h(name, 0)))
+ *                 for name, dtype, shape, data in tensors)
+ *     total += sum(h(value, h(key, 1)) for key, value in metadata if key != "checksum")
+ *     checksum = f"xxh64:{total % 2**64:016x}"
+ *
+ * Cost: one pass at about the speed of memory. Guards against accidents, not against forgery. */
 SUPINE_API uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
                                                 const supine_metadata *metadata,
                                                 size_t metadata_count);
-
-/** Writes a file, whole or not at all (see output.h), and adds metadata "checksum": the 16
- * hexadecimal digits of supine_safetensors_checksum. Tensors are laid out by descending element
- * size, in the given order within one size, so that each begins at a multiple of its element size;
- * the header is padded with spaces to a multiple of 8. Bytes of a name, key or value that are not
- * UTF-8 are written as '?'. Not part of the run-time library.
- * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
- *                                range, or the key "checksum", which is the writer's
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
-supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
-                                              size_t tensor_count, const supine_metadata *metadata,
-                                              size_t metadata_count, supine_error *error);
 
 /** An opened file. */
 typedef struct supine_safetensors supine_safetensors;
@@ -94,7 +90,8 @@ SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors
 /** The metadata string of that key, or NULL. */
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
-/** Checks the file's content against its metadata "checksum".
+/** Checks the file's content against its metadata "checksum": "xxh64:" and 16 hexadecimal digits,
+ * or the 16 digits alone of a hash of Supine's own that basis files of version 1 have.
  * @retval SUPINE_ERROR_FORMAT  no checksum, or the content differs: the file is corrupted */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
