@@ -48,7 +48,26 @@ esac
 nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
 grep -q '^supine_deform@@SUPINE_0$' "$work/names"
 if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
-if grep -E 'supine_(fold|hash|json|tiles|basis_pack|kernels)' "$work/names"; then exit 1; fi
+# Exactly the functions that the installed headers declare; each header stands alone, in C and C++,
+# and names none that is not installed.
+for header in "$prefix"/include/supine/*.h; do
+  name=supine/$(basename "$header")
+  printf '#include <%s>\n' "$name" >"$work/one.c"
+  cp "$work/one.c" "$work/one.cc"
+  "$cc" -std=c17 -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$prefix/include" "$work/one.c"
+  "$cxx" -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$prefix/include" "$work/one.cc"
+  cat "$work/one.c"
+done >"$work/all.c"
+sed -n 's/^\(supine_[a-z0-9_]*\)@@.*/\1/p' "$work/names" | sort >"$work/shown"
+"$cc" -std=c17 -E -P -I"$prefix/include" "$work/all.c" | grep -o 'supine_[a-z0-9_]*(' | tr -d '(' |
+  sort -u >"$work/declared"
+diff "$work/declared" "$work/shown" || { echo "headers and library disagree"; exit 1; }
+cat "$prefix"/include/supine/*.h | grep -o '[A-Za-z0-9_./]*\.h\b' | sort -u | while read -r named; do
+  case $named in
+  std*.h) ;;
+  *) [ -f "$prefix/include/$named" ] || { echo "a header cites $named, which is not installed"; exit 1; } ;;
+  esac
+done
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi
 
