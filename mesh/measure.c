@@ -2,7 +2,7 @@
 /* Volume, box and vertex areas of a surface. */
 #include <math.h>
 
-#include "mesh/read/read.h"
+#include "mesh/mesh.h"
 
 static void cross(const double a[3], const double b[3], double product[3]) {
   product[0] = a[1] * b[2] - a[2] * b[1];

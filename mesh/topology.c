@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/read/read.h"
+#include "mesh/mesh.h"
 
 enum { FEW = 24 }; /* sides that insertion sorts faster than qsort */
 

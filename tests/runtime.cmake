@@ -49,6 +49,12 @@ if(EGL_FOUND AND NOT SUPINE_SANITIZE MATCHES "thread")
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
 endif()
 
+# Rooms use the rooms that README says, and name what they show after themselves.
+if(Python3_FOUND)
+  add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
+    ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+endif()
+
 # The README's program is the one that is built against the installed package.
 add_test(NAME readme_example COMMAND sh -c
   "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - tests/example/example.c"

@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-#include "mesh/read/read.h"
+#include "mesh/mesh.h"
 
 /** What the writers get: the mesh and how to write it. */
 typedef struct mesh_writer {

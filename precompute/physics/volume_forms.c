@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "precompute/physics/volume_forms.h"
-#include "precompute/projection/projection.h"
 #include "sh/base/parallel.h"
 #include <supine/volume.h>
 
@@ -163,6 +162,10 @@ static supine_status create(const supine_lungs *lungs, const double *share,
       .lungs = lungs, .share = share, .directions = directions, .columns = columns, .count = count};
   supine_volume_forms made = {0};
   supine_status status = SUPINE_OK;
+  if (count > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "volume forms of %zu columns: at most %d",
+                            count, SUPINE_MODES_MADE_MAX);
+  }
   if (!lungs->topology.closed) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "the surface is not closed: %zu boundary, %zu non-manifold and %zu "

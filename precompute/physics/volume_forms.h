@@ -16,6 +16,9 @@
 extern "C" {
 #endif
 
+/** Most functions of orientation that a basis is made with. */
+enum { SUPINE_MODES_MADE_MAX = 64 };
+
 /** Forms of each lung for K columns, mL. */
 typedef struct supine_volume_forms {
   size_t lung_count;
@@ -29,8 +32,9 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
 /** Forms of closed lungs; a collapsed lung's are its share of its healthy ones (disease.h).
  * @param directions  [N, 3] d of the healthy shape, mm
- * @param columns     [N, count] c
+ * @param columns     [N, count] c, at most SUPINE_MODES_MADE_MAX
  * Cost: count^3 multiplications a triangle. Uses all cores.
+ * @retval SUPINE_ERROR_ARGUMENT      more columns
  * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,

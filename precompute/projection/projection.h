@@ -5,11 +5,12 @@
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
  * kept in factors, C = columns x functions: the linear route needs no more columns than the applied
- * force has , one right-hand side each. */
+ * force has, one right-hand side each. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
 #include "precompute/physics/model.h"
+#include "precompute/physics/volume_forms.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -58,9 +59,6 @@ supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_
                                         size_t band, double tolerance,
                                         supine_progress_function *progress, void *context,
                                         supine_projection *projection, supine_error *error);
-
-/** Most functions of orientation that a basis is made with. */
-enum { SUPINE_MODES_MADE_MAX = 64 };
 
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */

@@ -10,7 +10,7 @@
 #include <supine/version.h>
 
 #include "runtime/options/command.h"
-#include "runtime/words.h"
+#include "runtime/words/words.h"
 
 int supine_options_exit_code(supine_status status) {
   switch (status) {

@@ -2,7 +2,7 @@
 /* Words as users type them. */
 #include <string.h>
 
-#include "runtime/words.h"
+#include "runtime/words/words.h"
 
 int supine_words_lower(char c) {
   return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;

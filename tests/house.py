@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rooms of the house: README's table says whom each may use, and the sources keep to it.
+
+    python3 house.py SOURCE_FOLDER BUILD_FOLDER
+
+Each row of the table names a folder, says what it is for and lists the folders above it in the table
+that its files may include from; what those may use, it may use too. So includes form no circle."""
+import os
+import re
+import subprocess
+import sys
+
+source, build = sys.argv[1:3]
+faults = []
+
+# Rooms whose external names begin otherwise than supine_<folder>_.
+PREFIX = {"sh/base": "supine_", "runtime": "supine_", "runtime/words": "supine_words_",
+          "mesh/read": "supine_mesh_", "mesh/save": "supine_mesh_"}
+PUBLIC = ("sh/include/supine", "runtime/include/supine")
+
+
+def read_table():
+    rooms = {}
+    with open(os.path.join(source, "README.md"), encoding="utf-8") as readme:
+        rows = re.findall(r"^\| `([a-z/]+)` \|(.*)\|([^|]*)\|$", readme.read(), re.M)
+    for room, what, uses in rows:
+        if not what.strip():
+            faults.append(f"README does not say what {room} is")
+        rooms[room] = set()
+        for used in re.findall(r"`([a-z/]+)`", uses):
+            if used == room or used not in rooms:
+                faults.append(f"README: {room} may use only rooms above it, not {used}")
+            else:
+                rooms[room] |= {used} | rooms[used]
+    return rooms
+
+
+def tracked():
+    listed = subprocess.run(["git", "-C", source, "ls-files", "*.c", "*.h"], capture_output=True,
+                            text=True, check=False).stdout.split()
+    found = [os.path.relpath(os.path.join(folder, name), source)
+             for top in ("sh", "mesh", "precompute", "runtime")
+             for folder, _, names in os.walk(os.path.join(source, top))
+             for name in names if name.endswith((".c", ".h"))]
+    files = [f for f in (listed or found) if f.split("/")[0] in ("sh", "mesh", "precompute", "runtime")]
+    return [f for f in files if os.path.exists(os.path.join(source, f))]
+
+
+def included(file):
+    """Rooms that a file includes from."""
+    with open(os.path.join(source, file), encoding="utf-8") as text:
+        for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
+            for path in [name] + [f"{room[:-len('/supine')]}/{name}" for room in PUBLIC]:
+                if os.path.exists(os.path.join(source, path)):
+                    yield os.path.dirname(path), name
+
+
+def check_includes(rooms, files):
+    for room in sorted({os.path.dirname(f) for f in files} - set(rooms)):
+        faults.append(f"README's table lacks the room {room}")
+    for file in files:
+        room = os.path.dirname(file)
+        for used, name in included(file):
+            if room in rooms and used != room and used not in rooms[room]:
+                faults.append(f"{file} includes {name}: {room} may not use {used}")
+
+
+def check_files_apart(files):
+    """No two files that include each other, nor longer circles."""
+    graph = {f: set() for f in files}
+    for file in files:
+        for used, name in included(file):
+            target = os.path.join(used, os.path.basename(name))
+            if target in graph and target != file:
+                graph[file].add(target)
+    while leaves := {f for f, out in graph.items() if not out & set(graph)}:
+        graph = {f: out for f, out in graph.items() if f not in leaves}
+    if graph:
+        faults.append(f"files that include each other in circles: {sorted(graph)}")
+
+
+def check_names(rooms):
+    """External names begin with their room's."""
+    checked = 0
+    for folder, _, names in os.walk(build):
+        match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
+        for name in names if match else []:
+            room = (match[1] + match[2]).replace("//", "/")
+            if not name.endswith(".c.o") or not os.path.exists(os.path.join(source, room, name[:-2])):
+                continue
+            prefix = PREFIX.get(room, f"supine_{os.path.basename(room)}_")
+            listed = subprocess.run(["nm", "--defined-only", "--extern-only", os.path.join(folder, name)],
+                                    capture_output=True, text=True, check=True).stdout
+            checked += 1
+            for symbol in re.findall(r" [A-Z] (\w+)$", listed, re.M):
+                if not symbol.startswith((prefix, "__")) and symbol != prefix[:-1]:
+                    faults.append(f"{room}/{name[:-2]} defines {symbol}, which does not begin {prefix}")
+    if checked < len(rooms):
+        faults.append(f"only {checked} objects in {build}")
+
+
+rooms = read_table()
+files = tracked()
+check_includes(rooms, files)
+check_files_apart(files)
+check_names(rooms)
+for fault in faults:
+    print(fault)
+print(f"{len(rooms)} rooms, {len(files)} files, {len(faults)} faults")
+sys.exit(1 if faults else 0)
