@@ -185,6 +185,9 @@ static void name_lungs(const supine_safetensors *file, supine_basis *basis) {
 
 static void bound_lungs(supine_basis *basis) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    if (basis->lung_begin[lung] == basis->lung_begin[lung + 1]) {
+      continue;
+    }
     float(*box)[3] = basis->bounds[lung];
     const float *p = basis->info.vertices + 3 * basis->lung_begin[lung];
     memcpy(box[0], p, sizeof box[0]);
@@ -199,7 +202,18 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Lungs come one after the other: 0 ... 0 1 ... 1 2 ... */
+/* How many lungs the metadata names. */
+static size_t named_lungs(const check *c) {
+  const char *names = supine_safetensors_metadata(c->file, "lungs");
+  size_t count = names != NULL;
+  for (; names != NULL && *names != '\0'; ++names) {
+    count += *names == ',';
+  }
+  return count < SUPINE_LUNGS_MAX ? count : SUPINE_LUNGS_MAX;
+}
+
+/* Lungs come one after the other: 0 ... 0 1 ... 1 2 ... Those that the metadata names may be empty:
+ * what is carried along inside may lie in one lung alone. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t n = info->vertex_count;
@@ -207,18 +221,24 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   if (lung == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
+  const size_t named = named_lungs(c);
   size_t at = 0;
   size_t count = 0;
-  while (at < n && lung[at] == count && count < SUPINE_LUNGS_MAX) {
-    basis->lung_begin[count] = at;
-    while (at < n && lung[at] == count) {
+  while (at < n && count < SUPINE_LUNGS_MAX &&
+         (lung[at] == count || (lung[at] > count && lung[at] < named))) {
+    while (count <= lung[at]) {
+      basis->lung_begin[count++] = at;
+    }
+    while (at < n && lung[at] + 1U == count) {
       ++at;
     }
-    ++count;
   }
   if (at != n) {
     return refuse(c, "vertex %zu is of lung %u: vertices must be grouped by lung, 0 to at most %d",
                   at, lung[at], SUPINE_LUNGS_MAX - 1);
+  }
+  while (count < named) {
+    basis->lung_begin[count++] = n;
   }
   basis->lung_begin[count] = n;
   info->lung_count = count;
@@ -402,6 +422,10 @@ const supine_basis_info *supine_basis_get_info(const supine_basis *basis) {
 
 const char *supine_basis_metadata(const supine_basis *basis, const char *key) {
   return supine_safetensors_metadata(basis->file, key);
+}
+
+const supine_metadata *supine_basis_all_metadata(const supine_basis *basis, size_t *count) {
+  return supine_safetensors_all_metadata(basis->file, count);
 }
 
 const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name) {

@@ -118,6 +118,12 @@ const char *supine_safetensors_metadata(const supine_safetensors *file, const ch
   return NULL;
 }
 
+const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
+                                                       size_t *count) {
+  *count = file->metadata_count;
+  return file->metadata;
+}
+
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {
   const char *stated = supine_safetensors_metadata(file, "checksum");
   if (stated == NULL) {

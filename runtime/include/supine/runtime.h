@@ -124,6 +124,10 @@ SUPINE_API void supine_basis_close(supine_basis *basis);
 SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *basis);
 /** A metadata string ("format", "error_rms_percent", ...), or NULL. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
+/** All of them, in the file's order.
+ * @param count  written */
+SUPINE_API const supine_metadata *supine_basis_all_metadata(const supine_basis *basis,
+                                                            size_t *count);
 /** Any tensor of the file ("error_modes", ...), or NULL. */
 SUPINE_API const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name);
 /** Rest positions [N, 3], mm, LPS. */

@@ -90,6 +90,11 @@ SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors
 /** The metadata string of that key, or NULL. */
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
+/** All metadata, in the file's order.
+ * @param count  written */
+SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
+                                                                  size_t *count);
+
 /** Checks the file's content against its metadata "checksum": "xxh64:" and 16 hexadecimal digits,
  * or the 16 digits alone of a hash of Supine's own that basis files of version 1 have.
  * @retval SUPINE_ERROR_FORMAT  no checksum, or the content differs: the file is corrupted */

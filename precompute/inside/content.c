@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Reading what is to be carried along. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/csv.h"
+
+#include "precompute/inside/content.h"
+
+static supine_status no_memory(const char *path, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+}
+
+/* Space for more points, at least doubled so that points can come one by one. */
+static bool reserve(supine_inside_content *content, size_t *capacity, size_t more) {
+  if (content->count + more <= *capacity) {
+    return true;
+  }
+  const size_t wanted = 2 * (content->count + more);
+  double *points = realloc(content->points, 3 * wanted * sizeof *points);
+  content->points = points != NULL ? points : content->points;
+  uint32_t *part = realloc(content->part, wanted * sizeof *part);
+  content->part = part != NULL ? part : content->part;
+  if (points == NULL || part == NULL) {
+    return false;
+  }
+  *capacity = wanted;
+  return true;
+}
+
+/* Adds the name of the next part. */
+static bool add_name(supine_inside_content *content, const char *name, size_t length, size_t *used,
+                     size_t *capacity) {
+  if (*used + length + 2 > *capacity) {
+    const size_t wanted = 2 * (*used + length + 2);
+    char *names = realloc(content->names, wanted);
+    if (names == NULL) {
+      return false;
+    }
+    content->names = names;
+    *capacity = wanted;
+  }
+  if (content->part_count > 0) {
+    content->names[(*used)++] = '\n';
+  }
+  memcpy(content->names + *used, name, length);
+  *used += length;
+  content->names[*used] = '\0';
+  ++content->part_count;
+  return true;
+}
+
+supine_status supine_inside_content_points(const char *path,
+                                           const supine_mesh_load_options *options,
+                                           supine_inside_content *content, supine_error *error) {
+  static const char *const columns[] = {"x", "y", "z", "name"};
+  enum { NAME = 3 };
+  const double scale =
+      options != NULL && options->millimetres_per_unit > 0.0 ? options->millimetres_per_unit : 1.0;
+  const double turn = options != NULL && options->axes == SUPINE_AXES_RAS ? -scale : scale;
+  const double factor[3] = {turn, turn, scale};
+  const size_t before = content->count;
+  size_t capacity = content->count;
+  size_t used = content->names != NULL ? strlen(content->names) : 0;
+  size_t room = used;
+  supine_csv csv;
+  supine_status status = supine_csv_open(path, columns, 4, NAME, &csv, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  bool more = true;
+  while ((status = supine_csv_next(&csv, &more, error)) == SUPINE_OK && more) {
+    char number[24];
+    (void)snprintf(number, sizeof number, "%zu", content->count - before + 1);
+    const char *given = supine_csv_text(&csv, NAME);
+    const char *name = given != NULL && *given != '\0' ? given : number;
+    const uint32_t part = (uint32_t)content->part_count;
+    if (!reserve(content, &capacity, 1) || !add_name(content, name, strlen(name), &used, &room)) {
+      status = no_memory(path, error);
+      break;
+    }
+    double *point = content->points + 3 * content->count;
+    for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
+      status = supine_csv_number(&csv, k, columns[k], &point[k], error);
+      point[k] *= factor[k];
+    }
+    if (status != SUPINE_OK) {
+      break;
+    }
+    content->part[content->count++] = part;
+  }
+  supine_csv_close(&csv);
+  if (status == SUPINE_OK && content->count == before) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points below the header", path);
+  }
+  return status;
+}
+
+/* "airways" of "/scans/airways.ply". */
+static const char *part_name(const char *path, size_t *length) {
+  const char *slash = strrchr(path, '/');
+  const char *name = slash != NULL ? slash + 1 : path;
+  const char *dot = strrchr(name, '.');
+  *length = dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name);
+  return name;
+}
+
+supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
+                                         supine_inside_content *content, supine_error *error) {
+  supine_mesh mesh = {0};
+  supine_status status = supine_mesh_load(path, options, &mesh, NULL, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  size_t capacity = content->count;
+  size_t used = content->names != NULL ? strlen(content->names) : 0;
+  size_t room = used;
+  size_t length = 0;
+  const char *name = part_name(path, &length);
+  const uint32_t part = (uint32_t)content->part_count;
+  const size_t triangles = content->triangle_count + mesh.triangle_count;
+  uint32_t *joined = realloc(content->triangles, 3 * triangles * sizeof *joined);
+  content->triangles = joined != NULL ? joined : content->triangles;
+  if (joined == NULL || !reserve(content, &capacity, mesh.vertex_count) ||
+      !add_name(content, name, length, &used, &room)) {
+    status = no_memory(path, error);
+  } else {
+    for (size_t i = 0; i < 3 * mesh.triangle_count; ++i) {
+      joined[3 * content->triangle_count + i] = mesh.triangles[i] + (uint32_t)content->count;
+    }
+    memcpy(content->points + 3 * content->count, mesh.vertices,
+           3 * mesh.vertex_count * sizeof *mesh.vertices);
+    for (size_t i = 0; i < mesh.vertex_count; ++i) {
+      content->part[content->count + i] = part;
+    }
+    content->count += mesh.vertex_count;
+    content->triangle_count = triangles;
+  }
+  supine_mesh_free(&mesh);
+  return status;
+}
+
+void supine_inside_content_free(supine_inside_content *content) {
+  free(content->points);
+  free(content->part);
+  free(content->triangles);
+  free(content->names);
+  *content = (supine_inside_content){0};
+}

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * What is to be carried along: named points, meshes, or the nodes of a grid. */
+#ifndef SUPINE_INSIDE_CONTENT_H
+#define SUPINE_INSIDE_CONTENT_H
+
+#include "mesh/mesh.h"
+
+/** A grid of nodes: node (i, j, k) lies at origin + i step[0] + j step[1] + k step[2]. */
+typedef struct supine_inside_grid {
+  size_t size[3];
+  double origin[3];  /**< mm */
+  double step[3][3]; /**< mm */
+} supine_inside_grid;
+
+/** Points, of which some may be corners of triangles. Zero-initialise; supine_inside_content_free
+ * releases what the functions below put there. */
+typedef struct supine_inside_content {
+  size_t count;
+  double *points; /**< [count, 3] mm, LPS */
+  uint32_t *part; /**< [count] which of the parts a point is of; of a grid: its node,
+                       i + size[0] (j + size[1] k) */
+  size_t triangle_count;
+  uint32_t *triangles; /**< [triangle_count, 3] */
+  size_t part_count;   /**< names of parts; 0: a grid */
+  char *names;         /**< in order of part, each but the last followed by a newline */
+  supine_inside_grid grid;
+} supine_inside_content;
+
+/** Appends the points of a CSV file with the columns x, y, z and, where given, name (else they are
+ * numbered from 1), each a part of its own.
+ * @param options  axes and units of the numbers; AUTO: LPS
+ * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT  with the line; no point
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_content_points(const char *path,
+                                           const supine_mesh_load_options *options,
+                                           supine_inside_content *content, supine_error *error);
+
+/** Appends a mesh, one part, named as its file is.
+ * @retval those of supine_mesh_load */
+supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
+                                         supine_inside_content *content, supine_error *error);
+
+void supine_inside_content_free(supine_inside_content *content);
+
+#endif

@@ -1,0 +1,355 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Content in, a basis of kind vector that moves it out. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/writer/safetensors_write.h"
+#include "sh/base/parallel.h"
+
+#include "precompute/inside/biharmonic.h"
+#include "precompute/inside/embed.h"
+
+enum { BLOCK = 1024 };
+
+/* The content in the lungs' order, and where each point stands. */
+typedef struct embedding {
+  const supine_inside_shells *shells;
+  const supine_inside_content *content;
+  const supine_inside_options *options;
+  size_t columns; /* 3 K */
+  supine_inside_place *place;
+  unsigned char *lung;
+  size_t *order;       /* [N] content's points, lung by lung */
+  float *vertices;     /* [N, 3] in that order, likewise: */
+  float *coefficients; /* [N, 3, K] */
+  float *depth;
+  uint32_t *part;
+  unsigned char *group;
+  uint32_t *triangles; /* [M, 3] */
+} embedding;
+
+static void find_places(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const embedding *e = context;
+  supine_inside_place places[2][SUPINE_LUNGS_MAX];
+  for (size_t i = begin; i < end; ++i) {
+    supine_inside_place *place = places[i % 2];
+    const size_t lung = supine_inside_shells_find(e->shells, e->content->points + 3 * i,
+                                                  i > begin ? places[(i + 1) % 2] : NULL, place);
+    e->lung[i] = (unsigned char)lung;
+    e->place[i] = place[lung];
+  }
+}
+
+/* Points lung by lung, in their own order within each; triangles follow. */
+static supine_status sort_points(embedding *e, supine_inside_report *report) {
+  const size_t n = e->content->count;
+  uint32_t *position = malloc(n * sizeof *position);
+  if (position == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  size_t at = 0;
+  for (size_t lung = 0; lung < e->shells->count; ++lung) {
+    for (size_t i = 0; i < n; ++i) {
+      if (e->lung[i] != lung) {
+        continue;
+      }
+      const double depth = e->place[i].depth;
+      e->order[at] = i;
+      position[i] = (uint32_t)at;
+      e->group[at] = (unsigned char)lung;
+      e->part[at] = e->content->part[i];
+      e->depth[at] = (float)depth;
+      for (size_t k = 0; k < 3; ++k) {
+        e->vertices[3 * at + k] = (float)e->content->points[3 * i + k];
+      }
+      ++at;
+      ++report->in_lung[lung];
+      report->outside += depth < 0.0;
+      if (-depth > report->farthest_mm) {
+        report->farthest_mm = -depth;
+        report->farthest = i;
+      }
+    }
+  }
+  for (size_t i = 0; i < 3 * e->content->triangle_count; ++i) {
+    e->triangles[i] = position[e->content->triangles[i]];
+  }
+  free(position);
+  report->count = n;
+  return SUPINE_OK;
+}
+
+/* Motion of the surface at a place, linear in its triangle. */
+static void surface_motion(const embedding *e, const supine_inside_shell *shell,
+                           const double *displacement, const supine_inside_place *place,
+                           double *motion) {
+  const uint32_t *corner = shell->triangles + 3 * place->triangle;
+  for (size_t r = 0; r < e->columns; ++r) {
+    motion[r] = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      motion[r] += place->barycentric[k] * displacement[corner[k] * e->columns + r];
+    }
+  }
+}
+
+/* Points [begin, end) of the order, all of one lung, at most BLOCK. In `space`: positions
+ * [2 BLOCK, 3], values [2 BLOCK, R]; the second half are the surface's points nearest to those
+ * whose distance is less than `reach`. */
+static supine_status move_block(embedding *e, const supine_inside_shell *shell,
+                                const double *displacement, const supine_inside_biharmonic *fit,
+                                double reach, size_t begin, size_t end, double *space,
+                                supine_error *error) {
+  double *positions = space;
+  double *values = space + (size_t)6 * BLOCK;
+  const size_t count = end - begin;
+  size_t near[BLOCK];
+  size_t near_count = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const supine_inside_place *place = &e->place[e->order[begin + i]];
+    const bool clamp = e->options->clamp && place->depth < 0.0;
+    memcpy(positions + 3 * i, clamp ? place->nearest : place->point, sizeof place->point);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const supine_inside_place *place = &e->place[e->order[begin + i]];
+    if (fabs(place->depth) < reach || (e->options->clamp && place->depth < 0.0)) {
+      memcpy(positions + 3 * (count + near_count), place->nearest, sizeof place->nearest);
+      near[near_count++] = i;
+    }
+  }
+  const supine_status status =
+      supine_inside_biharmonic_evaluate(fit, count + near_count, positions, values, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  double *motion = values + (size_t)2 * BLOCK * e->columns;
+  for (size_t j = 0; j < near_count; ++j) {
+    const supine_inside_place *place = &e->place[e->order[begin + near[j]]];
+    const bool clamp = e->options->clamp && place->depth < 0.0;
+    const double t = clamp ? 0.0 : fabs(place->depth) / reach;
+    const double weight = (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);
+    const double *at_surface = values + (count + j) * e->columns;
+    double *value = values + near[j] * e->columns;
+    surface_motion(e, shell, displacement, place, motion);
+    for (size_t r = 0; r < e->columns; ++r) {
+      value[r] += weight * (motion[r] - at_surface[r]);
+    }
+  }
+  for (size_t i = 0; i < count * e->columns; ++i) {
+    e->coefficients[begin * e->columns + i] = (float)values[i];
+  }
+  return SUPINE_OK;
+}
+
+/* Adds to sums of squares what the interpolation leaves at the surface's vertices, and their
+ * motion.
+ */
+static supine_status residual(const embedding *e, const supine_inside_shell *shell,
+                              const double *displacement, const supine_inside_biharmonic *fit,
+                              double *space, double sums[2], supine_error *error) {
+  for (size_t first = 0; first < shell->vertex_count; first += BLOCK) {
+    const size_t left = shell->vertex_count - first;
+    const size_t count = left < BLOCK ? left : BLOCK;
+    const supine_status status =
+        supine_inside_biharmonic_evaluate(fit, count, shell->vertices + 3 * first, space, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    for (size_t i = 0; i < count * e->columns; ++i) {
+      const double wanted = displacement[first * e->columns + i];
+      sums[0] += (space[i] - wanted) * (space[i] - wanted);
+      sums[1] += wanted * wanted;
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end, double sums[2],
+                                supine_inside_report *report, supine_error *error) {
+  static const double reach_spacings = 2.0; /* what a wave of the centres' spacing fades out in */
+  const supine_inside_shell *shell = &e->shells->shell[lung];
+  const size_t centres =
+      e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
+  double *displacement = malloc(shell->vertex_count * e->columns * sizeof *displacement);
+  double *space =
+      malloc(((size_t)6 * BLOCK + (2 * (size_t)BLOCK + 1) * e->columns) * sizeof *space);
+  supine_inside_biharmonic fit = {0};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (displacement == NULL || space == NULL) {
+    (void)supine_error_set(error, status, "no memory for the motion of %zu vertices",
+                           shell->vertex_count);
+    goto cleanup;
+  }
+  supine_inside_shell_displacement(e->shells, lung, displacement);
+  status = supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
+                                        displacement, centres, &fit, error);
+  if (status == SUPINE_OK) {
+    status = residual(e, shell, displacement, &fit, space, sums, error);
+  }
+  const double reach = reach_spacings * (fit.spacing + shell->edge);
+  for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
+    status = move_block(e, shell, displacement, &fit, reach, at,
+                        at + BLOCK < end ? at + BLOCK : end, space, error);
+  }
+  report->centres += fit.count;
+  report->surface += shell->vertex_count;
+cleanup:
+  supine_inside_biharmonic_free(&fit);
+  free(displacement);
+  free(space);
+  return status;
+}
+
+/* Metadata of the surface that do not hold for what is inside. */
+static bool dropped(const char *key) {
+  static const char *const keys[] = {
+      "kind", "made_by", "checksum", "version", "turned_over_percent", "mode_count"};
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    if (strcmp(key, keys[i]) == 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* The surface's metadata, then those of the content. */
+static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
+                                size_t tensor_count, supine_error *error) {
+  enum { OWN = 6 };
+  size_t given = 0;
+  const supine_metadata *from = supine_basis_all_metadata(e->shells->basis, &given);
+  supine_metadata *metadata = malloc((given + OWN) * sizeof *metadata);
+  if (metadata == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  size_t count = 0;
+  for (size_t i = 0; i < given; ++i) {
+    if (!dropped(from[i].key)) {
+      metadata[count++] = from[i];
+    }
+  }
+  char modes[24];
+  (void)snprintf(modes, sizeof modes, "%zu", e->columns / 3);
+  const supine_inside_content *content = e->content;
+  metadata[count++] = (supine_metadata){"version", "2"};
+  metadata[count++] = (supine_metadata){"kind", "vector"};
+  metadata[count++] = (supine_metadata){"mode_count", modes};
+  metadata[count++] = (supine_metadata){"content", content->part_count == 0      ? "grid"
+                                                   : content->triangle_count > 0 ? "mesh"
+                                                                                 : "points"};
+  metadata[count++] = (supine_metadata){"outside", e->options->clamp ? "clamped" : "extrapolated"};
+  metadata[count++] = (supine_metadata){
+      "made_by", e->options->made_by != NULL ? e->options->made_by : "supine_inside_embed"};
+  const supine_status status =
+      supine_writer_safetensors_write(path, tensors, tensor_count, metadata, count, error);
+  free(metadata);
+  return status;
+}
+
+static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
+  /* What the surface and what is inside share. */
+  static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
+                                       "resting_volume"};
+  const supine_inside_content *content = e->content;
+  const supine_inside_grid *grid = &content->grid;
+  const size_t n = content->count;
+  const double frame[4][3] = {{grid->origin[0], grid->origin[1], grid->origin[2]},
+                              {grid->step[0][0], grid->step[0][1], grid->step[0][2]},
+                              {grid->step[1][0], grid->step[1][1], grid->step[1][2]},
+                              {grid->step[2][0], grid->step[2][1], grid->step[2][2]}};
+  const uint32_t size[3] = {(uint32_t)grid->size[0], (uint32_t)grid->size[1],
+                            (uint32_t)grid->size[2]};
+  supine_tensor tensors[16] = {
+      {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
+      {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
+      {"lung", SUPINE_U8, 1, {n}, e->group},
+      {"coefficients", SUPINE_F32, 3, {n, 3, e->columns / 3}, e->coefficients},
+      {"part", SUPINE_U32, 1, {n}, e->part},
+      {"depth", SUPINE_F32, 1, {n}, e->depth},
+  };
+  size_t count = 6;
+  for (size_t i = 0; i < sizeof shared / sizeof *shared; ++i) {
+    const supine_tensor *tensor = supine_basis_tensor(e->shells->basis, shared[i]);
+    if (tensor != NULL) {
+      tensors[count++] = *tensor;
+    }
+  }
+  if (content->part_count == 0) {
+    tensors[count++] = (supine_tensor){"grid", SUPINE_F64, 2, {4, 3}, frame};
+    tensors[count++] = (supine_tensor){"grid_size", SUPINE_U32, 1, {3}, size};
+  } else {
+    tensors[count++] =
+        (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
+  }
+  return write_file(e, path, tensors, count, error);
+}
+
+static bool allocate(embedding *e) {
+  const size_t n = e->content->count;
+  e->place = malloc(n * sizeof *e->place);
+  e->lung = malloc(n);
+  e->order = malloc(n * sizeof *e->order);
+  e->vertices = malloc(3 * n * sizeof *e->vertices);
+  e->coefficients = malloc(n * e->columns * sizeof *e->coefficients);
+  e->depth = malloc(n * sizeof *e->depth);
+  e->part = malloc(n * sizeof *e->part);
+  e->group = malloc(n);
+  e->triangles = malloc((3 * e->content->triangle_count + 1) * sizeof *e->triangles);
+  return e->place != NULL && e->lung != NULL && e->order != NULL && e->vertices != NULL &&
+         e->coefficients != NULL && e->depth != NULL && e->part != NULL && e->group != NULL &&
+         e->triangles != NULL;
+}
+
+supine_status supine_inside_embed(const supine_inside_shells *shells,
+                                  const supine_inside_content *content,
+                                  const supine_inside_options *options, const char *path,
+                                  supine_inside_report *report, supine_error *error) {
+  enum { GRAIN = 256 };
+  embedding e = {.shells = shells,
+                 .content = content,
+                 .options = options,
+                 .columns = 3 * supine_basis_get_info(shells->basis)->mode_count};
+  supine_status status = SUPINE_OK;
+  *report = (supine_inside_report){0};
+  if (content->count == 0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: no point");
+  }
+  if (!allocate(&e)) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points of %zu coefficients",
+                         content->count, e.columns);
+    goto cleanup;
+  }
+  supine_parallel_for(content->count, GRAIN, 0, find_places, &e);
+  if (sort_points(&e, report) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to sort %zu points",
+                              content->count);
+    goto cleanup;
+  }
+  double sums[2] = {0.0, 0.0};
+  size_t begin = 0;
+  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
+    const size_t end = begin + report->in_lung[lung];
+    if (begin < end) {
+      status = embed_lung(&e, lung, begin, end, sums, report, error);
+    }
+    begin = end;
+  }
+  if (status == SUPINE_OK) {
+    report->left_percent = sums[1] > 0.0 ? 100.0 * sqrt(sums[0] / sums[1]) : 0.0;
+    status = write_content(&e, path, error);
+  }
+cleanup:
+  free(e.place);
+  free(e.lung);
+  free(e.order);
+  free(e.vertices);
+  free(e.coefficients);
+  free(e.depth);
+  free(e.part);
+  free(e.group);
+  free(e.triangles);
+  return status;
+}

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Choosing the nodes of a grid that lie inside, row by row. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "sh/base/parallel.h"
+
+#include "precompute/inside/grid.h"
+
+static const double nodes_max = 2147483648.0;
+
+static void node_point(const supine_inside_grid *grid, const double node[3], double point[3]) {
+  for (int k = 0; k < 3; ++k) {
+    point[k] = grid->origin[k] + node[0] * grid->step[0][k] + node[1] * grid->step[1][k] +
+               node[2] * grid->step[2][k];
+  }
+}
+
+static double step_length(const supine_inside_grid *grid, int axis) {
+  const double *s = grid->step[axis];
+  return hypot(hypot(s[0], s[1]), s[2]);
+}
+
+/* Coordinates of a point in steps of the grid: Cramer's rule. */
+static void grid_coordinates(const supine_inside_grid *grid, const double point[3],
+                             double node[3]) {
+  const double *a = grid->step[0];
+  const double *b = grid->step[1];
+  const double *c = grid->step[2];
+  double x[3];
+  for (int k = 0; k < 3; ++k) {
+    x[k] = point[k] - grid->origin[k];
+  }
+  const double *columns[4] = {a, b, c, x};
+  double determinant[4];
+  for (int replaced = 0; replaced < 4; ++replaced) { /* the fourth: none */
+    const double *u = columns[replaced == 0 ? 3 : 0];
+    const double *v = columns[replaced == 1 ? 3 : 1];
+    const double *w = columns[replaced == 2 ? 3 : 2];
+    determinant[replaced] = u[0] * (v[1] * w[2] - v[2] * w[1]) +
+                            u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    node[k] = determinant[k] / determinant[3];
+  }
+}
+
+/* The box of the lungs and the margin in steps of `grid`. */
+static void cover(const supine_inside_shells *shells, const supine_inside_grid *grid, double margin,
+                  double low[3], double high[3]) {
+  for (int k = 0; k < 3; ++k) {
+    low[k] = INFINITY;
+    high[k] = -INFINITY;
+  }
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    const supine_inside_shell *shell = &shells->shell[lung];
+    for (size_t i = 0; i < shell->vertex_count; ++i) {
+      double node[3];
+      grid_coordinates(grid, shell->vertices + 3 * i, node);
+      for (int k = 0; k < 3; ++k) {
+        low[k] = fmin(low[k], node[k]);
+        high[k] = fmax(high[k], node[k]);
+      }
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    low[k] -= margin / step_length(grid, k);
+    high[k] += margin / step_length(grid, k);
+  }
+}
+
+/* The grid that covers the lungs: a box of its own, or every n-th node of another's. */
+static supine_status make_grid(const supine_inside_shells *shells, const supine_inside_grid *like,
+                               double spacing, double margin, supine_inside_grid *grid,
+                               supine_error *error) {
+  static const supine_inside_grid plain = {
+      .step = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+  supine_inside_grid from = like != NULL ? *like : plain;
+  double low[3];
+  double high[3];
+  double first[3];
+  double nodes = 1.0;
+  cover(shells, &from, margin, low, high);
+  for (int k = 0; k < 3; ++k) {
+    const double every = like != NULL ? fmax(1.0, rint(spacing / step_length(&from, k))) : spacing;
+    if (like != NULL) {
+      low[k] = fmax(low[k], 0.0);
+      high[k] = fmin(high[k], (double)from.size[k] - 1.0);
+    }
+    first[k] = every * floor(low[k] / every);
+    const double count = ceil((high[k] - first[k]) / every) + 1.0;
+    if (like != NULL && !(high[k] >= low[k])) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "the image does not show the lungs: are its axes, and those of the "
+                              "lungs' meshes, what they say?");
+    }
+    nodes *= count;
+    grid->size[k] = (size_t)fmin(count, nodes_max);
+    for (int a = 0; a < 3; ++a) {
+      grid->step[k][a] = every * from.step[k][a];
+    }
+  }
+  if (!(nodes < nodes_max)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a grid of %g mm has %.3g nodes; give a larger spacing", spacing,
+                            nodes);
+  }
+  node_point(&from, first, grid->origin);
+  return SUPINE_OK;
+}
+
+/* Which lung each node is of, and whether it is to be kept. */
+typedef struct search {
+  const supine_inside_shells *shells;
+  const supine_inside_grid *grid;
+  double limit; /* mm outside that are kept */
+  unsigned char *keep;
+} search;
+
+static void search_rows(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const search *work = context;
+  const size_t *size = work->grid->size;
+  for (size_t row = begin; row < end; ++row) {
+    supine_inside_place places[2][SUPINE_LUNGS_MAX];
+    for (size_t i = 0; i < size[0]; ++i) {
+      const double node[3] = {(double)i, (double)(row % size[1]), (double)(row / size[1])};
+      double point[3];
+      supine_inside_place *place = places[i % 2];
+      node_point(work->grid, node, point);
+      const size_t lung =
+          supine_inside_shells_find(work->shells, point, i > 0 ? places[(i + 1) % 2] : NULL, place);
+      work->keep[row * size[0] + i] = place[lung].depth > 0.0            ? 2
+                                      : place[lung].depth > -work->limit ? 1
+                                                                         : 0;
+    }
+  }
+}
+
+static supine_status take_nodes(const supine_inside_grid *grid, const unsigned char *keep,
+                                supine_inside_content *content, supine_error *error) {
+  const size_t nodes = grid->size[0] * grid->size[1] * grid->size[2];
+  size_t count = 0;
+  size_t inside = 0;
+  for (size_t i = 0; i < nodes; ++i) {
+    count += keep[i] != 0;
+    inside += keep[i] == 2;
+  }
+  if (inside == 0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "no node of the grid is inside a lung: give a smaller spacing, or an "
+                            "image that shows the lungs");
+  }
+  content->points = malloc(3 * count * sizeof *content->points);
+  content->part = malloc(count * sizeof *content->part);
+  if (content->points == NULL || content->part == NULL) {
+    supine_inside_content_free(content);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes", count);
+  }
+  content->grid = *grid;
+  for (size_t i = 0; i < nodes; ++i) {
+    if (keep[i] != 0) {
+      const double node[3] = {(double)(i % grid->size[0]),
+                              (double)(i / grid->size[0] % grid->size[1]),
+                              (double)(i / grid->size[0] / grid->size[1])};
+      node_point(grid, node, content->points + 3 * content->count);
+      content->part[content->count++] = (uint32_t)i;
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_inside_content_grid(const supine_inside_shells *shells,
+                                         const supine_inside_grid *like, double spacing,
+                                         double margin, supine_inside_content *content,
+                                         supine_error *error) {
+  supine_inside_grid grid = {0};
+  if (!(spacing > 0.0) || !isfinite(spacing)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a grid's spacing must be positive, not %g mm", spacing);
+  }
+  supine_status status = make_grid(shells, like, spacing, margin, &grid, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  double diagonal = 0.0;
+  for (int k = 0; k < 3; ++k) { /* the longest diagonal is no longer than this, however oblique */
+    diagonal += step_length(&grid, k);
+  }
+  const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
+  search work = {shells, &grid, diagonal, malloc(nodes)};
+  if (work.keep == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a grid of %zu nodes", nodes);
+  }
+  supine_parallel_for(grid.size[1] * grid.size[2], 1, 0, search_rows, &work);
+  status = take_nodes(&grid, work.keep, content, error);
+  free(work.keep);
+  return status;
+}

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The surfaces of a basis, lung by lung. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "precompute/inside/shells.h"
+
+static double mean_edge(const supine_inside_shell *shell) {
+  double sum = 0.0;
+  for (size_t i = 0; i < 3 * shell->triangle_count; ++i) {
+    const size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    const double *a = shell->vertices + 3 * (size_t)shell->triangles[i];
+    const double *b = shell->vertices + 3 * (size_t)shell->triangles[next];
+    sum += hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]);
+  }
+  return sum / (double)(3 * shell->triangle_count);
+}
+
+static supine_status create_shell(const supine_basis_info *info, size_t lung,
+                                  supine_inside_shell *shell, supine_error *error) {
+  const size_t begin = info->lung_begin[lung];
+  const size_t end = info->lung_begin[lung + 1];
+  shell->begin = begin;
+  shell->vertex_count = end - begin;
+  shell->vertices = malloc(3 * shell->vertex_count * sizeof *shell->vertices);
+  shell->triangles = malloc(3 * info->triangle_count * sizeof *shell->triangles);
+  if (shell->vertices == NULL || shell->triangles == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the surface of %zu vertices",
+                            shell->vertex_count);
+  }
+  for (size_t i = 0; i < 3 * shell->vertex_count; ++i) {
+    shell->vertices[i] = (double)info->vertices[3 * begin + i];
+  }
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    const uint32_t *corner = info->triangles + 3 * t;
+    if (corner[0] >= begin && corner[0] < end) { /* triangles join vertices of one lung */
+      for (size_t k = 0; k < 3; ++k) {
+        shell->triangles[3 * shell->triangle_count + k] = corner[k] - (uint32_t)begin;
+      }
+      ++shell->triangle_count;
+    }
+  }
+  if (shell->triangle_count == 0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "lung %s has no triangles: nothing can be inside it",
+                            info->lung_names[lung]);
+  }
+  shell->edge = mean_edge(shell);
+  return supine_inside_surface_create(shell->vertices, shell->triangle_count, shell->triangles,
+                                      &shell->surface, error);
+}
+
+/* Do all corners of every triangle lie in one lung? */
+static bool separate(const supine_basis_info *info) {
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    const size_t begin = info->lung_begin[lung];
+    const size_t end = info->lung_begin[lung + 1];
+    for (size_t t = 0; t < info->triangle_count; ++t) {
+      const uint32_t *corner = info->triangles + 3 * t;
+      size_t here = 0;
+      for (size_t k = 0; k < 3; ++k) {
+        here += corner[k] >= begin && corner[k] < end;
+      }
+      if (here != 0 && here != 3) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
+  if (supine_basis_metadata(basis, "content") != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis holds %s inside lungs already: give that of the lungs' "
+                            "surface",
+                            supine_basis_metadata(basis, "content"));
+  }
+  if (!separate(info)) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "a triangle of the basis joins two lungs: make the basis anew");
+  }
+  supine_status status = SUPINE_OK;
+  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
+    status = create_shell(info, lung, &shells->shell[lung], error);
+  }
+  if (status != SUPINE_OK) {
+    supine_inside_shells_free(shells);
+  }
+  return status;
+}
+
+void supine_inside_shells_free(supine_inside_shells *shells) {
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    supine_inside_shell *shell = &shells->shell[lung];
+    free(shell->vertices);
+    free(shell->triangles);
+    supine_inside_surface_destroy(shell->surface);
+  }
+  *shells = (supine_inside_shells){0};
+}
+
+void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
+                                      double *displacement) {
+  const supine_basis_info *info = supine_basis_get_info(shells->basis);
+  const supine_inside_shell *shell = &shells->shell[lung];
+  const size_t modes = info->mode_count;
+  for (size_t i = 0; i < shell->vertex_count; ++i) {
+    const size_t vertex = shell->begin + i;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      double *row = displacement + (3 * i + axis) * modes;
+      for (size_t k = 0; k < modes; ++k) {
+        row[k] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
+                              : (double)info->direction[3 * vertex + axis] *
+                                    (double)info->coefficients[vertex * modes + k];
+      }
+    }
+  }
+}
+
+size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
+                                 const supine_inside_place *near, supine_inside_place *place) {
+  size_t best = 0;
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    place[lung] = supine_inside_surface_find(shells->shell[lung].surface, point,
+                                             near != NULL ? &near[lung] : NULL);
+    best = place[lung].depth > place[best].depth ? lung : best;
+  }
+  return best;
+}

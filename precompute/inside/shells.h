@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The surfaces of an open basis, lung by lung, to tell what is inside which. */
+#ifndef SUPINE_INSIDE_SHELLS_H
+#define SUPINE_INSIDE_SHELLS_H
+
+#include <supine/runtime.h>
+
+#include "precompute/inside/surface.h"
+
+/** One lung's surface. */
+typedef struct supine_inside_shell {
+  size_t begin; /**< the basis's first vertex of it */
+  size_t vertex_count;
+  double *vertices; /**< [vertex_count, 3] mm */
+  size_t triangle_count;
+  uint32_t *triangles; /**< [triangle_count, 3], vertices counted from `begin` */
+  double edge;         /**< mean length of an edge, mm */
+  supine_inside_surface *surface;
+} supine_inside_shell;
+
+typedef struct supine_inside_shells {
+  const supine_basis *basis; /**< kept by the caller */
+  size_t count;              /**< lungs, G */
+  supine_inside_shell shell[SUPINE_LUNGS_MAX];
+} supine_inside_shells;
+
+/** @param shells  written; supine_inside_shells_free releases it
+ * @retval SUPINE_ERROR_MESH    a lung without a triangle
+ * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error);
+void supine_inside_shells_free(supine_inside_shells *shells);
+
+/** Displacements of a lung's vertices at weight and scale 1 of each mode.
+ * @param displacement  [vertex_count, 3, K] mm, written */
+void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
+                                      double *displacement);
+
+/** The lung that a point is in, or where it is in none, the nearest.
+ * @param near   [G] places of a point near by; NULL where none is known
+ * @param place  [G], written */
+size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
+                                 const supine_inside_place *near, supine_inside_place *place);
+
+#endif

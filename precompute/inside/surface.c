@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A tree of boxes over triangles: nearest points and winding numbers. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/inside/surface.h"
+
+enum { LEAF = 8 };
+
+/* Boxes seen from farther than this many of their radii are dipoles: errs by less than 1 % of the
+ * winding number, where 50 % decide. */
+static const double dipole_distance = 2.0;
+/* A point this near, mm, is on the surface, whose positions are float32: not outside. */
+static const double on_surface = 1e-3;
+
+typedef struct node {
+  double low[3], high[3];
+  double centre[3]; /* of area */
+  double dipole[3]; /* sum of the triangles' normals times area */
+  double radius;    /* about the centre */
+  size_t begin, end;
+  size_t right; /* the other child; the first follows the node; 0: a leaf */
+} node;
+
+struct supine_inside_surface {
+  const double *vertices;
+  const uint32_t *triangles;
+  size_t *order; /* triangles, leaf by leaf */
+  node *nodes;
+  size_t node_count;
+};
+
+static void subtract(const double a[3], const double b[3], double out[3]) {
+  for (int k = 0; k < 3; ++k) {
+    out[k] = a[k] - b[k];
+  }
+}
+
+static double dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double a[3], const double b[3], double out[3]) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void corners(const supine_inside_surface *s, size_t triangle, const double *corner[3]) {
+  for (int k = 0; k < 3; ++k) {
+    corner[k] = s->vertices + 3 * (size_t)s->triangles[3 * triangle + (size_t)k];
+  }
+}
+
+typedef struct keyed {
+  double key;
+  size_t triangle;
+} keyed;
+
+static int by_key(const void *a, const void *b) {
+  const double x = ((const keyed *)a)->key;
+  const double y = ((const keyed *)b)->key;
+  return (x > y) - (x < y);
+}
+
+static void measure(const supine_inside_surface *s, node *n) {
+  double total = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    n->low[k] = INFINITY;
+    n->high[k] = -INFINITY;
+    n->centre[k] = n->dipole[k] = 0.0;
+  }
+  for (size_t i = n->begin; i < n->end; ++i) {
+    const double *p[3];
+    double u[3];
+    double v[3];
+    double normal[3];
+    corners(s, s->order[i], p);
+    subtract(p[1], p[0], u);
+    subtract(p[2], p[0], v);
+    cross(u, v, normal);
+    const double area = 0.5 * sqrt(dot(normal, normal));
+    total += area;
+    for (int k = 0; k < 3; ++k) {
+      n->low[k] = fmin(n->low[k], fmin(p[0][k], fmin(p[1][k], p[2][k])));
+      n->high[k] = fmax(n->high[k], fmax(p[0][k], fmax(p[1][k], p[2][k])));
+      n->centre[k] += area * (p[0][k] + p[1][k] + p[2][k]) / 3.0;
+      n->dipole[k] += 0.5 * normal[k];
+    }
+  }
+  double square = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    n->centre[k] = total > 0.0 ? n->centre[k] / total : 0.5 * (n->low[k] + n->high[k]);
+    const double reach = fmax(n->high[k] - n->centre[k], n->centre[k] - n->low[k]);
+    square += reach * reach;
+  }
+  n->radius = sqrt(square);
+}
+
+/* Builds the node of triangles order[begin..end) and those below it. */
+static void build(supine_inside_surface *s, keyed *space, size_t begin, size_t end) {
+  node *n = &s->nodes[s->node_count++];
+  n->begin = begin;
+  n->end = end;
+  n->right = 0;
+  measure(s, n);
+  if (end - begin <= LEAF) {
+    return;
+  }
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) {
+    axis = n->high[k] - n->low[k] > n->high[axis] - n->low[axis] ? k : axis;
+  }
+  for (size_t i = begin; i < end; ++i) {
+    const double *p[3];
+    corners(s, s->order[i], p);
+    space[i] = (keyed){p[0][axis] + p[1][axis] + p[2][axis], s->order[i]};
+  }
+  qsort(space + begin, end - begin, sizeof *space, by_key);
+  for (size_t i = begin; i < end; ++i) {
+    s->order[i] = space[i].triangle;
+  }
+  const size_t middle = begin + (end - begin) / 2;
+  build(s, space, begin, middle);
+  n->right = s->node_count;
+  build(s, space, middle, end);
+}
+
+supine_status supine_inside_surface_create(const double *vertices, size_t count,
+                                           const uint32_t *triangles,
+                                           supine_inside_surface **surface, supine_error *error) {
+  supine_inside_surface *s = calloc(1, sizeof *s);
+  keyed *space = malloc(count * sizeof *space);
+  *surface = NULL;
+  if (s != NULL) {
+    s->vertices = vertices;
+    s->triangles = triangles;
+    s->order = malloc(count * sizeof *s->order);
+    s->nodes = malloc(2 * count * sizeof *s->nodes); /* a binary tree of at most `count` leaves */
+  }
+  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL) {
+    free(space);
+    supine_inside_surface_destroy(s);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a tree of %zu triangles",
+                            count);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    s->order[i] = i;
+  }
+  build(s, space, 0, count);
+  free(space);
+  *surface = s;
+  return SUPINE_OK;
+}
+
+void supine_inside_surface_destroy(supine_inside_surface *surface) {
+  if (surface != NULL) {
+    free(surface->order);
+    free(surface->nodes);
+    free(surface);
+  }
+}
+
+/* Weight of the second of two points, nearest to the first one's origin: -w.e / e.e in 0 to 1. */
+static double along(const double offset[3], const double edge[3]) {
+  const double length = dot(edge, edge);
+  return length > 0.0 ? fmin(fmax(dot(offset, edge) / length, 0.0), 1.0) : 0.0;
+}
+
+/* Barycentric coordinates of the triangle's point nearest to x: inside it, or on an edge. */
+static void nearest_in_triangle(const double *const p[3], const double x[3], double b[3]) {
+  double u[3];
+  double v[3];
+  double w[3];
+  subtract(p[1], p[0], u);
+  subtract(p[2], p[0], v);
+  subtract(x, p[0], w);
+  const double uu = dot(u, u);
+  const double uv = dot(u, v);
+  const double vv = dot(v, v);
+  const double uw = dot(u, w);
+  const double vw = dot(v, w);
+  const double determinant = uu * vv - uv * uv;
+  b[1] = (vv * uw - uv * vw) / determinant;
+  b[2] = (uu * vw - uv * uw) / determinant;
+  b[0] = 1.0 - b[1] - b[2];
+  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false where the triangle has no area */
+    return;
+  }
+  double best = INFINITY;
+  for (int k = 0; k < 3; ++k) {
+    const double *from = p[k];
+    const double *to = p[(k + 1) % 3];
+    double edge[3];
+    double offset[3];
+    subtract(to, from, edge);
+    subtract(x, from, offset);
+    const double t = along(offset, edge);
+    double square = 0.0;
+    for (int a = 0; a < 3; ++a) {
+      const double apart = offset[a] - t * edge[a];
+      square += apart * apart;
+    }
+    if (square < best) {
+      best = square;
+      b[k] = 1.0 - t;
+      b[(k + 1) % 3] = t;
+      b[(k + 2) % 3] = 0.0;
+    }
+  }
+}
+
+static double box_square(const node *n, const double x[3]) {
+  double square = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double apart = fmax(0.0, fmax(n->low[k] - x[k], x[k] - n->high[k]));
+    square += apart * apart;
+  }
+  return square;
+}
+
+/* The nearest triangle below node `at`, where it is nearer than the square *best. */
+static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
+                   supine_inside_place *place) {
+  const node *n = &s->nodes[at];
+  if (n->right != 0) {
+    size_t first = at + 1;
+    size_t second = n->right;
+    double near = box_square(&s->nodes[first], x);
+    double far = box_square(&s->nodes[second], x);
+    if (far < near) {
+      const size_t swap = first;
+      first = second;
+      second = swap;
+      const double square = near;
+      near = far;
+      far = square;
+    }
+    if (near < *best) {
+      search(s, first, x, best, place);
+    }
+    if (far < *best) {
+      search(s, second, x, best, place);
+    }
+    return;
+  }
+  for (size_t i = n->begin; i < n->end; ++i) {
+    const double *p[3];
+    double b[3];
+    double q[3];
+    double apart[3];
+    corners(s, s->order[i], p);
+    nearest_in_triangle(p, x, b);
+    for (int k = 0; k < 3; ++k) {
+      q[k] = b[0] * p[0][k] + b[1] * p[1][k] + b[2] * p[2][k];
+    }
+    subtract(x, q, apart);
+    const double square = dot(apart, apart);
+    if (square < *best) {
+      *best = square;
+      place->triangle = s->order[i];
+      memcpy(place->nearest, q, sizeof q);
+      memcpy(place->barycentric, b, sizeof b);
+    }
+  }
+}
+
+/* Solid angle of a triangle, 4 pi all round. */
+static double solid_angle(const double *const p[3], const double x[3]) {
+  double a[3];
+  double b[3];
+  double c[3];
+  double bc[3];
+  subtract(p[0], x, a);
+  subtract(p[1], x, b);
+  subtract(p[2], x, c);
+  cross(b, c, bc);
+  const double la = sqrt(dot(a, a));
+  const double lb = sqrt(dot(b, b));
+  const double lc = sqrt(dot(c, c));
+  return 2.0 * atan2(dot(a, bc), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+}
+
+/* Sum of solid angles below node `at`. */
+static double angle(const supine_inside_surface *s, size_t at, const double x[3]) {
+  const node *n = &s->nodes[at];
+  double apart[3];
+  subtract(n->centre, x, apart);
+  const double distance = sqrt(dot(apart, apart));
+  if (distance > dipole_distance * n->radius) {
+    return dot(n->dipole, apart) / (distance * distance * distance);
+  }
+  if (n->right != 0) {
+    return angle(s, at + 1, x) + angle(s, n->right, x);
+  }
+  double sum = 0.0;
+  for (size_t i = n->begin; i < n->end; ++i) {
+    const double *p[3];
+    corners(s, s->order[i], p);
+    sum += solid_angle(p, x);
+  }
+  return sum;
+}
+
+supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
+                                               const double point[3],
+                                               const supine_inside_place *near) {
+  static const double half = 6.283185307179586; /* of 4 pi */
+  supine_inside_place place = {.point = {point[0], point[1], point[2]}};
+  double best = INFINITY;
+  double moved = INFINITY;
+  if (near != NULL) { /* the surface is no farther than from there, and the way */
+    double way[3];
+    subtract(point, near->point, way);
+    moved = sqrt(dot(way, way));
+    const double limit = (fabs(near->depth) + moved) * (1.0 + 1e-9) + 1e-9;
+    best = limit * limit;
+  }
+  search(surface, 0, point, &best, &place);
+  const double distance = sqrt(best);
+  const bool inside =
+      distance <= on_surface ||
+      (near != NULL && moved < fabs(near->depth) ? near->depth > 0.0 /* no surface lies between */
+                                                 : angle(surface, 0, point) > half);
+  place.depth = inside ? distance : -distance;
+  return place;
+}

@@ -1,0 +1,597 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What is carried along inside the lungs: who is inside, how it moves, what the file holds. */
+#include "inside_helpers.h"
+
+#include "precompute/inside/biharmonic.h"
+#include "precompute/inside/embed.h"
+#include "precompute/inside/grid.h"
+
+static char folder[] = "/tmp/supine-inside-XXXXXX";
+static char surface_path[64];
+static char inside_path[64];
+static supine_basis *surface;
+static supine_inside_shells shells;
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(surface_path, sizeof surface_path, "%s/surface", folder);
+  (void)snprintf(inside_path, sizeof inside_path, "%s/inside", folder);
+  helper_write_basis(surface_path, 10, 2); /* 1,002 vertices each */
+  surface = helper_open(surface_path);
+  return supine_inside_shells_create(surface, &shells, NULL) == SUPINE_OK ? 0 : -1;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  char command[64];
+  supine_inside_shells_free(&shells);
+  supine_basis_close(surface);
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c) */
+}
+
+static double distance(const double a[3], const double b[3]) {
+  return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+}
+
+/* A point of the surface of a lung, in its triangle. */
+static void random_surface_point(const supine_inside_shell *shell, uint64_t *seed, double p[3],
+                                 size_t corner[3], double weight[3]) {
+  const size_t t = (size_t)(helper_random(seed) * (double)shell->triangle_count);
+  weight[1] = helper_random(seed);
+  weight[2] = helper_random(seed);
+  if (weight[1] + weight[2] > 1.0) {
+    weight[1] = 1.0 - weight[1];
+    weight[2] = 1.0 - weight[2];
+  }
+  weight[0] = 1.0 - weight[1] - weight[2];
+  p[0] = p[1] = p[2] = 0.0;
+  for (size_t c = 0; c < 3; ++c) {
+    corner[c] = shell->triangles[3 * t + c];
+    for (size_t k = 0; k < 3; ++k) {
+      p[k] += weight[c] * shell->vertices[3 * corner[c] + k];
+    }
+  }
+}
+
+/* A lump's points are its centre's share of the way to the surface: inside below 1. */
+static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3]) {
+  const double centre[3] = {lung == 0 ? 71.3 : -72.9, 3.1, -40.7};
+  size_t corner[3];
+  double weight[3];
+  random_surface_point(&shells.shell[lung], seed, p, corner, weight);
+  for (int k = 0; k < 3; ++k) {
+    p[k] = centre[k] + share * (p[k] - centre[k]);
+  }
+}
+
+/* The nearest point of a triangle by halving the barycentric square: slow and simple. */
+static double slow_distance(const supine_inside_shell *shell, const double x[3]) {
+  double best = INFINITY;
+  for (size_t t = 0; t < shell->triangle_count; ++t) {
+    const double *p[3];
+    for (size_t c = 0; c < 3; ++c) {
+      p[c] = shell->vertices + 3 * (size_t)shell->triangles[3 * t + c];
+    }
+    double low = 0.0;
+    double high = 1.0;
+    double found = INFINITY;
+    for (int i = 0; i < 60; ++i) { /* convex in each of the two */
+      double at[2];
+      for (int side = 0; side < 2; ++side) {
+        const double a = low + (side + 1) * (high - low) / 3.0;
+        double square = 0.0; /* nearest b for this a, on the segment across the triangle */
+        double along = 0.0;
+        double length = 0.0;
+        for (int k = 0; k < 3; ++k) {
+          const double from = p[0][k] + a * (p[1][k] - p[0][k]);
+          const double way = (1.0 - a) * (p[2][k] - p[0][k]);
+          along += (x[k] - from) * way;
+          length += way * way;
+        }
+        const double b = length > 0.0 ? fmin(fmax(along / length, 0.0), 1.0) : 0.0;
+        for (int k = 0; k < 3; ++k) {
+          const double q = p[0][k] + a * (p[1][k] - p[0][k]) + b * (1.0 - a) * (p[2][k] - p[0][k]);
+          square += (x[k] - q) * (x[k] - q);
+        }
+        at[side] = sqrt(square);
+        found = fmin(found, at[side]);
+      }
+      if (at[0] < at[1]) {
+        high = low + 2.0 * (high - low) / 3.0;
+      } else {
+        low += (high - low) / 3.0;
+      }
+    }
+    best = fmin(best, found);
+  }
+  return best;
+}
+
+static void test_surface_find_side_and_distance_of_random_points(void **state) {
+  (void)state;
+  uint64_t seed = 71;
+  for (int i = 0; i < 400; ++i) {
+    const double share = 1.7 * helper_random(&seed);
+    double p[3];
+    if (fabs(share - 1.0) < 0.02) { /* flat triangles cut corners of the round lump */
+      continue;
+    }
+    point_at_share(0, &seed, share, p);
+    const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, p, NULL);
+    assert_int_equal(place.depth > 0.0, share < 1.0);
+    assert_true(fabs(distance(p, place.nearest) - fabs(place.depth)) < 1e-9);
+    if (i < 40) {
+      /* The slow search ends at 1e-10 of an edge; distances off the minimum grow as its square. */
+      assert_true(fabs(slow_distance(&shells.shell[0], p) - fabs(place.depth)) < 1e-6);
+    }
+  }
+}
+
+static void test_surface_find_near_place_same_answer(void **state) {
+  (void)state;
+  uint64_t seed = 5;
+  supine_inside_place near = {0};
+  for (int i = 0; i < 500; ++i) {
+    double p[3];
+    if (i % 50 == 0) { /* a walk, begun anew now and then: the hint is then from far away */
+      point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
+    } else {
+      for (int k = 0; k < 3; ++k) {
+        p[k] = near.point[k] + 8.0 * random_signed(&seed);
+      }
+    }
+    const supine_inside_place alone = supine_inside_surface_find(shells.shell[0].surface, p, NULL);
+    const supine_inside_place hinted =
+        supine_inside_surface_find(shells.shell[0].surface, p, i > 0 ? &near : NULL);
+    assert_true(fabs(alone.depth - hinted.depth) <= 1e-9);
+    near = hinted;
+  }
+}
+
+static void test_surface_find_torn_surface_inside_stays_inside(void **state) {
+  (void)state;
+  const supine_inside_shell *shell = &shells.shell[0];
+  supine_inside_surface *torn = NULL;
+  uint64_t seed = 15; /* the first 12 triangles are missing */
+  assert_int_equal(supine_inside_surface_create(shell->vertices, shell->triangle_count - 12,
+                                                shell->triangles + 36, &torn, NULL),
+                   SUPINE_OK);
+  for (int i = 0; i < 200; ++i) {
+    double p[3];
+    const double share = i % 2 == 0 ? 0.8 * helper_random(&seed) : 1.3 + helper_random(&seed);
+    point_at_share(0, &seed, share, p);
+    assert_int_equal(supine_inside_surface_find(torn, p, NULL).depth > 0.0, share < 1.0);
+  }
+  supine_inside_surface_destroy(torn);
+}
+
+static void test_biharmonic_centres_and_affine_come_back(void **state) {
+  (void)state;
+  enum { COUNT = 300, COLUMNS = 4, CENTRES = 120 };
+  double points[3 * COUNT];
+  double values[COUNT * COLUMNS];
+  double found[COUNT * COLUMNS];
+  uint64_t seed = 9;
+  for (size_t i = 0; i < COUNT; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      points[3 * i + k] = 150.0 * random_signed(&seed) - 40.0;
+    }
+    helper_motion(0, points + 3 * i, values + COLUMNS * i);
+    values[COLUMNS * i + 3] = random_signed(&seed);
+  }
+  supine_inside_biharmonic fit;
+  assert_int_equal(
+      supine_inside_biharmonic_fit(COUNT, points, COLUMNS, values, CENTRES, &fit, NULL), SUPINE_OK);
+  assert_int_equal(fit.count, CENTRES);
+  assert_int_equal(supine_inside_biharmonic_evaluate(&fit, COUNT, points, found, NULL), SUPINE_OK);
+  double noise = 0.0;
+  for (size_t i = 0; i < COUNT; ++i) {
+    for (size_t k = 0; k < 3; ++k) { /* 60 mm, through a matrix of condition 1e5 or so */
+      assert_true(fabs(found[COLUMNS * i + k] - values[COLUMNS * i + k]) < 1e-9);
+    }
+    noise = fmax(noise, fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]));
+  }
+  assert_true(noise > 0.1); /* what is no centre is not met */
+  for (size_t j = 0; j < CENTRES; ++j) {
+    const size_t i = fit.chosen[j];
+    assert_true(fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]) < 1e-9);
+  }
+  supine_inside_biharmonic_free(&fit);
+}
+
+static void test_biharmonic_points_in_a_plane_refused(void **state) {
+  (void)state;
+  const double points[] = {0, 0, 1, 3, 0, 1, 0, 4, 1, 7, 8, 1, 2, 9, 1};
+  const double values[5] = {0};
+  supine_inside_biharmonic fit;
+  supine_error error;
+  assert_int_equal(supine_inside_biharmonic_fit(5, points, 1, values, 5, &fit, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  assert_non_null(strstr(error.message, "plane"));
+}
+
+/* Content of points at shares of the way to both lungs' surfaces. */
+static supine_inside_content made_points(size_t count, double lowest, double highest,
+                                         uint64_t seed) {
+  supine_inside_content content = {.count = count, .part_count = count};
+  content.points = malloc(3 * count * sizeof *content.points);
+  content.part = malloc(count * sizeof *content.part);
+  content.names = calloc(8, count);
+  char *at = content.names;
+  for (size_t i = 0; i < count; ++i) {
+    point_at_share(i % 2, &seed, lowest + (highest - lowest) * helper_random(&seed),
+                   content.points + 3 * i);
+    content.part[i] = (uint32_t)i;
+    at += sprintf(at, i > 0 ? "\np%zu" : "p%zu", i);
+  }
+  return content;
+}
+
+static supine_inside_report embed(const supine_inside_content *content, bool clamp,
+                                  size_t centres) {
+  const supine_inside_options options = {.clamp = clamp, .centres = centres};
+  supine_inside_report report;
+  supine_error error;
+  if (supine_inside_embed(&shells, content, &options, inside_path, &report, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return report;
+}
+
+/* Largest distance of embedded points from where one mode of the motion would put them. */
+static double farthest_from(const supine_inside_content *content, int mode) {
+  supine_basis *inside = helper_open(inside_path);
+  const double scales[2] = {1.3, 1.3};
+  double weights[HELPER_MODES] = {0.0};
+  weights[mode] = 1.0;
+  float *xyz = malloc(3 * content->count * sizeof *xyz);
+  supine_deform(inside, weights, scales, xyz);
+  const uint32_t *part = supine_basis_tensor(inside, "part")->data;
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  double largest = 0.0;
+  for (size_t i = 0; i < content->count; ++i) {
+    const double *p = content->points + 3 * (size_t)part[i];
+    double moved[3];
+    helper_motion(mode, p, moved);
+    for (int k = 0; k < 3; ++k) {
+      moved[k] = p[k] + 1.3 * (i < info->lung_begin[1] ? 1.0 : -0.7) * moved[k];
+    }
+    const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
+    largest = fmax(largest, distance(got, moved));
+  }
+  free(xyz);
+  supine_basis_close(inside);
+  return largest;
+}
+
+/* Affine: to the rounding of float32 at 200 mm. Quadratic, which a surface's values alone do not
+ * determine inside: 6.2 % of the largest motion here, at most. */
+static void test_embed_affine_exact_quadratic_near(void **state) {
+  (void)state;
+  supine_inside_content content = made_points(800, 0.0, 0.97, 21);
+  const supine_inside_report report = embed(&content, false, 0);
+  assert_int_equal(report.outside, 0);
+  assert_int_equal(report.in_lung[0], 400);
+  double largest = 0.0;
+  for (size_t i = 0; i < content.count; ++i) {
+    double u[3];
+    static const double nothing[3];
+    helper_motion(1, content.points + 3 * i, u);
+    largest = fmax(largest, 1.3 * distance(u, nothing));
+  }
+  assert_true(farthest_from(&content, 0) < 4.0 * 0x1p-24 * 256.0);
+  const double quadratic = farthest_from(&content, 1) / largest;
+  print_message("a quadratic motion: %.2f %% of the largest, which is %.1f mm\n", 100.0 * quadratic,
+                largest);
+  assert_true(quadratic < 0.065);
+  supine_inside_content_free(&content);
+}
+
+/* With few centres too: 0.01 mm on every vertex and in every triangle, for all modes at once. */
+static void test_embed_points_of_the_surface_move_with_it(void **state) {
+  (void)state;
+  enum { COUNT = 600 };
+  supine_inside_content content = made_points(COUNT, 1.0, 1.0, 33);
+  double target[3 * COUNT];
+  const double weights[HELPER_MODES] = {0.9, -1.1, 1.3};
+  const double scales[2] = {1.0, 1.7};
+  const size_t n = supine_basis_get_info(surface)->vertex_count;
+  float *moved = malloc(3 * n * sizeof *moved);
+  float *xyz = malloc((size_t)3 * COUNT * sizeof *xyz);
+  supine_deform(surface, weights, scales, moved);
+  uint64_t seed = 8;
+  for (size_t i = 0; i < COUNT; ++i) {
+    const supine_inside_shell *shell = &shells.shell[i % 2];
+    size_t corner[3];
+    double weight[3];
+    random_surface_point(shell, &seed, content.points + 3 * i, corner, weight);
+    for (size_t k = 0; k < 3; ++k) {
+      target[3 * i + k] = 0.0;
+      for (size_t c = 0; c < 3; ++c) {
+        target[3 * i + k] += weight[c] * (double)moved[3 * (shell->begin + corner[c]) + k];
+      }
+    }
+  }
+  for (size_t centres = 200; centres <= 2000; centres *= 10) {
+    const supine_inside_report report = embed(&content, false, centres);
+    assert_true(centres < 1002 ? report.left_percent > 0.1 : report.left_percent < 1e-6);
+    supine_basis *inside = helper_open(inside_path);
+    supine_deform(inside, weights, scales, xyz);
+    const uint32_t *part = supine_basis_tensor(inside, "part")->data;
+    for (size_t i = 0; i < COUNT; ++i) {
+      const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
+      assert_true(distance(got, target + 3 * (size_t)part[i]) < 0.01);
+    }
+    supine_basis_close(inside);
+  }
+  free(moved);
+  free(xyz);
+  supine_inside_content_free(&content);
+}
+
+static void test_embed_file_shares_weights_volume_and_metadata(void **state) {
+  (void)state;
+  supine_inside_content content = made_points(40, 0.2, 0.9, 2);
+  (void)embed(&content, false, 0);
+  supine_basis *inside = helper_open(inside_path);
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const double gravity[3] = {0.2, -0.9, 0.3};
+  double mine[HELPER_MODES];
+  double theirs[HELPER_MODES];
+  double scale[2];
+  assert_true(info->vector && info->has_volume);
+  assert_int_equal(info->triangle_count, 0);
+  assert_int_equal(info->lung_begin[1], 20);
+  assert_int_equal(supine_basis_weights(inside, gravity, mine), SUPINE_OK);
+  assert_int_equal(supine_basis_weights(surface, gravity, theirs), SUPINE_OK);
+  assert_memory_equal(mine, theirs, sizeof mine);
+  assert_int_equal(supine_basis_scale(inside, mine, 700.0, &scale[0], NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_scale(surface, mine, 700.0, &scale[1], NULL), SUPINE_OK);
+  assert_true(scale[0] == scale[1]);
+  assert_string_equal(supine_basis_metadata(inside, "a key of tomorrow"), "kept");
+  assert_string_equal(supine_basis_metadata(inside, "content"), "points");
+  const supine_tensor *names = supine_basis_tensor(inside, "names");
+  assert_memory_equal(names->data, content.names, names->shape[0]);
+  const float *depth = supine_basis_tensor(inside, "depth")->data;
+  for (size_t i = 0; i < info->vertex_count; ++i) {
+    assert_true(depth[i] > 0.0F);
+  }
+  supine_inside_shells none;
+  supine_error error;
+  assert_int_equal(supine_inside_shells_create(inside, &none, &error), SUPINE_ERROR_FORMAT);
+  assert_non_null(strstr(error.message, "points"));
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+}
+
+static void test_embed_points_of_one_lung_file_has_both(void **state) {
+  (void)state;
+  supine_inside_content content = made_points(30, 0.2, 0.9, 2);
+  for (int other = 0; other < 2; ++other) {
+    for (size_t i = 0; i < content.count; ++i) {
+      uint64_t seed = 100 + i;
+      point_at_share((size_t)other, &seed, 0.5, content.points + 3 * i);
+    }
+    (void)embed(&content, false, 0);
+    supine_basis *inside = helper_open(inside_path);
+    const supine_basis_info *info = supine_basis_get_info(inside);
+    assert_int_equal(info->lung_count, 2);
+    assert_int_equal(info->lung_begin[1], other == 0 ? 30 : 0);
+    supine_basis_close(inside);
+    assert_true(farthest_from(&content, 0) < 4.0 * 0x1p-24 * 256.0);
+  }
+  supine_inside_content_free(&content);
+}
+
+static void test_embed_outside_counted_and_clamped(void **state) {
+  (void)state;
+  supine_inside_content content = made_points(50, 0.3, 0.9, 4);
+  const double far[3] = {71.3, 3.1, 900.0};
+  memcpy(content.points + (size_t)3 * 17, far, sizeof far);
+  supine_inside_report report = embed(&content, false, 0);
+  assert_int_equal(report.outside, 1);
+  assert_int_equal(report.farthest, 17);
+  const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, far, NULL);
+  assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
+  assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0); /* affine goes on outside */
+  report = embed(&content, true, 0);
+  assert_int_equal(report.outside, 1);
+  supine_basis *inside = helper_open(inside_path);
+  const double weights[HELPER_MODES] = {1.0, 0.0, 0.0};
+  const double scales[2] = {1.0, 1.0};
+  const size_t n = content.count;
+  float *step = malloc(3 * n * sizeof *step);
+  supine_displace_range(inside, weights, scales, 0, n, step);
+  const uint32_t *part = supine_basis_tensor(inside, "part")->data;
+  size_t at = 0;
+  while (part[at] != 17) {
+    ++at;
+  }
+  double expected[3];
+  helper_motion(0, place.nearest, expected);
+  for (size_t k = 0; k < 3; ++k) {
+    expected[k] *= at < supine_basis_get_info(inside)->lung_begin[1] ? 1.0 : -0.7;
+    assert_true(fabs((double)step[3 * at + k] - expected[k]) < 1e-4);
+  }
+  free(step);
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+}
+
+/* Every point inside lies in a cell whose eight corners are stored. */
+static void test_grid_cells_of_all_points_inside_are_whole(void **state) {
+  (void)state;
+  const supine_inside_grid like = {
+      .size = {300, 260, 280},
+      .origin = {180.0, 120.0, -200.0},
+      .step = {{-0.96, 0.28, 0.0}, {-0.28, -0.96, 0.0}, {0.0, 0.0, 1.5}}};
+  for (int oblique = 0; oblique < 2; ++oblique) {
+    supine_inside_content content = {0};
+    assert_int_equal(
+        supine_inside_content_grid(&shells, oblique ? &like : NULL, 6.0, 0.0, &content, NULL),
+        SUPINE_OK);
+    const supine_inside_grid *grid = &content.grid;
+    const size_t nodes = grid->size[0] * grid->size[1] * grid->size[2];
+    unsigned char *stored = calloc(nodes, 1);
+    for (size_t i = 0; i < content.count; ++i) {
+      stored[content.part[i]] = 1;
+    }
+    assert_true(content.count < nodes * 9 / 10);
+    for (size_t i = 0; i + 1 < nodes; ++i) {
+      const size_t at[3] = {i % grid->size[0], i / grid->size[0] % grid->size[1],
+                            i / grid->size[0] / grid->size[1]};
+      if (at[0] + 1 == grid->size[0] || at[1] + 1 == grid->size[1] || at[2] + 1 == grid->size[2]) {
+        continue;
+      }
+      uint64_t seed = i;
+      double p[3];
+      const double share[3] = {helper_random(&seed), helper_random(&seed), helper_random(&seed)};
+      for (int k = 0; k < 3; ++k) {
+        p[k] = grid->origin[k];
+        for (int a = 0; a < 3; ++a) {
+          p[k] += ((double)at[a] + share[a]) * grid->step[a][k];
+        }
+      }
+      supine_inside_place place[SUPINE_LUNGS_MAX];
+      if (place[supine_inside_shells_find(&shells, p, NULL, place)].depth <= 0.0) {
+        continue;
+      }
+      for (size_t corner = 0; corner < 8; ++corner) {
+        const size_t node =
+            at[0] + (corner & 1U) +
+            grid->size[0] * (at[1] + (corner >> 1 & 1U) + grid->size[1] * (at[2] + (corner >> 2)));
+        assert_int_equal(stored[node], 1);
+      }
+    }
+    free(stored);
+    supine_inside_content_free(&content);
+  }
+}
+
+static void test_grid_bad_requests_refused(void **state) {
+  (void)state;
+  supine_inside_content content = {0};
+  supine_error error;
+  const supine_inside_grid elsewhere = {.size = {20, 20, 20},
+                                        .origin = {4000.0, 0.0, 0.0},
+                                        .step = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  assert_int_equal(supine_inside_content_grid(&shells, NULL, 0.0, 0.0, &content, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_inside_content_grid(&shells, NULL, NAN, 0.0, &content, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_inside_content_grid(&shells, NULL, 0.01, 0.0, &content, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "larger"));
+  assert_int_equal(supine_inside_content_grid(&shells, &elsewhere, 4.0, 0.0, &content, &error),
+                   SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "axes"));
+  assert_int_equal(supine_inside_content_grid(&shells, NULL, 5000.0, 0.0, &content, &error),
+                   SUPINE_ERROR_MESH);
+}
+
+static void write_text(const char *path, const char *text) {
+  FILE *file = fopen(path, "w");
+  assert_non_null(file);
+  assert_true(fputs(text, file) >= 0);
+  assert_int_equal(fclose(file), 0);
+}
+
+static void test_content_points_names_axes_and_units(void **state) {
+  (void)state;
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/points.csv", folder);
+  write_text(path, "name,x,y,z\ncarina,1,2,3\n# a remark\n,-4.5,5,6\n");
+  const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
+  supine_inside_content content = {0};
+  assert_int_equal(supine_inside_content_points(path, &ras, &content, NULL), SUPINE_OK);
+  write_text(path, "z,y,x\n7,8,9\n");
+  assert_int_equal(supine_inside_content_points(path, NULL, &content, NULL), SUPINE_OK);
+  assert_string_equal(content.names, "carina\n2\n1");
+  static const double expected[] = {-10, -20, 30, 45, -50, 60, 9, 8, 7};
+  assert_int_equal(content.count, 3);
+  for (size_t i = 0; i < 9; ++i) {
+    assert_true(content.points[i] == expected[i]);
+  }
+  supine_inside_content_free(&content);
+}
+
+static void test_content_points_bad_files_refused(void **state) {
+  (void)state;
+  static const char *const bad[] = {"",
+                                    "x,y\n1,2\n",
+                                    "x,y,z\n",
+                                    "x,y,z\n1,2\n",
+                                    "x,y,z\n1,2,nan\n",
+                                    "x,y,z,colour\n1,2,3,red\n",
+                                    "name,x,y,z\na,1,2,3mm\n"};
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/bad.csv", folder);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    supine_inside_content content = {0};
+    supine_error error;
+    write_text(path, bad[i]);
+    assert_int_equal(supine_inside_content_points(path, NULL, &content, &error),
+                     SUPINE_ERROR_FORMAT);
+    assert_non_null(strstr(error.message, path));
+    supine_inside_content_free(&content);
+  }
+  supine_inside_content content = {0};
+  assert_int_equal(supine_inside_content_points("/nowhere.csv", NULL, &content, NULL),
+                   SUPINE_ERROR_READ);
+}
+
+static void test_content_meshes_parts_and_triangles(void **state) {
+  (void)state;
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/nodule.obj", folder);
+  write_text(path, "v 70 0 -40\nv 75 0 -40\nv 70 5 -40\nv 70 0 -35\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf "
+                   "2 3 4\n");
+  supine_inside_content content = {0};
+  assert_int_equal(supine_inside_content_mesh(path, NULL, &content, NULL), SUPINE_OK);
+  assert_int_equal(supine_inside_content_mesh(path, NULL, &content, NULL), SUPINE_OK);
+  assert_string_equal(content.names, "nodule\nnodule");
+  assert_int_equal(content.count, 8);
+  assert_int_equal(content.triangle_count, 8);
+  assert_int_equal(content.part[7], 1);
+  for (size_t i = 12; i < 24; ++i) {
+    assert_int_equal(content.triangles[i], content.triangles[i - 12] + 4);
+  }
+  (void)embed(&content, false, 0);
+  supine_basis *inside = helper_open(inside_path);
+  assert_string_equal(supine_basis_metadata(inside, "content"), "mesh");
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+  supine_inside_report report;
+  const supine_inside_options options = {0};
+  assert_int_equal(supine_inside_embed(&shells, &content, &options, inside_path, &report, NULL),
+                   SUPINE_ERROR_MESH); /* nothing */
+  content = made_points(4, 0.5, 0.6, 1);
+  assert_int_equal(supine_inside_embed(&shells, &content, &options, "/nowhere/x", &report, NULL),
+                   SUPINE_ERROR_WRITE);
+  supine_inside_content_free(&content);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_surface_find_side_and_distance_of_random_points),
+      cmocka_unit_test(test_surface_find_near_place_same_answer),
+      cmocka_unit_test(test_surface_find_torn_surface_inside_stays_inside),
+      cmocka_unit_test(test_biharmonic_centres_and_affine_come_back),
+      cmocka_unit_test(test_biharmonic_points_in_a_plane_refused),
+      cmocka_unit_test(test_embed_affine_exact_quadratic_near),
+      cmocka_unit_test(test_embed_points_of_the_surface_move_with_it),
+      cmocka_unit_test(test_embed_file_shares_weights_volume_and_metadata),
+      cmocka_unit_test(test_embed_points_of_one_lung_file_has_both),
+      cmocka_unit_test(test_embed_outside_counted_and_clamped),
+      cmocka_unit_test(test_grid_cells_of_all_points_inside_are_whole),
+      cmocka_unit_test(test_grid_bad_requests_refused),
+      cmocka_unit_test(test_content_points_names_axes_and_units),
+      cmocka_unit_test(test_content_points_bad_files_refused),
+      cmocka_unit_test(test_content_meshes_parts_and_triangles),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}
