@@ -52,13 +52,14 @@ typedef struct supine_mesh_report {
                                 NULL. A string literal. */
 } supine_mesh_report;
 
-/** Reads one surface: everything that assimp reads; polygons are cut into triangles, all nodes of
- * a scene are joined, vertices at the same position are welded in order of first appearance.
+/** Reads one surface: PLY, STL and OFF directly, all else that assimp reads through it. Polygons
+ * are cut into triangles, all nodes of a scene are joined, vertices at the same position are welded
+ * in order of first appearance.
  *
- * PLY, STL, OBJ and OFF files are checked against their own counts first, so that a truncated or
- * hostile one is refused; other formats are as safe as assimp's importers. Positions are float32,
- * as assimp reads them. A name without a known ending is read as PLY, STL or OFF where it begins
- * with that word.
+ * Files are held to their own counts, so that a truncated or hostile one is refused. assimp runs in
+ * a process of its own, so that a file on which an importer crashes or runs wild is refused too.
+ * Positions are rounded to float32. A name without a known ending is read as PLY, STL or OFF where
+ * it begins with that word.
  *
  * @param path     file
  * @param options  NULL: defaults
@@ -69,10 +70,20 @@ typedef struct supine_mesh_report {
  * @retval SUPINE_ERROR_MESH    no triangles, a coordinate that is not finite (vertex named)
  * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit negative or not finite
  * @retval SUPINE_ERROR_MEMORY
- * Thread-safe: several files can be under way at once. Binary PLY and STL are parsed at the same
- * time, other formats one at a time, as assimp has one error string for the whole process. */
+ * Thread-safe: several files can be under way at once. */
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
+
+/** Reads a number beside the position of each vertex of a PLY file: rows of x, y, z, in the file's
+ * units and axes, and the property, in the file's order, nothing welded or dropped.
+ *
+ * @param property  its name; a number of any type
+ * @param rows      [*count, 4], written on success alone; the caller frees
+ * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
+ * @retval SUPINE_ERROR_FORMAT  no PLY file, truncated, no such property
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_mesh_load_property(const char *path, const char *property, double **rows,
+                                        size_t *count, supine_error *error);
 
 /** Frees the arrays and zeroes the struct; a zeroed struct is legal. */
 void supine_mesh_free(supine_mesh *mesh);

@@ -115,6 +115,89 @@ static void test_load_degenerate_and_unreferenced_dropped_counted(void **state) 
   supine_mesh_free(&mesh);
 }
 
+static const char strip_head[] =
+    "ply\nformat ascii 1.0\nelement tristrips 2\nproperty list int int vertex_indices\n"
+    "element vertex 5\nproperty float x\nproperty float y\nproperty double z\nend_header\n";
+static const char strip_points[] = "0 0 0\n120 0 0\n0 120 0\n0 0 120\n9 9 9\n";
+
+/* A strip may begin anew after -1; every second triangle runs the other way. Elements may stand in
+ * any order. */
+static void test_load_ply_strips_become_all_their_triangles(void **state) {
+  char text[512];
+  char path[256];
+  (void)snprintf(text, sizeof text, "%s6 2 1 0 3 2 1\n0\n%s", strip_head, strip_points);
+  supine_mesh_report report = {0};
+  supine_mesh mesh = load(sample_text(state, "strip.ply", text, path), NULL, &report);
+  expect_tetrahedron(&mesh);
+  static const uint32_t one_strip[] = {2, 1, 0, 0, 1, 3, 0, 3, 2, 2, 3, 1};
+  assert_memory_equal(mesh.triangles, one_strip, sizeof one_strip);
+  assert_int_equal(report.file_faces, 4);
+  supine_mesh_free(&mesh);
+  (void)snprintf(text, sizeof text, "%s8 2 1 0 3 -1 0 3 2\n5 -1 -1 2 3 1\n%s", strip_head,
+                 strip_points);
+  mesh = load(sample_text(state, "strip.ply", text, path), NULL, NULL);
+  expect_tetrahedron(&mesh);
+  assert_memory_equal(mesh.triangles, one_strip, sizeof one_strip);
+  supine_mesh_free(&mesh);
+}
+
+static void test_load_ply_strips_illegal_refused(void **state) {
+  static const struct {
+    const char *strips, *words;
+  } bad[] = {{"4 0 1 2 5\n0\n", "face 1 names vertex 5, but there are 5"},
+             {"4 0 1 2 -2\n0\n", "face 1 names vertex -2"},
+             {"4 0 1 2\n0\n", "at item 0 of the 2"},
+             {"2 0 1\n1 -1\n", "no triangles"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    char text[512];
+    (void)snprintf(text, sizeof text, "%s%s%s", strip_head, bad[i].strips, strip_points);
+    refuse_text(state, "strip.ply", text, i == 3 ? SUPINE_ERROR_MESH : SUPINE_ERROR_FORMAT,
+                bad[i].words);
+  }
+}
+
+/* A flat face that turns both ways is cut along lines that run inside it: all its triangles face
+ * the same way and add up to its area. */
+static void test_load_concave_face_cut_inside(void **state) {
+  static const char text[] = "OFF\n9 2 0\n0 0 0\n90 0 0\n90 60 0\n60 60 0\n60 30 0\n30 30 0\n"
+                             "30 60 0\n0 60 0\n0 0 50\n8 0 1 2 3 4 5 6 7\n4 8 7 5 0\n";
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "u.off", text, path), NULL, NULL);
+  assert_int_equal(mesh.vertex_count, 9);
+  assert_int_equal(mesh.triangle_count, 8);
+  double area = 0.0;
+  for (size_t t = 0; t < 6; ++t) {
+    const double *a = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t];
+    const double *b = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 1];
+    const double *c = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 2];
+    const double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    assert_true(twice > 0.0);
+    area += 0.5 * twice;
+  }
+  assert_true(fabs(area - (90.0 * 60.0 - 30.0 * 30.0)) < 1.0e-9);
+  supine_mesh_free(&mesh);
+}
+
+/* Corners on one line, and a face that crosses itself, still give every triangle. */
+static void test_load_degenerate_faces_cut_into_all_triangles(void **state) {
+  static const char text[] = "OFF\n6 3 0\n0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
+                             "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "flat.off", text, path), NULL, NULL);
+  assert_int_equal(mesh.triangle_count, 2 + 3 + 2);
+  supine_mesh_free(&mesh);
+}
+
+static void test_load_face_of_too_many_corners_refused(void **state) {
+  enum { CORNERS = 1025 };
+  char text[32 + 8 * CORNERS];
+  int length = snprintf(text, sizeof text, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n%d", CORNERS);
+  for (int i = 0; i < CORNERS; ++i) {
+    length += snprintf(text + length, sizeof text - (size_t)length, " %d", i % 3);
+  }
+  refuse_text(state, "a.off", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
+}
+
 static void test_load_off_comments_and_colours(void **state) {
   static const char text[] = "COFF # a tetrahedron\n4 4 6\n\n0 0 0 255 0 0\n120 0 0 255 0 0\n"
                              "0 120 0 255 0 0 # y\n\n# z\n0 0 120 255 0 0\n3 0 2 1\n# between\n"
@@ -391,6 +474,11 @@ int main(void) {
       cmocka_unit_test(test_load_stl_soup_equals_indexed),
       cmocka_unit_test(test_load_polygons_cut_points_and_lines_dropped),
       cmocka_unit_test(test_load_degenerate_and_unreferenced_dropped_counted),
+      cmocka_unit_test(test_load_ply_strips_become_all_their_triangles),
+      cmocka_unit_test(test_load_ply_strips_illegal_refused),
+      cmocka_unit_test(test_load_concave_face_cut_inside),
+      cmocka_unit_test(test_load_degenerate_faces_cut_into_all_triangles),
+      cmocka_unit_test(test_load_face_of_too_many_corners_refused),
       cmocka_unit_test(test_load_off_comments_and_colours),
       cmocka_unit_test(test_load_nodes_transformed_mirror_keeps_sense),
       cmocka_unit_test(test_load_axes_tag_option_and_comment),

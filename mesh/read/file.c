@@ -67,6 +67,7 @@ static supine_status read_bytes(FILE *stream, size_t size, mesh_file *file, supi
   file->bytes = bytes;
   errno = 0;
   file->size += fread(bytes + file->size, 1, size - file->size, stream);
+  bytes[file->size] = '\0';
   return ferror(stream) != 0 ? cannot_read(file->path, error) : SUPINE_OK;
 }
 
@@ -95,7 +96,7 @@ static supine_status open_regular(const char *path, FILE **stream, size_t *size,
 }
 
 supine_status supine_mesh_file_read(const char *path, mesh_file *file, supine_error *error) {
-  *file = (mesh_file){.path = path, .faces = SIZE_MAX};
+  *file = (mesh_file){.path = path};
   FILE *stream = NULL;
   size_t size = 0;
   supine_status status = open_regular(path, &stream, &size, error);

@@ -21,7 +21,8 @@ supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error) {
       continue;
     }
     drop_materials(file, word);
-    if (supine_mesh_text_is(word, "v") && !supine_mesh_text_skip_numbers(&line, 3)) {
+    double position[3];
+    if (supine_mesh_text_is(word, "v") && !supine_mesh_text_position(&line, position)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu: a vertex wants three numbers", file->path, number);
     }

@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The one place that knows assimp: from a file to one list of vertices and triangles. */
-#include <math.h>
-#include <pthread.h>
+/* assimp, in a process of its own: on a bent file its importers may crash, leak, or take all time
+ * and memory, and that process alone bears it. */
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <assimp/cimport.h>
 #include <assimp/config.h>
@@ -12,225 +18,209 @@
 
 #include "mesh/read/read.h"
 
-enum { NODES_DEEP = 256, VERTICES_MAX = INT32_MAX, TRIANGLES_MAX = UINT32_MAX / 3 };
+/* What an importer may take: far beyond what it needs for a lung. */
+enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Where an import fails, assimp writes one error string of the whole process, and importers run
- * without a lock otherwise. So files that may fail are read one at a time, and files that a guard
- * found whole at the same time as other such files. */
-static pthread_rwlock_t import_lock = PTHREAD_RWLOCK_INITIALIZER;
+/* What the child leaves, in memory that both processes have. */
+typedef struct outcome {
+  supine_error error;
+  size_t dropped;
+} outcome;
+
+/* In the child: the scene's surface, node by node. */
+typedef struct sink {
+  const char *path;
+  FILE *vertices;
+  FILE *triangles;
+  size_t vertex_count;
+  size_t face_count;
+  outcome *outcome;
+} sink;
 
 /* assimp's words as one line. */
-static supine_status import_fail(const mesh_file *file, const char *words, supine_error *error) {
+static supine_status import_fail(const char *path, const char *words, supine_error *error) {
   char line[256];
   size_t length = 0;
-  for (; words != NULL && *words != '\0' && length < sizeof line - 1; ++words) {
+  for (; *words != '\0' && length < sizeof line - 1; ++words) {
     const bool blank = (unsigned char)*words <= ' ';
     if (!blank || (length > 0 && line[length - 1] != ' ')) {
-      line[length] = *words;
-      if (blank) {
-        line[length] = ' ';
-      }
-      ++length;
+      line[length++] = blank ? ' ' : *words;
     }
   }
   line[length] = '\0';
-  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: malformed: %s", file->path,
+  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: malformed: %s", path,
                           length == 0 ? "the importer failed" : line);
 }
 
 /* The bytes that a guard has seen; a path where none has. */
-static const struct aiScene *import(const mesh_file *file,
-                                    const struct aiPropertyStore *properties) {
-  static const char *const hints[] = {[MESH_FORMAT_PLY] = "ply",
-                                      [MESH_FORMAT_STL] = "stl",
-                                      [MESH_FORMAT_OBJ] = "obj",
-                                      [MESH_FORMAT_OFF] = "off"};
-  if (file->format == MESH_FORMAT_OTHER) {
-    return aiImportFileExWithProperties(file->path, 0, NULL, properties);
-  }
-  return aiImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size, 0,
-                                              hints[file->format], properties);
-}
-
-static supine_status read_scene(mesh_file *file, const struct aiScene **scene,
-                                supine_error *error) {
-  if (file->size > UINT32_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: larger than 4 GiB; reduce the mesh first", file->path);
-  }
+static const struct aiScene *import(const mesh_file *file) {
+  const unsigned steps = aiProcess_Triangulate;
   struct aiPropertyStore *properties = aiCreatePropertyStore();
-  if (properties == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
-  }
   /* Else importers make up a surface for files that hold bones alone. */
   aiSetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
-  if (file->whole) {
-    (void)pthread_rwlock_rdlock(&import_lock);
-  } else {
-    (void)pthread_rwlock_wrlock(&import_lock);
-  }
-  supine_status status = SUPINE_OK;
-  *scene = import(file, properties);
-  if (*scene == NULL) {
-    status = import_fail(file, file->whole ? NULL : aiGetErrorString(), error);
-  }
-  (void)pthread_rwlock_unlock(&import_lock);
+  const struct aiScene *scene =
+      file->format == MESH_FORMAT_OTHER
+          ? aiImportFileExWithProperties(file->path, steps, NULL, properties)
+          : aiImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
+                                                 steps, "obj", properties);
   aiReleasePropertyStore(properties);
-  free(file->bytes);
-  file->bytes = NULL;
-  file->size = 0;
-  return status;
+  return scene;
 }
 
-/* Importers check no index; `polygons` tells whether some face has more than three. */
-static supine_status check_faces(const mesh_file *file, const struct aiScene *scene, bool *polygons,
-                                 supine_error *error) {
-  size_t number = 0;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-    const struct aiMesh *part = scene->mMeshes[m];
-    for (unsigned f = 0; f < part->mNumFaces; ++f, ++number) {
-      const struct aiFace *face = &part->mFaces[f];
-      *polygons = *polygons || face->mNumIndices > 3;
-      for (unsigned k = 0; k < face->mNumIndices; ++k) {
-        if (face->mIndices[k] >= part->mNumVertices) {
-          return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                  "%s: face %zu names vertex %u, but there are %u", file->path,
-                                  number, face->mIndices[k], part->mNumVertices);
-        }
-      }
-    }
-  }
-  if (file->faces != SIZE_MAX && number != file->faces) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the file promises %zu faces, but %zu could be read", file->path,
-                            file->faces, number);
-  }
-  return SUPINE_OK;
-}
-
-static bool node_is_legal(const struct aiScene *scene, const struct aiNode *node) {
-  for (unsigned m = 0; m < node->mNumMeshes; ++m) {
-    if (node->mMeshes[m] >= scene->mNumMeshes) {
-      return false;
-    }
-  }
-  return true;
-}
-
-/* Adds what the node and those below it hold; false where the scene is not a tree of use. */
-static bool count_node(const struct aiScene *scene, const struct aiNode *node, unsigned depth,
-                       size_t *vertices, size_t *faces) {
-  if (depth > NODES_DEEP || !node_is_legal(scene, node)) {
-    return false;
-  }
-  for (unsigned m = 0; m < node->mNumMeshes; ++m) {
-    const struct aiMesh *part = scene->mMeshes[node->mMeshes[m]];
-    *vertices += part->mNumVertices;
-    *faces += part->mNumFaces;
-    if (*vertices > VERTICES_MAX || *faces > TRIANGLES_MAX) {
-      return false;
-    }
-  }
-  for (unsigned c = 0; c < node->mNumChildren; ++c) {
-    if (!count_node(scene, node->mChildren[c], depth + 1, vertices, faces)) {
-      return false;
-    }
-  }
-  return true;
-}
-
-static void add_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *to,
-                         supine_mesh *mesh) {
-  double *out = mesh->vertices + 3 * mesh->vertex_count;
-  for (unsigned i = 0; i < part->mNumVertices; ++i, out += 3) {
+static void put_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *to, FILE *out) {
+  for (unsigned i = 0; i < part->mNumVertices; ++i) {
     const double x = (double)part->mVertices[i].x;
     const double y = (double)part->mVertices[i].y;
     const double z = (double)part->mVertices[i].z;
-    out[0] = (double)to->a1 * x + (double)to->a2 * y + (double)to->a3 * z + (double)to->a4;
-    out[1] = (double)to->b1 * x + (double)to->b2 * y + (double)to->b3 * z + (double)to->b4;
-    out[2] = (double)to->c1 * x + (double)to->c2 * y + (double)to->c3 * z + (double)to->c4;
+    const double row[3] = {
+        (double)to->a1 * x + (double)to->a2 * y + (double)to->a3 * z + (double)to->a4,
+        (double)to->b1 * x + (double)to->b2 * y + (double)to->b3 * z + (double)to->b4,
+        (double)to->c1 * x + (double)to->c2 * y + (double)to->c3 * z + (double)to->c4};
+    (void)fwrite(row, sizeof row, 1, out);
   }
 }
 
-static void add_triangles(const struct aiMesh *part, bool mirrored, supine_mesh *mesh,
-                          size_t *dropped) {
-  const uint32_t base = (uint32_t)mesh->vertex_count;
-  uint32_t *out = mesh->triangles + 3 * mesh->triangle_count;
-  for (unsigned f = 0; f < part->mNumFaces; ++f) {
+/* Importers check no index. */
+static bool put_triangles(const struct aiMesh *part, bool mirrored, sink *out) {
+  for (unsigned f = 0; f < part->mNumFaces; ++f, ++out->face_count) {
     const struct aiFace *face = &part->mFaces[f];
+    uint32_t corner[3];
+    for (unsigned k = 0; k < face->mNumIndices; ++k) {
+      if (face->mIndices[k] >= part->mNumVertices) {
+        (void)supine_error_set(&out->outcome->error, SUPINE_ERROR_FORMAT,
+                               "%s: face %zu names vertex %u, but there are %u", out->path,
+                               out->face_count, face->mIndices[k], part->mNumVertices);
+        return false;
+      }
+      corner[k < 3 ? k : 0] = (uint32_t)out->vertex_count + face->mIndices[k];
+    }
     if (face->mNumIndices != 3) {
-      ++*dropped;
+      ++out->outcome->dropped;
       continue;
     }
-    out[0] = base + face->mIndices[0];
-    out[1] = base + face->mIndices[mirrored ? 2 : 1];
-    out[2] = base + face->mIndices[mirrored ? 1 : 2];
-    out += 3;
-    ++mesh->triangle_count;
+    const uint32_t row[3] = {corner[0], corner[mirrored ? 2 : 1], corner[mirrored ? 1 : 2]};
+    (void)fwrite(row, sizeof row, 1, out->triangles);
   }
+  return true;
 }
 
-static void add_node(const struct aiScene *scene, const struct aiNode *node,
-                     const struct aiMatrix4x4 *above, supine_mesh *mesh, size_t *dropped) {
+static bool put_node(const struct aiScene *scene, const struct aiNode *node,
+                     const struct aiMatrix4x4 *above, sink *out) {
   struct aiMatrix4x4 to = *above;
   aiMultiplyMatrix4(&to, &node->mTransformation);
   const bool mirrored = aiMatrix4Determinant(&to) < 0.0F;
-  for (unsigned m = 0; m < node->mNumMeshes; ++m) {
+  bool good = true;
+  for (unsigned m = 0; good && m < node->mNumMeshes; ++m) {
     const struct aiMesh *part = scene->mMeshes[node->mMeshes[m]];
-    add_vertices(part, &to, mesh);
-    add_triangles(part, mirrored, mesh, dropped);
-    mesh->vertex_count += part->mNumVertices;
+    put_vertices(part, &to, out->vertices);
+    good = put_triangles(part, mirrored, out);
+    out->vertex_count += part->mNumVertices;
   }
-  for (unsigned c = 0; c < node->mNumChildren; ++c) {
-    add_node(scene, node->mChildren[c], &to, mesh, dropped);
+  for (unsigned c = 0; good && c < node->mNumChildren; ++c) {
+    good = put_node(scene, node->mChildren[c], &to, out);
   }
+  return good;
+}
+
+static void confine(size_t bytes) {
+  const rlim_t seconds = SECONDS_LEAST + SECONDS_PER_MEGABYTE * (bytes >> 20);
+  const struct rlimit time = {seconds, seconds};
+  const struct rlimit none = {0, 0};
+  (void)setrlimit(RLIMIT_CPU, &time);
+  (void)setrlimit(RLIMIT_CORE, &none);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) /* they map terabytes */
+  const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
+  (void)setrlimit(RLIMIT_AS, &memory);
+#endif
+  static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
+  for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
+    (void)signal(signals[i], SIG_DFL); /* not the program's own, which clear its outputs away */
+  }
+  (void)alarm(10 * (unsigned)seconds); /* where it waits */
+  (void)freopen("/dev/null", "w", stderr);
+}
+
+static _Noreturn void be_child(const mesh_file *file, const int streams[2], size_t bytes,
+                               outcome *left) {
+  confine(bytes);
+  sink out = {.path = file->path,
+              .vertices = fdopen(streams[0], "wb"),
+              .triangles = fdopen(streams[1], "wb"),
+              .outcome = left};
+  const struct aiScene *scene = import(file);
+  if (scene == NULL) {
+    (void)import_fail(file->path, aiGetErrorString(), &left->error);
+    _exit(0);
+  }
+  struct aiMatrix4x4 identity;
+  aiIdentityMatrix4(&identity);
+  if (out.vertices != NULL && out.triangles != NULL &&
+      (scene->mRootNode == NULL || put_node(scene, scene->mRootNode, &identity, &out)) &&
+      fclose(out.vertices) == 0 && fclose(out.triangles) == 0) {
+    left->error.status = SUPINE_OK;
+  }
+  _exit(0); /* and the scene with it */
+}
+
+/* All that the child wrote, in items of `size` bytes; false where memory is short. */
+static bool collect(int stream, size_t size, void **items, size_t *count) {
+  const off_t end = lseek(stream, 0, SEEK_END);
+  *count = end < 0 ? 0 : (size_t)end / size;
+  *items = malloc(*count * size + 1);
+  size_t done = 0;
+  while (*items != NULL && done < *count * size) {
+    const ssize_t got = pread(stream, (char *)*items + done, *count * size - done, (off_t)done);
+    if (got <= 0) {
+      return false;
+    }
+    done += (size_t)got;
+  }
+  return *items != NULL;
 }
 
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error) {
-  supine_mesh joined = {0};
-  const struct aiScene *scene = NULL;
-  supine_status status = read_scene(file, &scene, error);
-  if (status != SUPINE_OK || scene == NULL) {
+  struct stat about = {0};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  const int streams[2] = {memfd_create("vertices", MFD_CLOEXEC),
+                          memfd_create("triangles", MFD_CLOEXEC)};
+  outcome *left =
+      mmap(NULL, sizeof *left, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (streams[0] < 0 || streams[1] < 0 || left == MAP_FAILED) {
+    (void)supine_error_set(error, status, "%s: out of memory", file->path);
     goto cleanup;
   }
-  bool polygons = false;
-  status = check_faces(file, scene, &polygons, error);
+  (void)stat(file->path, &about);
+  (void)supine_error_set(&left->error, SUPINE_ERROR_FORMAT,
+                         "%s: malformed: the importer crashed, or took too much time or memory; "
+                         "save the mesh as PLY or STL",
+                         file->path);
+  const pid_t child = fork();
+  if (child == 0) {
+    be_child(file, streams, (size_t)about.st_size, left);
+  }
+  while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
+  }
+  status = left->error.status;
   if (status != SUPINE_OK) {
-    goto cleanup;
+    (void)supine_error_set(error, status, "%s", left->error.message);
+  } else if (!collect(streams[0], 3 * sizeof(double), (void **)&mesh->vertices,
+                      &mesh->vertex_count) ||
+             !collect(streams[1], 3 * sizeof(uint32_t), (void **)&mesh->triangles,
+                      &mesh->triangle_count) ||
+             mesh->vertex_count > MESH_VERTICES_MAX) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
   }
-  if (polygons) {
-    scene = aiApplyPostProcessing(scene, aiProcess_Triangulate);
-  }
-  size_t vertices = 0;
-  size_t faces = 0;
-  if (scene == NULL ||
-      (scene->mRootNode != NULL && !count_node(scene, scene->mRootNode, 0, &vertices, &faces))) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT,
-                         "%s: malformed, or more faces and nodes than can be held", file->path);
-    goto cleanup;
-  }
-  joined.vertices = malloc((3 * vertices + 1) * sizeof *joined.vertices);
-  joined.triangles = malloc((3 * faces + 1) * sizeof *joined.triangles);
-  if (joined.vertices == NULL || joined.triangles == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
-                              "%s: out of memory for %zu vertices and %zu faces", file->path,
-                              vertices, faces);
-    goto cleanup;
-  }
-  if (scene->mRootNode != NULL) {
-    struct aiMatrix4x4 identity;
-    aiIdentityMatrix4(&identity);
-    add_node(scene, scene->mRootNode, &identity, &joined, dropped);
-  }
-  *mesh = joined;
-  joined = (supine_mesh){0};
+  *dropped = left->dropped;
 
 cleanup:
-  supine_mesh_free(&joined);
-  if (scene != NULL) {
-    aiReleaseImport(scene);
+  if (left != MAP_FAILED) {
+    (void)munmap(left, sizeof *left);
+  }
+  for (int i = 0; i < 2; ++i) {
+    if (streams[i] >= 0) {
+      (void)close(streams[i]);
+    }
   }
   return status;
 }

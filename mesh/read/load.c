@@ -5,20 +5,24 @@
 
 #include "mesh/read/read.h"
 
-static supine_status guard(mesh_file *file, supine_error *error) {
+static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                  supine_error *error) {
   switch (file->format) {
   case MESH_FORMAT_PLY:
-    return supine_mesh_guard_ply(file, error);
+    return supine_mesh_read_ply(file, mesh, dropped, error);
   case MESH_FORMAT_STL:
-    return supine_mesh_guard_stl(file, error);
-  case MESH_FORMAT_OBJ:
-    return supine_mesh_guard_obj(file, error);
+    return supine_mesh_read_stl(file, mesh, error);
   case MESH_FORMAT_OFF:
-    return supine_mesh_guard_off(file, error);
+    return supine_mesh_read_off(file, mesh, dropped, error);
+  case MESH_FORMAT_OBJ:
+    if (supine_mesh_guard_obj(file, error) != SUPINE_OK) {
+      return SUPINE_ERROR_FORMAT;
+    }
+    break;
   case MESH_FORMAT_OTHER:
     break;
   }
-  return SUPINE_OK;
+  return supine_mesh_import(file, mesh, dropped, error);
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
@@ -86,9 +90,8 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   if (status != SUPINE_OK) {
     return status;
   }
-  if ((status = guard(&file, error)) != SUPINE_OK ||
+  if ((status = read_surface(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
       (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
-      (status = supine_mesh_import(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
       (status = convert(path, scale, found.axes == SUPINE_AXES_RAS, &loaded, error)) != SUPINE_OK) {
     goto cleanup;
   }

@@ -16,37 +16,44 @@ typedef struct ply_type {
   bool is_real;
 } ply_type;
 
+/* The first four are columns of a vertex. */
+typedef enum ply_role {
+  PLY_X,
+  PLY_Y,
+  PLY_Z,
+  PLY_VALUE, /* what the caller asks for by name */
+  PLY_CORNERS,
+  PLY_NOTHING /* what no surface needs */
+} ply_role;
+
 typedef struct ply_property {
   const ply_type *count; /* NULL: not a list */
   const ply_type *type;
-  const char *role; /* a literal: "x", "y", "z", "vertex_indices"; NULL for what no surface needs */
+  ply_role role;
 } ply_property;
 
+typedef enum ply_kind { PLY_VERTICES, PLY_FACES, PLY_STRIPS, PLY_OTHER } ply_kind;
+
 typedef struct ply_element {
-  const char *role; /* a literal: "vertex", "face", "tristrips", or NULL */
+  ply_kind kind;
   uint64_t count;
   size_t first_property;
   size_t property_count;
-  bool has_list;
-  mesh_text body; /* its bytes in the file; set while the body is checked */
 } ply_element;
 
 typedef struct ply_header {
   ply_encoding encoding;
-  size_t size; /* bytes, with the line end after end_header */
+  size_t size;      /* bytes, with the line end after end_header */
+  unsigned present; /* bit for each role that an element with items has */
   size_t element_count;
   size_t property_count;
   ply_element elements[PLY_ELEMENTS_MAX];
   ply_property properties[PLY_PROPERTIES_MAX];
 } ply_header;
 
-/** Reads the header at the start of `file`. @retval SUPINE_ERROR_FORMAT */
-supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
-                                          supine_error *error);
-
-/** Rewrites `file` so that importers cannot stumble over it: the elements that make a surface and
- * no others, under a header without comments and names of no concern. */
-supine_status supine_mesh_ply_rewrite(mesh_file *file, const ply_header *header,
-                                      supine_error *error);
+/** Reads the header at the start of `file`; `value` names the property of PLY_VALUE, or is NULL.
+ * @retval SUPINE_ERROR_FORMAT */
+supine_status supine_mesh_ply_header_read(const mesh_file *file, const char *value,
+                                          ply_header *header, supine_error *error);
 
 #endif

@@ -1,8 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Reading a PLY file's header, and writing it again in its plainest form. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+/* What a PLY file's header promises. */
 
 #include "mesh/read/ply.h"
 
@@ -22,25 +19,25 @@ static const ply_type *find_type(mesh_text word) {
   return NULL;
 }
 
-static const char *find_role(mesh_text word, const char *const *roles) {
-  for (; *roles != NULL; ++roles) {
-    if (supine_mesh_text_is(word, *roles)) {
-      return *roles;
-    }
+/* Index of the word in a NULL-terminated list; that of NULL where it is not in it. */
+static int find_name(mesh_text word, const char *const *names) {
+  int index = 0;
+  while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
+    ++index;
   }
-  return NULL;
+  return index;
 }
 
-static const char *property_role(mesh_text name, const char *element, bool is_list) {
-  static const char *const coordinates[] = {"x", "y", "z", NULL};
+static ply_role find_role(mesh_text name, ply_kind kind, bool is_list, const char *value) {
+  const char *const columns[] = {"x", "y", "z", value, NULL};
   static const char *const corners[] = {"vertex_indices", "vertex_index", NULL};
-  if (element == NULL) {
-    return NULL;
+  const int index = find_name(name, is_list ? corners : columns);
+  if (kind == PLY_VERTICES && !is_list) {
+    return columns[index] == NULL ? PLY_NOTHING : (ply_role)index;
   }
-  if (strcmp(element, "vertex") == 0) {
-    return is_list ? NULL : find_role(name, coordinates);
-  }
-  return is_list && find_role(name, corners) != NULL ? corners[0] : NULL;
+  return (kind == PLY_FACES || kind == PLY_STRIPS) && is_list && corners[index] != NULL
+             ? PLY_CORNERS
+             : PLY_NOTHING;
 }
 
 static bool read_format(mesh_text line, ply_header *header) {
@@ -55,7 +52,7 @@ static bool read_format(mesh_text line, ply_header *header) {
 }
 
 static bool read_element(mesh_text line, ply_header *header) {
-  static const char *const roles[] = {"vertex", "face", "tristrips", NULL};
+  static const char *const kinds[] = {"vertex", "face", "tristrips", NULL};
   mesh_text name;
   mesh_text count;
   if (header->element_count == PLY_ELEMENTS_MAX || !supine_mesh_text_word(&line, &name) ||
@@ -63,10 +60,10 @@ static bool read_element(mesh_text line, ply_header *header) {
     return false;
   }
   ply_element *element = &header->elements[header->element_count];
-  *element =
-      (ply_element){.role = find_role(name, roles), .first_property = header->property_count};
-  for (size_t e = 0; element->role != NULL && e < header->element_count; ++e) {
-    if (header->elements[e].role == element->role) { /* twice: which would it be? */
+  *element = (ply_element){.kind = (ply_kind)find_name(name, kinds),
+                           .first_property = header->property_count};
+  for (size_t e = 0; element->kind != PLY_OTHER && e < header->element_count; ++e) {
+    if (header->elements[e].kind == element->kind) { /* twice: which would it be? */
       return false;
     }
   }
@@ -74,7 +71,7 @@ static bool read_element(mesh_text line, ply_header *header) {
   return supine_mesh_text_count(count, &element->count);
 }
 
-static bool read_property(mesh_text line, ply_header *header) {
+static bool read_property(mesh_text line, const char *value, ply_header *header) {
   mesh_text word;
   if (header->property_count == PLY_PROPERTIES_MAX || header->element_count == 0 ||
       !supine_mesh_text_word(&line, &word)) {
@@ -95,9 +92,9 @@ static bool read_property(mesh_text line, ply_header *header) {
   if (property.type == NULL || !supine_mesh_text_word(&line, &word)) {
     return false;
   }
-  property.role = property_role(word, element->role, property.count != NULL);
+  property.role = find_role(word, element->kind, property.count != NULL, value);
   ++element->property_count;
-  element->has_list = element->has_list || property.count != NULL;
+  header->present |= element->count > 0 ? 1U << property.role : 0U;
   header->properties[header->property_count++] = property;
   return true;
 }
@@ -112,7 +109,7 @@ static bool is_printable(mesh_text line) {
 }
 
 /* Comments and words of no known meaning pass. */
-static bool read_line(mesh_text line, ply_header *header, bool *has_format) {
+static bool read_line(mesh_text line, const char *value, ply_header *header, bool *has_format) {
   mesh_text word;
   if (!is_printable(line)) {
     return false;
@@ -125,12 +122,12 @@ static bool read_line(mesh_text line, ply_header *header, bool *has_format) {
     return *has_format;
   }
   return supine_mesh_text_is(word, "element")    ? read_element(line, header)
-         : supine_mesh_text_is(word, "property") ? read_property(line, header)
+         : supine_mesh_text_is(word, "property") ? read_property(line, value, header)
                                                  : true;
 }
 
-supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
-                                          supine_error *error) {
+supine_status supine_mesh_ply_header_read(const mesh_file *file, const char *value,
+                                          ply_header *header, supine_error *error) {
   *header = (ply_header){0};
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
@@ -148,7 +145,7 @@ supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *hea
                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                            "%s: the PLY header has no format line", file->path);
     }
-    if (!read_line(line, header, &has_format)) {
+    if (!read_line(line, value, header, &has_format)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu of the PLY header is malformed", file->path, number);
     }
@@ -156,70 +153,4 @@ supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *hea
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
                           "%s: the PLY header has no end_header: the file is truncated",
                           file->path);
-}
-
-static void write_element(FILE *out, const ply_header *header, const ply_element *element) {
-  (void)fprintf(out, "element %s %llu\n", element->role, (unsigned long long)element->count);
-  for (size_t p = 0; p < element->property_count; ++p) {
-    const ply_property *property = &header->properties[element->first_property + p];
-    const char *role = property->role == NULL ? "other" : property->role;
-    if (property->count == NULL) {
-      (void)fprintf(out, "property %s %s\n", property->type->name, role);
-    } else {
-      (void)fprintf(out, "property list %s %s %s\n", property->count->name, property->type->name,
-                    role);
-    }
-  }
-}
-
-/* assimp 5.2 drops a binary body's first byte where it is LF, and mistakes elements that it does
- * not know; so a byte of a kind that it knows goes first. */
-static void write_header(FILE *out, const ply_header *header) {
-  static const char *const encodings[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-  const bool pad = header->encoding != PLY_ASCII;
-  (void)fprintf(out, "ply\nformat %s 1.0\n%s", encodings[header->encoding],
-                pad ? "element material 1\nproperty uchar other\n" : "");
-  for (size_t e = 0; e < header->element_count; ++e) {
-    if (header->elements[e].role != NULL) {
-      write_element(out, header, &header->elements[e]);
-    }
-  }
-  (void)fprintf(out, "end_header\n%s", pad ? "." : "");
-}
-
-supine_status supine_mesh_ply_rewrite(mesh_file *file, const ply_header *header,
-                                      supine_error *error) {
-  char *head = NULL;
-  size_t length = 0;
-  unsigned char *bytes = NULL;
-  FILE *out = open_memstream(&head, &length);
-  if (out == NULL) {
-    goto cleanup;
-  }
-  write_header(out, header);
-  if (fclose(out) != 0) {
-    goto cleanup;
-  }
-  bytes = malloc(length + file->size);
-  if (bytes == NULL) {
-    goto cleanup;
-  }
-  memcpy(bytes, head, length);
-  for (size_t e = 0; e < header->element_count; ++e) {
-    const ply_element *element = &header->elements[e];
-    const size_t size = (size_t)(element->body.end - element->body.at);
-    if (element->role != NULL && size > 0) {
-      memcpy(bytes + length, element->body.at, size);
-      length += size;
-    }
-  }
-  free(file->bytes);
-  file->bytes = bytes;
-  file->size = length;
-
-cleanup:
-  free(head);
-  return bytes != NULL
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
 }

@@ -23,12 +23,13 @@ bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
 /** Is the word `expected`, in any case? */
 bool supine_mesh_text_is(mesh_text word, const char *expected);
-/** Is the word a decimal number, nan or inf? */
-bool supine_mesh_text_is_number(mesh_text word);
 /** Reads decimal digits alone; false for anything else or beyond 2^63. */
 bool supine_mesh_text_count(mesh_text word, uint64_t *value);
-/** Takes the next `count` words off `text`; true where all are there and are numbers. */
-bool supine_mesh_text_skip_numbers(mesh_text *text, uint64_t count);
+/** Takes the next word off `text` as a decimal number, nan and inf among them; false where there is
+ * none or it is something else. A byte of 0 must follow the file's last. */
+bool supine_mesh_text_number(mesh_text *text, double *value);
+/** Takes three numbers, to single precision. */
+bool supine_mesh_text_position(mesh_text *text, double position[3]);
 
 /* ---- file.c: a file's bytes. ---- */
 
@@ -52,12 +53,10 @@ typedef enum mesh_space {
 typedef struct mesh_file {
   const char *path;
   mesh_format format;
-  unsigned char *bytes; /**< all of PLY, STL, OBJ and OFF, the head of others */
+  unsigned char *bytes; /**< all of PLY, STL, OBJ and OFF, the head of others; then a 0 */
   size_t size;
   mesh_space space;
   bool mentions_ras; /**< the word RAS stands in a comment */
-  size_t faces;      /**< faces that the file promises, SIZE_MAX where it does not say */
-  bool whole;        /**< checked byte for byte: the importer cannot fail on it */
 } mesh_file;
 
 /** Opens, tells the format from the ending (or, without a known one, the first bytes), reads. */
@@ -70,26 +69,46 @@ void supine_mesh_file_free(mesh_file *file);
  * mentions_ras. */
 void supine_mesh_space_note(mesh_file *file, size_t size);
 
-/* ---- guard*.c: is the file as long and as large as it says? The importers believe the counts in
- * a file: they read past the end of some, take gigabytes for others, and read words that are no
- * numbers as 0. Each guard returns SUPINE_ERROR_FORMAT with the place, notes the SPACE tag, and
- * may take out of the bytes what importers misread or what would make them open other files. ----
- */
+/* ---- faces.c: faces on their way into a mesh that has its vertices. ---- */
 
-supine_status supine_mesh_guard_ply(mesh_file *file, supine_error *error);
-supine_status supine_mesh_guard_stl(mesh_file *file, supine_error *error);
-supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error);
-supine_status supine_mesh_guard_off(mesh_file *file, supine_error *error);
-/** Line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
-bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
+enum {
+  MESH_CORNERS_MAX = 1024, /**< of a face: cutting it takes up to their cube in time */
+  MESH_VERTICES_MAX = INT32_MAX,
+  MESH_TRIANGLES_MAX = UINT32_MAX / 3
+};
 
-/* ---- import.c: the surface as assimp gives it: all nodes joined, polygons cut. ---- */
+typedef struct mesh_faces {
+  const char *path;
+  supine_mesh *mesh;
+  size_t capacity; /**< triangles that there is room for */
+  size_t count;    /**< faces that came */
+  size_t dropped;  /**< points and lines */
+} mesh_faces;
 
-/** @param mesh     file's units and axes, not welded; written on success alone
- *  @param dropped  points and lines
- *  Frees the file's bytes as soon as it can. */
+/** Adds a face, cut into triangles. `count` may be beyond what `corners` holds where it is beyond
+ * MESH_CORNERS_MAX. @retval SUPINE_ERROR_FORMAT  a corner that is no vertex, too many corners */
+supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
+                                    supine_error *error);
+
+/* ---- ply.c, stl.c, off.c, import.c (assimp: all else): a file's surface in its own units and
+ * axes, not welded, in single precision. What stands in `mesh` after a failure is the caller's to
+ * free; `dropped` counts points and lines. The SPACE tag is noted where the head has not shown it
+ * yet. ---- */
+
+supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error);
+supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error);
+supine_status supine_mesh_read_off(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error);
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error);
+
+/* ---- guard_*.c: what importers stumble over ---- */
+
+/** OBJ: coordinates that are no numbers, names of other files. @retval SUPINE_ERROR_FORMAT */
+supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error);
+/** Line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
+bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- weld.c ---- */
 

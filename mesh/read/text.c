@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Lines, words and numbers of a text that may hold anything. */
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -58,7 +59,7 @@ static void skip_sign(mesh_text *word) {
   }
 }
 
-bool supine_mesh_text_is_number(mesh_text word) {
+static bool is_number(mesh_text word) {
   skip_sign(&word);
   if (supine_mesh_text_is(word, "nan") || supine_mesh_text_is(word, "inf") ||
       supine_mesh_text_is(word, "infinity")) {
@@ -88,12 +89,18 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   return word.at < word.end;
 }
 
-bool supine_mesh_text_skip_numbers(mesh_text *text, uint64_t count) {
+bool supine_mesh_text_number(mesh_text *text, double *value) {
   mesh_text word;
-  for (; count > 0; --count) {
-    if (!supine_mesh_text_word(text, &word) || !supine_mesh_text_is_number(word)) {
-      return false;
-    }
+  const bool good = supine_mesh_text_word(text, &word) && is_number(word);
+  *value = good ? strtod((const char *)word.at, NULL) : 0.0; /* ends with the word at the latest */
+  return good;
+}
+
+bool supine_mesh_text_position(mesh_text *text, double position[3]) {
+  bool good = true;
+  for (int k = 0; good && k < 3; ++k) {
+    good = supine_mesh_text_number(text, &position[k]);
+    position[k] = (double)(float)position[k];
   }
-  return true;
+  return good;
 }

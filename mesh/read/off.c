@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Does an OFF file hold the vertices and faces that it promises? Its bytes are written anew on the
- * way, without comments, colours and normals, over which the importer loses faces. */
-#include <stdio.h>
+/* OFF: vertices and faces, one a line, with colours and normals that a surface does not need. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,93 +46,61 @@ static bool read_counts(mesh_text *text, uint64_t *vertices, uint64_t *faces) {
          supine_mesh_text_count(word, faces);
 }
 
-static void put(FILE *out, mesh_text word) {
-  (void)fwrite(word.at, 1, (size_t)(word.end - word.at), out);
-}
-
-static bool copy_vertex(mesh_text line, FILE *out) {
-  for (int k = 0; k < 3; ++k) {
-    mesh_text word;
-    if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_is_number(word)) {
-      return false;
-    }
-    put(out, word);
-    (void)fputc(k < 2 ? ' ' : '\n', out);
-  }
-  return true;
-}
-
-static bool copy_face(mesh_text line, uint64_t vertices, FILE *out) {
+/* How many corners, and which; false for what is no number. */
+static bool read_face(mesh_text line, double corners[MESH_CORNERS_MAX], uint64_t *count) {
   mesh_text word;
-  uint64_t corners = 0;
-  if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &corners) ||
-      corners == 0) {
+  if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, count) || *count == 0) {
     return false;
   }
-  put(out, word);
-  for (; corners > 0; --corners) {
+  for (uint64_t k = 0; k < *count; ++k) {
     uint64_t corner = 0;
-    if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &corner) ||
-        corner >= vertices) {
+    if (!supine_mesh_text_word(&line, &word) || !supine_mesh_text_count(word, &corner)) {
       return false;
     }
-    (void)fputc(' ', out);
-    put(out, word);
+    corners[k < MESH_CORNERS_MAX ? k : 0] = (double)corner;
   }
-  (void)fputc('\n', out);
   return true;
 }
 
-static supine_status copy(mesh_file *file, FILE *out, supine_error *error) {
+supine_status supine_mesh_read_off(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   uint64_t vertices = 0;
   uint64_t faces = 0;
+  if (!supine_mesh_guard_text(file, error)) {
+    return SUPINE_ERROR_FORMAT;
+  }
   if (!read_counts(&text, &vertices, &faces)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: does not begin with OFF and the counts of vertices and faces",
                             file->path);
   }
-  (void)fprintf(out, "OFF\n%llu %llu 0\n", (unsigned long long)vertices, (unsigned long long)faces);
-  for (uint64_t i = 0; i < vertices; ++i) {
-    if (!next_line(&text, &line) || !copy_vertex(line, out)) {
+  const size_t room = (size_t)(text.end - text.at) / 6 + 1; /* "0 0 0\n" */
+  mesh->vertices = malloc(3 * (vertices < room ? (size_t)vertices : room) * sizeof(double));
+  if (mesh->vertices == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
+  }
+  for (uint64_t i = 0; i < vertices; ++i, ++mesh->vertex_count) {
+    if (!next_line(&text, &line) || !supine_mesh_text_position(&line, mesh->vertices + 3 * i)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: truncated or malformed at vertex %llu of %llu", file->path,
                               (unsigned long long)i, (unsigned long long)vertices);
     }
   }
-  for (uint64_t i = 0; i < faces; ++i) {
-    if (!next_line(&text, &line) || !copy_face(line, vertices, out)) {
+  mesh_faces out = {.path = file->path, .mesh = mesh};
+  supine_status status = SUPINE_OK;
+  for (uint64_t i = 0; status == SUPINE_OK && i < faces; ++i) {
+    double corners[MESH_CORNERS_MAX];
+    uint64_t count = 0;
+    if (!next_line(&text, &line) || !read_face(line, corners, &count)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: truncated or malformed at face %llu of %llu, with %llu vertices",
                               file->path, (unsigned long long)i, (unsigned long long)faces,
                               (unsigned long long)vertices);
     }
+    status = supine_mesh_faces_add(&out, corners, (size_t)count, error);
   }
-  file->faces = (size_t)faces;
-  return SUPINE_OK;
-}
-
-supine_status supine_mesh_guard_off(mesh_file *file, supine_error *error) {
-  if (!supine_mesh_guard_text(file, error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  char *bytes = NULL;
-  size_t size = 0;
-  FILE *out = open_memstream(&bytes, &size);
-  if (out == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
-  }
-  supine_status status = copy(file, out, error);
-  if (fclose(out) != 0 && status == SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
-  }
-  if (status == SUPINE_OK) {
-    free(file->bytes);
-    file->bytes = (unsigned char *)bytes;
-    file->size = size;
-  } else {
-    free(bytes);
-  }
+  *dropped = out.dropped;
   return status;
 }
