@@ -65,6 +65,7 @@ static int unknown_command(const char *name) {
 
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler_off();
+  supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();
     return SUPINE_EXIT_USAGE;

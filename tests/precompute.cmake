@@ -9,5 +9,8 @@ target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 300)
+add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_no_data_lost.sh
+  $<TARGET_FILE:supine>)
+set_tests_properties(no_data_lost PROPERTIES TIMEOUT 600)
 supine_test(projection supine_precompute supine_phantom supine_mesh_read supine_gsl)
 supine_test(fields supine_precompute supine_phantom supine_mesh_read supine_mesh_save supine_safetensors_write)

@@ -1,13 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Status strings, output files and threads: what every folder stands on. */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -90,6 +95,178 @@ static void test_output_full_or_missing_target_reports_write(void **state) {
   assert_non_null(strstr(error.message, "/dev/full"));
 }
 
+/* What the system calls below do: a file system without nameless files, a disk that is full after
+ * so many writes. */
+static bool nameless_missing;
+static int writes_left = INT_MAX;
+
+int __real_open(const char *path, int flags, ...);
+int __wrap_open(const char *path, int flags, ...);
+int __wrap_open(const char *path, int flags, ...) {
+  va_list list;
+  va_start(list, flags);
+  const unsigned mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(list, unsigned) : 0;
+  va_end(list);
+  if (nameless_missing && (flags & O_TMPFILE) == O_TMPFILE) {
+    errno = EOPNOTSUPP;
+    return -1;
+  }
+  return __real_open(path, flags, mode);
+}
+
+ssize_t __real_write(int descriptor, const void *bytes, size_t size);
+ssize_t __wrap_write(int descriptor, const void *bytes, size_t size);
+ssize_t __wrap_write(int descriptor, const void *bytes, size_t size) {
+  if (writes_left <= 0) {
+    errno = ENOSPC;
+    return -1;
+  }
+  --writes_left;
+  return __real_write(descriptor, bytes, size);
+}
+
+static void write_output(const char *path, const char *text) {
+  supine_output output;
+  assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
+  (void)fputs(text, output.file);
+  assert_int_equal(supine_output_commit(&output, NULL), SUPINE_OK);
+}
+
+static mode_t mode_of(const char *path) {
+  struct stat status;
+  assert_int_equal(stat(path, &status), 0);
+  return status.st_mode & 0777;
+}
+
+static void check_modes(void) {
+  char folder[] = "/tmp/supine-output-XXXXXX";
+  char path[64];
+  assert_non_null(mkdtemp(folder));
+  (void)snprintf(path, sizeof path, "%s/out", folder);
+  static const mode_t masks[] = {022, 027, 077, 0};
+  for (size_t i = 0; i < sizeof masks / sizeof *masks; ++i) {
+    const mode_t before = umask(masks[i]);
+    write_output(path, "new");
+    assert_int_equal(mode_of(path), 0666 & ~masks[i]);
+    assert_int_equal(chmod(path, 0640), 0);
+    write_output(path, "old"); /* keeps its own */
+    assert_int_equal(mode_of(path), 0640);
+    assert_int_equal(umask(before), masks[i]);
+    assert_int_equal(unlink(path), 0);
+  }
+  write_output(path, "kept");
+  assert_int_equal(chmod(path, 0444), 0);
+  supine_output output;
+  supine_error error;
+  assert_int_equal(supine_output_open(path, &output, &error), SUPINE_ERROR_WRITE);
+  assert_non_null(strstr(error.message, "Permission denied"));
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(rmdir(folder), 0);
+}
+
+static void check_links(void) {
+  char folder[] = "/tmp/supine-output-XXXXXX";
+  char target[64];
+  char link[64];
+  char over[64];
+  char text[16];
+  assert_non_null(mkdtemp(folder));
+  (void)snprintf(target, sizeof target, "%s/target", folder);
+  (void)snprintf(link, sizeof link, "%s/link", folder);
+  (void)snprintf(over, sizeof over, "%s/over", folder);
+  assert_int_equal(symlink("target", link), 0);
+  assert_int_equal(symlink(link, over), 0);
+  for (int i = 0; i < 2; ++i) { /* what it leads to is not there yet; is there */
+    struct stat status;
+    write_output(over, i == 0 ? "first" : "second");
+    read_text(target, text, sizeof text);
+    assert_string_equal(text, i == 0 ? "first" : "second");
+    assert_int_equal(lstat(over, &status), 0);
+    assert_true(S_ISLNK(status.st_mode));
+  }
+  assert_int_equal(unlink(over) + unlink(link) + unlink(target), 0);
+  assert_int_equal(rmdir(folder), 0);
+}
+
+/* Enough for several buffers, so that a write fails before the last and at it. */
+static void check_full_disk(void) {
+  char folder[] = "/tmp/supine-output-XXXXXX";
+  char path[64];
+  char text[16];
+  static char much[1 << 20];
+  assert_non_null(mkdtemp(folder));
+  (void)snprintf(path, sizeof path, "%s/out", folder);
+  write_output(path, "old");
+  supine_status status = SUPINE_ERROR_WRITE;
+  int failed = 0;
+  for (; status != SUPINE_OK; ++failed) {
+    supine_output output;
+    supine_error error;
+    assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
+    writes_left = failed;
+    for (size_t i = 0; i < sizeof much; i += 4096) {
+      (void)fwrite(much + i, 1, 4096, output.file);
+    }
+    status = supine_output_commit(&output, &error);
+    writes_left = INT_MAX;
+    if (status != SUPINE_OK) {
+      assert_int_equal(status, SUPINE_ERROR_WRITE);
+      assert_non_null(strstr(error.message, "No space left on device"));
+      read_text(path, text, sizeof text);
+      assert_string_equal(text, "old");
+    }
+  }
+  assert_true(failed > 3);
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(rmdir(folder), 0);
+}
+
+static void test_output_keeps_modes_links_and_old_files(void **state) {
+  (void)state;
+  for (int i = 0; i < 2; ++i) {
+    nameless_missing = i == 1;
+    check_modes();
+    check_links();
+    check_full_disk();
+    test_output_commit_replaces_abandon_keeps(state);
+  }
+  nameless_missing = false;
+}
+
+static void test_output_abandon_all_removes_temporary_names(void **state) {
+  (void)state;
+  char folder[] = "/tmp/supine-output-XXXXXX";
+  char path[64];
+  assert_non_null(mkdtemp(folder));
+  (void)snprintf(path, sizeof path, "%s/out", folder);
+  supine_output output;
+  nameless_missing = true;
+  assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
+  nameless_missing = false;
+  assert_int_equal(access(output.temporary, F_OK), 0);
+  supine_output_abandon_all();
+  assert_int_equal(rmdir(folder), 0); /* fails where a temporary file is left */
+  supine_output_abandon(&output);
+  assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
+}
+
+static void test_thread_count_bounded_and_nonsense_ignored(void **state) {
+  (void)state;
+  assert_int_equal(unsetenv("SUPINE_THREADS"), 0);
+  const size_t own = supine_thread_count();
+  static const struct {
+    const char *text;
+    size_t count; /* 0: as without it */
+  } cases[] = {{"1", 1},   {"7", 7},          {"255", 255}, {"256", 256}, {"257", 0},
+               {"0", 0},   {"-1", 0},         {"2 x", 0},   {"", 0},      {"many", 0},
+               {"1e2", 0}, {"4294967297", 0}, {"3.", 0},    {"0x10", 0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    assert_int_equal(setenv("SUPINE_THREADS", cases[i].text, 1), 0);
+    assert_int_equal(supine_thread_count(), cases[i].count == 0 ? own : cases[i].count);
+  }
+  assert_int_equal(unsetenv("SUPINE_THREADS"), 0);
+}
+
 typedef struct tally {
   _Atomic unsigned char seen[1000];
   size_t grain;
@@ -128,6 +305,9 @@ int main(void) {
       cmocka_unit_test(test_error_set_long_message_cut),
       cmocka_unit_test(test_output_commit_replaces_abandon_keeps),
       cmocka_unit_test(test_output_full_or_missing_target_reports_write),
+      cmocka_unit_test(test_output_keeps_modes_links_and_old_files),
+      cmocka_unit_test(test_output_abandon_all_removes_temporary_names),
+      cmocka_unit_test(test_thread_count_bounded_and_nonsense_ignored),
       cmocka_unit_test(test_parallel_for_any_split_covers_each_item_once),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

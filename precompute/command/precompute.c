@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/csv.h"
+#include "sh/base/output.h"
 #include <supine/sh.h>
 
 #include "precompute/command/model_options.h"
@@ -124,6 +126,24 @@ static void report_fit(const char *path, const supine_fields *fields, const supi
                fit->accuracy.max_mm);
 }
 
+/* The output must be none of the surfaces that a list of fields names. */
+static int check_fields(const char *list, const char *output) {
+  static const char *const columns[] = {"gx", "gy", "gz", "file"};
+  supine_csv csv;
+  bool more = true;
+  int result = SUPINE_EXIT_OK;
+  if (supine_csv_open(list, columns, 4, 4, &csv, NULL) != SUPINE_OK) {
+    return SUPINE_EXIT_OK; /* no list: what is wrong with it is said when it is loaded */
+  }
+  while (result == SUPINE_EXIT_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
+    char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
+    result = path != NULL ? supine_options_check_output(name, output, path) : SUPINE_EXIT_NUMERICAL;
+    free(path);
+  }
+  supine_csv_close(&csv);
+  return result;
+}
+
 static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
   const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
                                       .modes = wanted->basis.modes,
@@ -154,7 +174,7 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   wanted->basis.made_by = made_by;
   wanted->basis.progress = supine_options_progress_step;
   wanted->basis.progress_context = &progress;
-  supine_options_interrupts_catch();
+  supine_options_signals_catch(true);
   const supine_status status =
       supine_precompute(lungs, &wanted->basis, wanted->path, &report, &error);
   supine_options_progress_end(&progress);
@@ -172,8 +192,14 @@ static void begin(void *chosen) {
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   supine_lungs lungs = {0};
-  int result =
-      supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
+  if (supine_mesh_save_supports(wanted->path)) {
+    return supine_options_usage(
+        name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
+  }
+  int result = wanted->fields != NULL ? check_fields(wanted->fields, wanted->path) : SUPINE_EXIT_OK;
+  if (result == SUPINE_EXIT_OK) {
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
+  }
   if (result == SUPINE_EXIT_OK) {
     result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)
                                     : compute(&lungs, wanted, given->made_by);

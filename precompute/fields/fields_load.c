@@ -9,6 +9,7 @@
 #include <supine/safetensors.h>
 
 #include "sh/base/csv.h"
+#include "sh/base/output.h"
 
 /* Directions closer than this are the same, radians. */
 static const double same_direction = 1e-6;
@@ -103,18 +104,6 @@ cleanup:
   return status;
 }
 
-/* `name` beside the file `list`; a name that begins with / stands for itself. */
-static char *beside(const char *list, const char *name) {
-  const char *slash = name[0] == '/' ? NULL : strrchr(list, '/');
-  const size_t stem = slash == NULL ? 0 : (size_t)(slash - list) + 1;
-  char *path = malloc(stem + strlen(name) + 1);
-  if (path != NULL) {
-    memcpy(path, list, stem);
-    memcpy(path + stem, name, strlen(name) + 1);
-  }
-  return path;
-}
-
 /* The surfaces of a list, loaded on all cores once the list is read. */
 typedef struct surface_work {
   char **paths;
@@ -185,7 +174,7 @@ static supine_status take_row(const supine_csv *csv, supine_fields *fields, char
   if (status != SUPINE_OK) {
     return status;
   }
-  (*paths)[at] = beside(csv->path, supine_csv_text(csv, 3));
+  (*paths)[at] = supine_path_beside(csv->path, supine_csv_text(csv, 3));
   if ((*paths)[at] == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", csv->path);
   }

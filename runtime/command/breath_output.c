@@ -84,6 +84,15 @@ static supine_status folder_is_free(const char *path, supine_error *error) {
                                        path);
 }
 
+/* A folder of a name that ends in XXXXXX and nobody else has; its mode as the process's mask
+ * allows, which mkdtemp's would not be. */
+static bool make_temporary(char *name) {
+  if (mkdtemp(name) == NULL || rmdir(name) != 0) {
+    return false;
+  }
+  return mkdir(name, 0777) == 0;
+}
+
 static supine_status open_series(breath_output *made, supine_error *error) {
   made->folder = join(made->path, "");
   if (made->folder == NULL) {
@@ -105,13 +114,10 @@ static supine_status open_series(breath_output *made, supine_error *error) {
     return no_memory(made->path, error);
   }
   const supine_status status = folder_is_free(made->folder, error);
-  if (status != SUPINE_OK || mkdtemp(made->temporary) == NULL) {
+  if (status != SUPINE_OK || !make_temporary(made->temporary)) {
     made->temporary[0] = '\0';
     return status != SUPINE_OK ? status : fail(made->path, "cannot create its folder", error);
   }
-  const mode_t mask = umask(0);
-  (void)umask(mask);
-  (void)chmod(made->temporary, 0777 & ~mask);
   return SUPINE_OK;
 }
 
@@ -128,10 +134,7 @@ static supine_status open_tensors(breath_output *made, supine_error *error) {
         made->path, made->course->count, made->rest->vertex_count,
         4e-9 * (double)frame * (double)made->course->count);
   }
-  supine_output probe = {0}; /* whether the name can be written is found before the work */
-  const supine_status status = supine_output_open(made->path, &probe, error);
-  supine_output_abandon(&probe);
-  return status;
+  return supine_output_try(made->path, error); /* before the work */
 }
 
 supine_status supine_command_breath_output_open(const char *path, const supine_mesh *rest,

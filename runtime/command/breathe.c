@@ -195,13 +195,13 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   if (status == SUPINE_OK) {
     status = supine_breath_frames_create(basis, &course, &frames, error);
   }
+  supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
     status = supine_command_breath_output_open(wanted->path, &rest, &course, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_options_interrupts_catch();
   progress = supine_options_progress_begin(name);
   for (size_t t = 0; t < count && status == SUPINE_OK; ++t) {
     seconds[t] = supine_breath_frames_next(frames, xyz);

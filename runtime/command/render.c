@@ -94,6 +94,9 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
     return supine_options_fail(name, &error);
   }
   if (supine_render_picture_write(renderer, picture, output.file, &error) != SUPINE_OK) {
+    if (ferror(output.file) != 0) { /* why a write failed, the output knows */
+      (void)supine_output_commit(&output, &error);
+    }
     supine_output_abandon(&output);
     return supine_options_fail(name, &error);
   }

@@ -68,8 +68,9 @@ supine_progress supine_options_progress_begin(const char *label);
 bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 
-/* Lets SIGINT and SIGTERM ask for an orderly end instead of ending the program. */
-void supine_options_interrupts_catch(void);
+/* Signals that end the program leave no unfinished file behind. With an orderly end SIGINT, SIGTERM
+ * and SIGHUP ask for it instead, once: progress says so. */
+void supine_options_signals_catch(bool orderly_end);
 bool supine_options_interrupted(void);
 
 #endif

@@ -4,6 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
+
+#include "sh/base/output.h"
 
 #include "runtime/options/command.h"
 
@@ -268,6 +271,53 @@ static int check_given(const reading *r, size_t operands, char **argv) {
   return SUPINE_EXIT_OK;
 }
 
+int supine_options_check_output(const char *command, const char *output, const char *input) {
+  struct stat old;
+  struct stat read;
+  const bool same = stat(output, &old) == 0 && stat(input, &read) == 0 && S_ISREG(old.st_mode) &&
+                    old.st_dev == read.st_dev && old.st_ino == read.st_ino;
+  return same ? supine_options_usage(command, "%s: an output must not replace an input (%s)",
+                                     output, input)
+              : SUPINE_EXIT_OK;
+}
+
+/* No output is an input or another output, and each can be written. */
+static int check_output(const reading *r, const row *output, const supine_arguments *given) {
+  const char *name = r->command->name;
+  int result = SUPINE_EXIT_OK;
+  for (size_t i = 0; i < given->count && result == SUPINE_EXIT_OK; ++i) {
+    result = supine_options_check_output(name, output->value, given->operand[i]);
+  }
+  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+    const row *other = &r->rows[i];
+    if (!other->given || other->option->file == SUPINE_FILE_NONE) {
+      continue;
+    }
+    if (other->option->file == SUPINE_FILE_IN) {
+      result = supine_options_check_output(name, output->value, other->value);
+    } else if (other < output && strcmp(output->value, other->value) == 0) {
+      result = supine_options_usage(name, "--%s and --%s name the same file", other->option->name,
+                                    output->option->name);
+    }
+  }
+  supine_error error;
+  if (result == SUPINE_EXIT_OK && output->option->file == SUPINE_FILE_OUT &&
+      supine_output_try(output->value, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  }
+  return result;
+}
+
+static int check_outputs(const reading *r, const supine_arguments *given) {
+  int result = SUPINE_EXIT_OK;
+  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+    if (r->rows[i].given && r->rows[i].option->file >= SUPINE_FILE_OUT) {
+      result = check_output(r, &r->rows[i], given);
+    }
+  }
+  return result;
+}
+
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   reading r = {.command = command, .request = calloc(1, command->request_size)};
   char made_by[512];
@@ -295,6 +345,9 @@ int supine_options_run(const supine_command *command, int argc, char **argv) {
   } else if (result == SUPINE_EXIT_OK) {
     const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
     result = check_given(&r, given.count, argv);
+    if (result == SUPINE_EXIT_OK) {
+      result = check_outputs(&r, &given);
+    }
     if (result == SUPINE_EXIT_OK) {
       result = command->run(r.request, &given);
     }

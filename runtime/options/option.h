@@ -127,6 +127,10 @@ typedef struct supine_command {
  * command's name. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
+/* Refuses an output that is an input, by name, link or inode: SUPINE_EXIT_USAGE after a message.
+ * For inputs that other inputs name; those of the command line are seen to. */
+int supine_options_check_output(const char *command, const char *output, const char *input);
+
 /* Calls `each` for every row of a table and of the tables in it, in order, with where its struct
  * begins in the request. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);

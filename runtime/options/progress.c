@@ -4,22 +4,32 @@
 #include <unistd.h>
 
 #include "sh/base/clock.h"
+#include "sh/base/output.h"
 
 #include "runtime/options/command.h"
 
-static volatile sig_atomic_t interrupted;
+static volatile sig_atomic_t orderly, interrupted;
 
 static void on_signal(int number) {
-  (void)number;
-  interrupted = 1;
+  if (orderly != 0 && interrupted == 0) {
+    interrupted = 1;
+    return;
+  }
+  supine_output_abandon_all();
+  (void)signal(number, SIG_DFL);
+  (void)raise(number); /* ends the program when this handler returns */
 }
 
-void supine_options_interrupts_catch(void) {
+void supine_options_signals_catch(bool orderly_end) {
+  static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
   struct sigaction action = {0};
   action.sa_handler = on_signal;
-  action.sa_flags = (int)SA_RESETHAND; /* a second signal ends the program at once */
-  (void)sigaction(SIGINT, &action, NULL);
-  (void)sigaction(SIGTERM, &action, NULL);
+  action.sa_flags = SA_RESTART;
+  orderly = orderly_end ? 1 : 0;
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
+    (void)sigaction(numbers[i], &action, NULL);
+  }
+  (void)signal(SIGXFSZ, SIG_IGN); /* a file that grows too large is an error of the write */
 }
 
 bool supine_options_interrupted(void) {

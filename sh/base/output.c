@@ -1,13 +1,61 @@
 /* SPDX-License-Identifier: MIT */
 /* Output files that appear whole or not at all. */
 #include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdatomic.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "sh/base/output.h"
+
+/* What stdio writes through: it remembers why a write failed, which FILE does not. */
+struct supine_output_stream {
+  int descriptor;
+  int code; /* errno of the first failure, or 0 */
+};
+
+enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* more than outputs are open at once; bytes */
+
+/* Temporary names that exist, for supine_output_abandon_all. */
+static char *_Atomic live[LIVE_MAX];
+
+static void set_live(char *from, char *to) {
+  for (int i = 0; i < LIVE_MAX; ++i) {
+    char *expected = from;
+    if (atomic_compare_exchange_strong(&live[i], &expected, to)) {
+      return;
+    }
+  }
+}
+
+void supine_output_abandon_all(void) {
+  for (int i = 0; i < LIVE_MAX; ++i) {
+    const char *name = atomic_load(&live[i]);
+    if (name != NULL) {
+      (void)unlink(name);
+    }
+  }
+}
+
+static ssize_t stream_write(void *cookie, const char *bytes, size_t size) {
+  struct supine_output_stream *stream = cookie;
+  size_t done = 0;
+  while (done < size && stream->code == 0) {
+    const ssize_t wrote = write(stream->descriptor, bytes + done, size - done);
+    if (wrote > 0) {
+      done += (size_t)wrote;
+    } else if (wrote < 0 && errno != EINTR) {
+      stream->code = errno;
+    }
+  }
+  return done == size ? (ssize_t)size : 0;
+}
 
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
   const int code = errno;
@@ -17,85 +65,208 @@ static supine_status output_fail(supine_output *output, supine_error *error, con
   return SUPINE_ERROR_WRITE;
 }
 
-/* The mode a plain fopen would give; an existing file keeps its own. */
-static mode_t output_mode(const struct stat *old) {
-  if (old != NULL) {
-    return old->st_mode & 0777;
+char *supine_path_beside(const char *path, const char *name) {
+  const char *slash = name[0] == '/' ? NULL : strrchr(path, '/');
+  const size_t stem = slash == NULL ? 0 : (size_t)(slash - path) + 1;
+  char *made = malloc(stem + strlen(name) + 1);
+  if (made != NULL) {
+    memcpy(made, path, stem);
+    memcpy(made + stem, name, strlen(name) + 1);
   }
-  const mode_t mask = umask(0);
-  (void)umask(mask);
-  return 0666 & ~mask;
+  return made;
+}
+
+/* What a path leads to, symbolic links of its last part followed, there or not. */
+static char *follow_links(const char *path) {
+  enum { LINKS_MAX = 40 }; /* as the kernel's */
+  char *at = strdup(path);
+  for (int i = 0; at != NULL && i < LINKS_MAX; ++i) {
+    char link[PATH_MAX];
+    const ssize_t length = readlink(at, link, sizeof link - 1);
+    if (length < 0) {
+      break;
+    }
+    link[length] = '\0';
+    char *next = supine_path_beside(at, link);
+    free(at);
+    at = next;
+  }
+  return at;
+}
+
+static void descriptor_path(int descriptor, char path[32]) {
+  (void)snprintf(path, 32, "/proc/self/fd/%d", descriptor);
+}
+
+/* Gives the output a temporary name beside its target that nobody else has: a new file's, whose
+ * descriptor it returns, or one for the file that `link` leads to. -1 and errno. */
+static int take_temporary(supine_output *output, const char *link) {
+  enum { TRIES = 100 };
+  const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
+  int result = -1;
+  output->temporary = malloc(size);
+  for (int i = 0; output->temporary != NULL && i < TRIES; ++i) {
+    unsigned long long number = 0;
+    (void)!getrandom(&number, sizeof number, 0);
+    (void)snprintf(output->temporary, size, "%s.part-%llx", output->target, number);
+    result = link != NULL ? linkat(AT_FDCWD, link, AT_FDCWD, output->temporary, AT_SYMLINK_FOLLOW)
+                          : open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (result >= 0) {
+      set_live(NULL, output->temporary);
+      return result;
+    }
+    if (errno != EEXIST) {
+      break;
+    }
+  }
+  free(output->temporary);
+  output->temporary = NULL;
+  return -1;
+}
+
+/* A file without a name in the target's folder, where it can be given one later; else one with a
+ * temporary name. -1 and errno. */
+static int open_regular(supine_output *output) {
+  char *folder = supine_path_beside(output->target, ".");
+  if (folder == NULL) {
+    errno = ENOMEM;
+    return -1;
+  }
+  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* less the mask */
+  free(folder);
+  if (descriptor >= 0) {
+    char link[32];
+    descriptor_path(descriptor, link);
+    if (access(link, F_OK) == 0) {
+      return descriptor;
+    }
+    (void)close(descriptor); /* no /proc: it could not be given a name */
+  }
+  return take_temporary(output, NULL);
+}
+
+static int open_descriptor(supine_output *output) {
+  struct stat old;
+  if (stat(output->target, &old) != 0) {
+    return open_regular(output);
+  }
+  if (S_ISDIR(old.st_mode)) {
+    errno = EISDIR;
+    return -1;
+  }
+  if (!S_ISREG(old.st_mode)) { /* a device or pipe cannot be replaced: write into it */
+    return open(output->target, O_WRONLY | O_CLOEXEC);
+  }
+  if ((old.st_mode & 0222) == 0) {
+    errno = EACCES;
+    return -1;
+  }
+  const int descriptor = open_regular(output);
+  if (descriptor >= 0) {
+    (void)fchmod(descriptor, old.st_mode & 0777);
+  }
+  return descriptor;
 }
 
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error) {
-  static const char suffix[] = ".part-XXXXXX";
   *output = (supine_output){0};
-  const size_t length = strlen(path);
-  output->path = malloc(length + 1);
-  output->temporary = calloc(1, length + sizeof suffix);
-  if (output->path == NULL || output->temporary == NULL) {
+  output->path = strdup(path);
+  output->target = follow_links(path);
+  output->stream = malloc(sizeof *output->stream);
+  if (output->stream != NULL) {
+    *output->stream = (struct supine_output_stream){.descriptor = -1};
+  }
+  if (output->path == NULL || output->target == NULL || output->stream == NULL) {
     supine_output_abandon(output);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
-  memcpy(output->path, path, length + 1);
-  memcpy(output->temporary, path, length);
-  memcpy(output->temporary + length, suffix, sizeof suffix);
-
-  struct stat old = {0};
-  const int exists = stat(path, &old) == 0;
-  if (exists && S_ISDIR(old.st_mode)) {
-    errno = EISDIR;
+  output->stream->descriptor = open_descriptor(output);
+  if (output->stream->descriptor < 0) {
     return output_fail(output, error, "cannot write");
   }
-  if (exists && !S_ISREG(old.st_mode)) { /* a device or pipe cannot be replaced: write into it */
-    output->temporary[0] = '\0';
-    output->file = fopen(path, "wb");
-  } else {
-    const int descriptor = mkstemp(output->temporary);
-    if (descriptor < 0) {
-      output->temporary[0] = '\0';
-      return output_fail(output, error, "cannot create");
-    }
-    (void)fchmod(descriptor, output_mode(exists ? &old : NULL));
-    output->file = fdopen(descriptor, "wb");
-    if (output->file == NULL) {
-      (void)close(descriptor);
-    }
-  }
-  if (output->file == NULL) {
-    return output_fail(output, error, "cannot create");
+  output->file = fopencookie(output->stream, "wb", (cookie_io_functions_t){.write = stream_write});
+  if (output->file == NULL || setvbuf(output->file, NULL, _IOFBF, BUFFER) != 0) {
+    supine_output_abandon(output);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
   return SUPINE_OK;
 }
 
+/* Gives the finished file its name; false and errno. */
+static bool give_name(supine_output *output) {
+  if (output->temporary == NULL) {
+    char link[32];
+    descriptor_path(output->stream->descriptor, link);
+    if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
+      return true;
+    }
+    /* A link replaces nothing: where there is an old file the new one goes beside it first. */
+    if (errno != EEXIST || take_temporary(output, link) < 0) {
+      return false;
+    }
+  }
+  return rename(output->temporary, output->target) == 0;
+}
+
+/* Waits until the folder's entry is on the disk, where that can be waited for. */
+static void sync_folder(const char *target) {
+  char *folder = supine_path_beside(target, ".");
+  const int descriptor = folder != NULL ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+  if (descriptor >= 0) {
+    (void)fsync(descriptor);
+    (void)close(descriptor);
+  }
+  free(folder);
+}
+
 supine_status supine_output_commit(supine_output *output, supine_error *error) {
+  struct supine_output_stream *stream = output->stream;
+  struct stat made;
   errno = 0;
-  const int bad = ferror(output->file) != 0 || fflush(output->file) != 0;
-  if (bad) {
-    errno = errno == 0 ? EIO : errno;
+  const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
+  const bool regular = fstat(stream->descriptor, &made) == 0 && S_ISREG(made.st_mode);
+  if (!flushed || stream->code != 0 || (regular && fsync(stream->descriptor) != 0)) {
+    errno = stream->code != 0 ? stream->code : errno == 0 ? EIO : errno;
     return output_fail(output, error, "cannot write");
   }
-  FILE *file = output->file;
-  output->file = NULL;
-  if (fclose(file) != 0) {
-    return output_fail(output, error, "cannot write");
+  if (regular) {
+    if (!give_name(output)) {
+      return output_fail(output, error, "cannot replace");
+    }
+    if (output->temporary != NULL) {
+      set_live(output->temporary, NULL);
+      output->temporary[0] = '\0'; /* no longer its name */
+    }
+    sync_folder(output->target);
   }
-  if (output->temporary[0] != '\0' && rename(output->temporary, output->path) != 0) {
-    return output_fail(output, error, "cannot replace");
-  }
-  output->temporary[0] = '\0';
   supine_output_abandon(output);
   return SUPINE_OK;
 }
 
 void supine_output_abandon(supine_output *output) {
-  if (output->file != NULL) {
-    (void)fclose(output->file);
-  }
   if (output->temporary != NULL && output->temporary[0] != '\0') {
     (void)unlink(output->temporary);
+    set_live(output->temporary, NULL);
   }
+  if (output->stream != NULL) {
+    output->stream->code = output->stream->code == 0 ? ECANCELED : output->stream->code;
+    if (output->stream->descriptor >= 0) {
+      (void)close(output->stream->descriptor);
+    }
+  }
+  if (output->file != NULL) {
+    (void)fclose(output->file); /* writes nothing more: the stream has failed */
+  }
+  free(output->stream);
   free(output->temporary);
+  free(output->target);
   free(output->path);
   *output = (supine_output){0};
+}
+
+supine_status supine_output_try(const char *path, supine_error *error) {
+  supine_output output;
+  const supine_status status = supine_output_open(path, &output, error);
+  supine_output_abandon(&output);
+  return status;
 }

@@ -1,0 +1,158 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# No command loses data: test_no_data_lost.sh PROGRAM [KILLS]
+#
+# An output that is an input is refused, however it is named; outputs are tried before the work; full
+# disks, files that grow too large and signals leave the old file, and nothing else; KILLS times
+# (default 2) for each writer and signal it is ended at some moment.
+set -u
+supine=$1
+kills=${2:-2}
+work=$(mktemp -d) || exit 1
+trap 'cd /; umount "$work/small" 2>/dev/null; rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+"$supine" phantom --vertices 700 -o lungs.ply >/dev/null || exit 1
+"$supine" precompute lungs.ply --band 3 -o lungs.safetensors >/dev/null || exit 1
+"$supine" pv show | cut -d, -f1,2 | sed '1s/.*/pressure_cmH2O,volume_mL/' >samples.csv
+"$supine" pv fit samples.csv -o lungs.pv >/dev/null || exit 1
+
+# refused INPUT ENDING COMMAND...: the command, with -o and each name of the input, changes nothing.
+refused() {
+  input=$1
+  ending=$2
+  shift 2
+  cp "$input" "before$ending" && cp "$input" "input$ending"
+  ln -f "input$ending" "hard$ending"
+  ln -sf "input$ending" "soft$ending"
+  for name in "input$ending" "./input$ending" "hard$ending" "soft$ending" "$work/input$ending"; do
+    "$supine" "$@" -o "$name" >said 2>&1
+    code=$?
+    [ $code -eq 1 ] && grep -q 'must not replace an input' said || fail "$* -o $name: $code, $(cat said)"
+    cmp -s "before$ending" "input$ending" || fail "$* -o $name: the input is not what it was"
+  done
+  rm -f "before$ending" "input$ending" "hard$ending" "soft$ending"
+}
+# The input has each output's ending in turn, so that nothing else is in the way.
+refused lungs.ply .ply precompute input.ply
+refused lungs.ply .ply solve input.ply --posture prone
+refused lungs.safetensors .safetensors precompute lungs.ply --fields input.safetensors
+refused lungs.safetensors .ply deform input.ply --posture prone
+refused lungs.safetensors .html compare input.html
+refused lungs.safetensors .png render input.png --posture prone
+refused lungs.safetensors .html export input.html
+refused lungs.safetensors .glb export input.glb
+refused lungs.safetensors .pvd breathe input.pvd --posture prone
+refused lungs.pv .pvd breathe lungs.safetensors --posture prone --pv input.pvd
+refused samples.csv .csv pv fit input.csv
+cp lungs.safetensors same.csv
+"$supine" compare same.csv --csv same.csv >/dev/null 2>&1
+cmp -s lungs.safetensors same.csv || fail "compare --csv replaced its basis"
+"$supine" phantom --vertices 700 -o rest.ply >/dev/null
+cp lungs.ply field.safetensors
+printf 'gx,gy,gz,file\n0,1,0,lungs.ply\n0,-1,0,field.safetensors\n' >fields.csv
+"$supine" precompute rest.ply --fields fields.csv -o field.safetensors >said 2>&1
+grep -q 'must not replace an input' said || fail "a field of --fields as output: $(cat said)"
+cmp -s lungs.ply field.safetensors || fail "a field of --fields was replaced"
+"$supine" precompute lungs.ply -o basis.stl >said 2>&1
+[ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"
+
+# The output's folder is missing: said before the input is even read.
+"$supine" precompute missing.ply -o nowhere/a.safetensors >said 2>&1
+[ $? -eq 4 ] && grep -q 'nowhere/a.safetensors: .*No such file' said || fail "missing folder: $(cat said)"
+
+# A link stays one, and what it leads to is replaced.
+mkdir far
+echo old >far/target.ply
+ln -s far/target.ply link.ply
+"$supine" deform lungs.safetensors --posture prone -o link.ply >/dev/null || fail "through a link"
+[ -L link.ply ] && [ "$(head -c 3 far/target.ply)" = ply ] || fail "the link did not stay"
+
+# writer NAME COMMAND...: runs "COMMAND -o NAME" to its end once, then under limits and signals.
+writer() {
+  name=$1
+  shift
+  mkdir out
+  began=$(date +%s%N)
+  "$supine" "$@" -o "out/$name" >said 2>&1
+  code=$?
+  took=$((($(date +%s%N) - began) / 1000000))
+  if [ $code -eq 3 ]; then
+    echo "skipped $1: $(cat said)"
+    rm -rf out
+    return
+  fi
+  [ $code -eq 0 ] || fail "$*: $code, $(cat said)"
+  mv "out/$name" whole
+  rm -rf out && mkdir out
+
+  (ulimit -f 8; "$supine" "$@" -o "out/$name" >said 2>&1)
+  code=$?
+  [ $code -eq 4 ] && grep -q 'File too large' said || fail "$*: too large: $code, $(cat said)"
+  [ -z "$(ls -A out)" ] || fail "$*: too large left $(ls -A out)"
+
+  if [ -d small ]; then
+    "$supine" "$@" -o "small/$name" >said 2>&1
+    code=$?
+    [ $code -eq 4 ] && grep -q 'No space left on device' said || fail "$*: full: $code, $(cat said)"
+    [ "$(ls -A small)" = filler ] || fail "$*: a full disk left $(ls -A small)"
+  fi
+
+  for signal in KILL TERM INT; do
+    done_whole=0
+    for i in $(seq "$kills"); do
+      moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
+      timeout -s $signal "$moment" "$supine" "$@" -o "out/$name" >/dev/null 2>&1
+      case "$(ls -A out)" in
+      "") ;;
+      "$name")
+        done_whole=$((done_whole + 1))
+        [ "$name" = turning ] || cmp -s whole "out/$name" || fail "$*: SIG$signal at $moment s left part of it"
+        ;;
+      *) fail "$*: SIG$signal at $moment s left $(ls -A out)" ;;
+      esac
+      rm -rf out && mkdir out
+    done
+    echo "$1: $kills times SIG$signal within $took ms: $done_whole whole, the others nothing"
+  done
+  rm -rf out whole
+}
+mkdir small
+if mount -t tmpfs -o size=16k tmpfs small 2>/dev/null; then
+  head -c 8192 /dev/zero >small/filler
+else
+  rmdir small
+  echo "no full disk: mounting one takes more rights"
+fi
+writer phantom.ply phantom --vertices 20000
+writer basis.safetensors precompute lungs.ply --band 3
+writer prone.vtp deform lungs.safetensors --posture prone
+writer prone.stl solve lungs.ply --posture prone
+writer column.csv solve lungs.ply --unit-force 3
+writer report.html compare lungs.safetensors --postures supine,prone
+writer lung.png render lungs.safetensors --posture supine
+writer page.html export lungs.safetensors
+writer lungs.glb export lungs.safetensors --animate
+writer frames.safetensors breathe lungs.safetensors --posture prone
+
+# A series is a folder of files: it cannot be nameless, so SIGKILL is beyond it; other signals not.
+for signal in TERM INT HUP; do
+  for i in 1 2 3 4; do
+    mkdir out
+    timeout -s $signal "0.0$i" "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null 2>&1
+    case "$(ls -A out | tr '\n' ' ')" in
+    "" | "frames frames.pvd ") ;;
+    *) fail "breathe: SIG$signal left $(ls -A out)" ;;
+    esac
+    rm -rf out
+  done
+done
+(mkdir out; ulimit -f 8; "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >said 2>&1)
+[ -z "$(ls -A out)" ] && grep -q 'File too large' said || fail "breathe: too large: $(cat said), $(ls -A out)"
+
+[ $failures -eq 0 ] || { echo "$failures failures"; exit 1; }
