@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The checksum of OpenIGTLink's messages, fast: CRC-64 of ECMA-182, most significant bit first,
+ * from 0,
+ *
+ *     crc(M) = M(x) x^64 mod P,     P = x^64 + 0x42F0E1EBA9EA3693
+ *
+ * and so linear: checksums of parts join into the whole's without another look at the parts. */
+#ifndef SUPINE_STREAM_CRC64_H
+#define SUPINE_STREAM_CRC64_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Goes on from `crc` (0 at first) over more bytes: by carry-less multiplication where the
+ * processor has it, else as supine_stream_crc64_tables. Thread-safe. */
+uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
+
+/** The same, 16 bytes a step through 16 tables. */
+uint64_t supine_stream_crc64_tables(uint64_t crc, const void *bytes, size_t size);
+
+/** x^(8 size) mod P: what `size` more bytes multiply a checksum by. */
+uint64_t supine_stream_crc64_power(size_t size);
+
+/** crc(A B) = crc(A) x^(8 |B|) + crc(B).
+ * @param power  supine_stream_crc64_power of the second part's size */
+uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

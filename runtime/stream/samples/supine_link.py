@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""A peer of 'supine stream' in plain Python: OpenIGTLink over a socket, and the basis file.
+
+    link = Link("localhost", 18944)
+    link.send_pose(rotation)               # 3 x 3, rows
+    stamp, frame = link.newest(timeout=1)  # weights and scales, or points
+"""
+import json
+import select
+import socket
+import struct
+import time
+
+HEADER = struct.Struct(">H12s20sQQQ")
+EXTENSION = struct.Struct(">HHII")  # its size, metadata index's size, metadata's size, number
+
+
+def _crc_table():
+    table = []
+    for byte in range(256):
+        value = byte << 56
+        for _ in range(8):
+            value = (value << 1) ^ (0x42F0E1EBA9EA3693 if value >> 63 else 0)
+            value &= 0xFFFFFFFFFFFFFFFF
+        table.append(value)
+    return table
+
+
+_TABLE = _crc_table()
+
+
+def crc64(data, crc=0):
+    """CRC-64 of ECMA-182, most significant bit first, from 0."""
+    for byte in data:
+        crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
+    return crc
+
+
+def pack(kind, device, content, stamp=0, version=1, number=0):
+    """A whole message; one of version 2 has an extension before and metadata behind its content."""
+    if version == 2:
+        content = EXTENSION.pack(12, 2, 0, number) + content + b"\0\0"
+    return HEADER.pack(version, kind.encode(), device.encode(), stamp, len(content),
+                       crc64(content)) + content
+
+
+def transform(rotation, position=(0, 0, 0)):
+    """Content of a TRANSFORM: the columns of the matrix, then the position."""
+    columns = [rotation[row][column] for column in range(3) for row in range(3)]
+    return struct.pack(">12f", *columns, *position)
+
+
+def quaternion(wxyz, position=(0, 0, 0)):
+    """Content of a POSITION."""
+    w, x, y, z = wxyz
+    return struct.pack(">7f", *position, x, y, z, w)
+
+
+def instruments(poses):
+    """Content of a QTDATA: {name: (w, x, y, z)}."""
+    return b"".join(struct.pack(">20sBB", name.encode(), 2, 0) + quaternion(wxyz)
+                    for name, wxyz in poses.items())
+
+
+def array(values):
+    """Content of an NDARRAY of one dimension, float64."""
+    return struct.pack(f">BBH{len(values)}d", 11, 1, len(values), *values)
+
+
+def string(text):
+    """Content of a STRING, US-ASCII."""
+    return struct.pack(">HH", 3, len(text)) + text.encode("ascii")
+
+
+def unpack(kind, content):
+    """NDARRAY: a tuple of floats. POLYDATA: (points as a flat tuple of x, y, z, triangles as a flat
+    tuple of corners). STRING: text. Others: the bytes."""
+    if kind == "NDARRAY":
+        scalar, dimension = content[0], content[1]
+        count = 1
+        for size in struct.unpack_from(f">{dimension}H", content, 2):
+            count *= size
+        return struct.unpack_from(f">{count}{'f' if scalar == 10 else 'd'}", content, 2 + 2 * dimension)
+    if kind == "POLYDATA":
+        points, _, vertices, _, lines, polygons, size, _, _, _ = struct.unpack_from(">10I", content)
+        corners = struct.unpack_from(f">{size // 4}I", content, 40 + 12 * points + vertices + lines)
+        assert all(corners[4 * i] == 3 for i in range(polygons))
+        return (struct.unpack_from(f">{3 * points}f", content, 40),
+                tuple(c for i, c in enumerate(corners) if i % 4))
+    if kind == "STRING":
+        return content[4:].decode()
+    return content
+
+
+class Link:
+    """A connection. Frames that are not fetched in time are passed over: `newest` is the last."""
+
+    def __init__(self, host="localhost", port=18944, version=1, check=False):
+        self.socket = socket.create_connection((host, port), timeout=10)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.version = version
+        self.check = check  # checksums, which plain Python is slow at
+        self.bytes = bytearray()
+
+    def close(self):
+        self.socket.close()
+
+    def send(self, kind, device, content, stamp=None):
+        if stamp is None:
+            stamp = int(time.time() * 2**32)
+        self.socket.sendall(pack(kind, device, content, stamp, self.version))
+
+    def send_pose(self, rotation, device="Patient", stamp=None):
+        self.send("TRANSFORM", device, transform(rotation), stamp)
+
+    def ask_for(self, what):
+        """weights, points, surface or nothing."""
+        self.send("STRING", "SEND", string(what))
+
+    def set_volume(self, text):
+        """rest, full, rest+500 or mL from the reference."""
+        self.send("STRING", "VOLUME", string(text))
+
+    def message(self):
+        """The next whole message that has come: (kind, device, stamp, content); None: not yet."""
+        if len(self.bytes) < HEADER.size:
+            return None
+        version, kind, device, stamp, size, crc = HEADER.unpack_from(self.bytes)
+        if len(self.bytes) < HEADER.size + size:
+            return None
+        body = bytes(self.bytes[HEADER.size:HEADER.size + size])
+        del self.bytes[:HEADER.size + size]
+        if self.check and crc64(body) != crc:
+            raise ValueError("a wrong checksum")
+        if version == 2:
+            extension, index, metadata, _ = EXTENSION.unpack_from(body)
+            body = body[extension:len(body) - index - metadata]
+        return kind.rstrip(b"\0").decode(), device.rstrip(b"\0").decode(), stamp, body
+
+    def receive(self, timeout=0.0):
+        """Takes in what has come; False where nothing does in that time."""
+        if not select.select([self.socket], [], [], timeout)[0]:
+            return False
+        data = self.socket.recv(1 << 20)
+        if not data:
+            raise ConnectionError("the server has gone")
+        self.bytes += data
+        return True
+
+    def newest(self, timeout=1.0):
+        """(stamp, content unpacked) of the newest message; None where none comes in that time."""
+        end = time.monotonic() + timeout
+        last = None
+        while True:
+            message = self.message()
+            if message is not None:
+                last = message
+                continue
+            left = 0.0 if last is not None else max(0.0, end - time.monotonic())
+            if not self.receive(left) and (last is not None or time.monotonic() >= end):
+                return None if last is None else (last[2], unpack(last[0], last[3]))
+
+
+class Basis:
+    """A scalar basis file, for peers that are sent weights: x = p + scale (w . c) d."""
+
+    def __init__(self, path):
+        with open(path, "rb") as file:
+            size, = struct.unpack("<Q", file.read(8))
+            header = json.loads(file.read(size))
+            data = file.read()
+        self.metadata = header.pop("__metadata__", {})
+        self.header = header
+        self._data = data
+        self.vertices = self.tensor("vertices")
+        self.triangles = self.tensor("triangles")
+        self.direction = self.tensor("direction")
+        self.coefficients = self.tensor("coefficients")
+        self.lung = self.tensor("lung")
+        self.modes = header["coefficients"]["shape"][1]
+
+    def tensor(self, name):
+        begin, end = self.header[name]["data_offsets"]
+        kind = {"F32": "f", "F64": "d", "U32": "I", "U8": "B"}[self.header[name]["dtype"]]
+        return memoryview(self._data[begin:end]).cast(kind)
+
+    def deform(self, frame):
+        """Positions, flat, of an NDARRAY frame: K weights, then each lung's scale."""
+        weights, scales = frame[:self.modes], frame[self.modes:]
+        positions = []
+        for i, lung in enumerate(self.lung):
+            row = self.coefficients[i * self.modes:(i + 1) * self.modes]
+            amount = scales[lung] * sum(w * c for w, c in zip(weights, row))
+            positions += [self.vertices[3 * i + j] + amount * self.direction[3 * i + j]
+                          for j in range(3)]
+        return positions

@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Postures as trackers give them, rotations that are none, and smoothing. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <string.h>
+
+#include "runtime/stream/gravity.h"
+#include <supine/posture.h>
+
+/* A few roundings of 32-bit numbers. */
+static const double tolerance = 1e-6;
+
+static void expect_gravity(const double gravity[3], const char *posture) {
+  double wanted[3];
+  assert_int_equal(supine_posture_gravity(posture, wanted), SUPINE_OK);
+  for (int i = 0; i < 3; ++i) {
+    assert_true(fabs(gravity[i] - wanted[i]) < tolerance);
+  }
+}
+
+/* Written by hand. The room: z up, y from the foot end to the head end of a bed, x to the right of
+ * someone who stands at the foot end and looks towards the head end. */
+
+/* Where the body's left, back and head point in that room: the columns of a tracker's matrix. */
+typedef struct lie {
+  const char *posture;
+  double left[3], back[3], head[3];
+} lie;
+
+static const lie lies[] = {
+    /* Head at the head end (y). Face up: seen from the feet, the patient's left is on the right. */
+    {"supine", {1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
+    /* Face down: left is on the left. */
+    {"prone", {-1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
+    /* On the left side: left points down, and the back to the left as seen from the feet. */
+    {"left", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}},
+    /* On the right side: left points up, the back to the right. */
+    {"right", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},
+    /* Feet at the head end: the same postures, turned about the vertical. */
+    {"supine", {-1, 0, 0}, {0, 0, -1}, {0, -1, 0}},
+    {"prone", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
+    {"left", {0, 0, -1}, {1, 0, 0}, {0, -1, 0}},
+    {"right", {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}},
+    /* Across the bed, on the back. */
+    {"supine", {0, 1, 0}, {0, 0, -1}, {-1, 0, 0}},
+    {"upright", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+    {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
+};
+
+enum { LIES = sizeof lies / sizeof *lies };
+
+static void matrix_of(const lie *l, double r[9]) {
+  for (int i = 0; i < 3; ++i) {
+    r[3 * i] = l->left[i];
+    r[3 * i + 1] = l->back[i];
+    r[3 * i + 2] = l->head[i];
+  }
+}
+
+static double determinant(const double m[9]) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+static supine_stream_verdict take(const double r[9], double gravity[3]) {
+  const supine_stream_setup setup = supine_stream_setup_default();
+  const char *why = NULL;
+  const supine_stream_verdict verdict = supine_stream_gravity_rotation(&setup, r, gravity, &why);
+  assert_true((why == NULL) == (verdict == SUPINE_STREAM_EXACT));
+  return verdict;
+}
+
+static void test_postures_as_trackers_give_them(void **state) {
+  (void)state;
+  for (int i = 0; i < LIES; ++i) {
+    double r[9];
+    double gravity[3];
+    matrix_of(&lies[i], r);
+    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* the table itself */
+    assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
+    expect_gravity(gravity, lies[i].posture);
+  }
+}
+
+/* A quaternion of each, in every sign, as another route to the same. */
+static void test_quaternions_as_trackers_give_them(void **state) {
+  (void)state;
+  static const struct {
+    const char *posture;
+    double q[4]; /* W, X, Y, Z, by hand: a turn about a unit axis, cos and sin of half of it */
+  } turns[] = {
+      {"upright", {1, 0, 0, 0}},
+      {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}}, /* upright, laid back about x */
+      {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}},   /* laid forward */
+      {"left", {0.7071067811865476, 0, 0.7071067811865476, 0}},    /* about y: head towards x */
+      {"right", {0.7071067811865476, 0, -0.7071067811865476, 0}},
+      {"inverted", {0, 1, 0, 0}},
+      {"supine", {0.5, -0.5, -0.5, 0.5}}, /* laid back, then turned about the vertical */
+  };
+  const supine_stream_setup setup = supine_stream_setup_default();
+  for (size_t i = 0; i < sizeof turns / sizeof *turns; ++i) {
+    for (int sign = -1; sign < 2; sign += 2) {
+      double q[4];
+      double gravity[3];
+      const char *why = NULL;
+      for (int k = 0; k < 4; ++k) {
+        q[k] = sign * turns[i].q[k];
+      }
+      assert_int_equal(supine_stream_gravity_quaternion(&setup, q, gravity, &why),
+                       SUPINE_STREAM_EXACT);
+      expect_gravity(gravity, turns[i].posture);
+    }
+  }
+}
+
+/* A tracker whose world has y up, and a marker whose axes are right, front, head. */
+static void test_setup_turns_world_and_marker(void **state) {
+  (void)state;
+  supine_stream_setup setup = {.down = {0, -1, 0}};
+  const double half_turn[4] = {0, 0, 0, 1};
+  supine_stream_rotation(half_turn, setup.body);
+  /* Lying on the back: the marker's front points up, which is y there; its head along the world's
+   * x; its right then along z: x cross y. */
+  const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
+  double gravity[3];
+  const char *why = NULL;
+  assert_true(fabs(determinant(r) - 1.0) < tolerance);
+  assert_int_equal(supine_stream_gravity_rotation(&setup, r, gravity, &why), SUPINE_STREAM_EXACT);
+  expect_gravity(gravity, "supine");
+  const double down[3] = {3, 0, 0}; /* a tilt sensor with the same axes: its right falls */
+  assert_int_equal(supine_stream_gravity_down(&setup, down, gravity, &why), SUPINE_STREAM_EXACT);
+  expect_gravity(gravity, "right");
+}
+
+static void scaled(const double r[9], double x, double y, double z, double out[9]) {
+  const double s[3] = {x, y, z};
+  for (int i = 0; i < 9; ++i) {
+    out[i] = r[i] * s[i % 3];
+  }
+}
+
+static void test_rotations_that_are_none(void **state) {
+  (void)state;
+  for (int i = 0; i < LIES; ++i) {
+    double r[9];
+    double m[9];
+    double gravity[3];
+    matrix_of(&lies[i], r);
+    scaled(r, 1.0001, 0.9999, 1.0, m); /* a tracker's rounding */
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_EXACT);
+    scaled(r, 25.4, 25.4, 25.4, m); /* inches */
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
+    expect_gravity(gravity, lies[i].posture);
+    scaled(r, 1.0, 1.0, 1.05, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
+    expect_gravity(gravity, lies[i].posture);
+    const double kept[3] = {gravity[0], gravity[1], gravity[2]};
+    scaled(r, 1.0, 1.0, 1.5, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    scaled(r, 1.0, 1.0, -1.0, m); /* a mirror */
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    scaled(r, -1.0, -1.0, -1.0, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    scaled(r, 1.0, 1.0, 0.0, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    scaled(r, 0.0, 0.0, 0.0, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    for (int k = 0; k < 9; ++k) {
+      scaled(r, 1, 1, 1, m);
+      m[k] = k % 2 == 0 ? NAN : INFINITY;
+      assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    }
+    scaled(r, 1e300, 1e300, 1e300, m);
+    assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
+    assert_memory_equal(gravity, kept, sizeof kept); /* refused poses change nothing */
+  }
+}
+
+static void test_quaternions_and_vectors_that_are_none(void **state) {
+  (void)state;
+  const supine_stream_setup setup = supine_stream_setup_default();
+  const double good[4] = {3, -3, 0, 0};
+  const double bad[3][4] = {{0, 0, 0, 0}, {NAN, 0, 0, 0}, {1, INFINITY, 0, 0}};
+  double gravity[3] = {7, 7, 7};
+  const char *why = NULL;
+  for (int i = 0; i < 3; ++i) {
+    assert_int_equal(supine_stream_gravity_quaternion(&setup, bad[i], gravity, &why),
+                     SUPINE_STREAM_REFUSED);
+    assert_non_null(why);
+    assert_int_equal(supine_stream_gravity_down(&setup, bad[i], gravity, &why),
+                     SUPINE_STREAM_REFUSED);
+  }
+  assert_true(gravity[0] == 7.0);
+  assert_int_equal(supine_stream_gravity_quaternion(&setup, good, gravity, &why),
+                   SUPINE_STREAM_REPAIRED);
+  expect_gravity(gravity, "supine");
+}
+
+/* Behind a steady turn the smoothed direction stays the stated time behind. */
+static void test_smoothing_lags_as_stated(void **state) {
+  (void)state;
+  const double seconds = 0.2;
+  const double step = 1e-3;
+  const double speed = 0.5; /* rad/s */
+  double smooth[3] = {0, 1, 0};
+  for (int i = 1; i <= 2000; ++i) { /* ten times the lag */
+    const double angle = speed * step * i;
+    const double gravity[3] = {sin(angle), cos(angle), 0};
+    const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
+    if (i == 2000) { /* after the step, which is then `step` ahead of the lag */
+      assert_true(fabs(left - speed * seconds) < speed * step);
+      assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
+    }
+  }
+  const double still[3] = {0, 0, -1};
+  double none[3] = {0, 1, 0};
+  assert_true(supine_stream_gravity_smooth(still, step, 0.0, none) == 0.0);
+  assert_memory_equal(none, still, sizeof still);
+  double opposite[3] = {0, 0, 1}; /* no way is shorter: it goes at once */
+  assert_true(supine_stream_gravity_smooth(still, step, seconds, opposite) == 0.0);
+  assert_memory_equal(opposite, still, sizeof still);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_postures_as_trackers_give_them),
+      cmocka_unit_test(test_quaternions_as_trackers_give_them),
+      cmocka_unit_test(test_setup_turns_world_and_marker),
+      cmocka_unit_test(test_rotations_that_are_none),
+      cmocka_unit_test(test_quaternions_and_vectors_that_are_none),
+      cmocka_unit_test(test_smoothing_lags_as_stated),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

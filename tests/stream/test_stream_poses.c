@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Poses in files, volumes in words, latencies in counts. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "runtime/stream/latency.h"
+#include "runtime/stream/poses.h"
+#include "runtime/stream/volume.h"
+#include "tests/runtime_fixture.h"
+
+static char *folder;
+
+static const char *file_of(const char *text) {
+  static char path[256];
+  (void)snprintf(path, sizeof path, "%s/poses.csv", folder);
+  FILE *file = fopen(path, "w");
+  assert_non_null(file);
+  assert_true(fputs(text, file) >= 0);
+  assert_int_equal(fclose(file), 0);
+  return path;
+}
+
+static void test_poses_come_back_as_they_were(void **state) {
+  (void)state;
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/kept.csv", folder);
+  FILE *file = fopen(path, "w");
+  assert_non_null(file);
+  supine_stream_poses_begin(file);
+  supine_stream_pose pose[500];
+  uint64_t seed = 3;
+  for (int i = 0; i < 500; ++i) {
+    double v[3];
+    for (int k = 0; k < 3; ++k) {
+      v[k] = fixture_random(&seed);
+    }
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    pose[i] =
+        (supine_stream_pose){0.015 * i + 1e-9 * i, {v[0] / length, v[1] / length, v[2] / length}};
+    supine_stream_poses_add(file, &pose[i]);
+  }
+  assert_int_equal(fclose(file), 0);
+  supine_stream_poses poses;
+  supine_error error;
+  assert_int_equal(supine_stream_poses_load(path, &poses, &error), SUPINE_OK);
+  assert_int_equal(poses.count, 500);
+  for (int i = 0; i < 500; ++i) {
+    assert_true(poses.pose[i].seconds == pose[i].seconds);
+    for (int k = 0; k < 3; ++k) { /* their length is taken once more */
+      assert_true(fabs(poses.pose[i].gravity[k] - pose[i].gravity[k]) < 4e-16);
+    }
+  }
+  supine_stream_poses_free(&poses);
+}
+
+static void test_files_that_are_no_poses(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *says;
+  } bad[] = {
+      {"seconds,gravity_x,gravity_y,gravity_z\n", "no poses"},
+      {"seconds,gravity_x,gravity_y\n0,0,1\n", "gravity_z"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1,0\n1,0,0,0\n", ":3:"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n1,0,1,0\n0.5,0,1,0\n", ":3:"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n-1,0,1,0\n", ":2:"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,nan,0\n", ":2:"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1e300,0\n", ":2:"},
+      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1\n", ":2:"},
+  };
+  supine_stream_poses poses;
+  supine_error error;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    assert_int_equal(supine_stream_poses_load(file_of(bad[i].text), &poses, &error),
+                     SUPINE_ERROR_FORMAT);
+    assert_non_null(strstr(error.message, bad[i].says));
+    assert_null(poses.pose);
+  }
+  assert_int_equal(supine_stream_poses_load("/no/such/poses.csv", &poses, &error),
+                   SUPINE_ERROR_READ);
+}
+
+static void test_latencies_are_counted(void **state) {
+  (void)state;
+  supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
+  assert_true(supine_stream_latency_share(latency, 0.5) == 0.0);
+  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: middles of bins */
+    supine_stream_latency_add(latency, (10.0 * i + 0.5) * 1e-6);
+  }
+  assert_true(fabs(supine_stream_latency_share(latency, 0.5) - 5001e-6) < 1e-12);
+  assert_true(fabs(supine_stream_latency_share(latency, 0.99) - 9901e-6) < 1e-12);
+  assert_true(supine_stream_latency_share(latency, 1.0) == latency->worst);
+  assert_true(fabs(latency->worst - 10000.5e-6) < 1e-12);
+  supine_stream_latency_add(latency, 3.0); /* past the last bin */
+  assert_true(supine_stream_latency_share(latency, 1.0) == 3.0);
+  assert_true(supine_stream_latency_share(latency, 0.99) < 0.01);
+  free(latency);
+}
+
+static void test_volumes_in_words(void **state) {
+  (void)state;
+  fixture *made = fixture_create(200, 4, 2, 2, false, true, 10.0, 5);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(made, &size);
+  supine_basis *basis = NULL;
+  supine_error error;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, &error), SUPINE_OK);
+  supine_stream_volume *volume = fixture_allocate(1, sizeof *volume);
+  const double gravity[3] = {0, 1, 0};
+  static const struct {
+    const char *text;
+    double volume; /* of a basis whose rest is its reference */
+  } good[] = {{"rest", 0}, {"rest+350", 350}, {"rest-20.5", -20.5},
+              {"full", 0}, {"-1200", -1200},  {"+40", 40}};
+  for (size_t i = 0; i < sizeof good / sizeof *good; ++i) {
+    assert_int_equal(supine_stream_volume_fix(volume, good[i].text, &error), SUPINE_OK);
+    assert_true(supine_stream_volume_at(volume, basis, gravity, 1.0) == good[i].volume);
+  }
+  static const char *const bad[] = {"",    "rest 5", "rest+", "rest+x",   "fuller",
+                                    "nan", "inf",    "5 mL",  "rest+inf", "restful"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    assert_int_equal(supine_stream_volume_fix(volume, bad[i], &error), SUPINE_ERROR_ARGUMENT);
+    assert_true(supine_stream_volume_at(volume, basis, gravity, 1.0) == 40.0); /* as it was */
+  }
+  /* The breath is the model's, between samples to a part in a thousand of it. */
+  const supine_pv_breath breath = supine_breath_default();
+  assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &breath, &error),
+                   SUPINE_OK);
+  for (int i = 0; i < 200; ++i) {
+    const double time = 0.0731 * i;
+    double wanted = 0.0;
+    assert_int_equal(
+        supine_breath_evaluate(supine_breath_normal(), &breath, 1, &time, &wanted, NULL, &error),
+        SUPINE_OK);
+    assert_true(fabs(supine_stream_volume_at(volume, basis, gravity, time) - wanted) <
+                1e-3 * breath.tidal);
+  }
+  const supine_pv_breath none = {.tidal = -1.0, .rate = 12.0, .inhale_fraction = 0.3};
+  assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &none, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  free(volume);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(made);
+}
+
+static int make_folder(void **state) {
+  (void)state;
+  folder = fixture_folder();
+  return 0;
+}
+
+static int remove_folder(void **state) {
+  (void)state;
+  fixture_folder_remove(folder);
+  return 0;
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_poses_come_back_as_they_were),
+      cmocka_unit_test(test_files_that_are_no_poses),
+      cmocka_unit_test(test_latencies_are_counted),
+      cmocka_unit_test(test_volumes_in_words),
+  };
+  return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

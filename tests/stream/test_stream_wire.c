@@ -1,0 +1,514 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Bytes on the wire, against those that the protocol's public library makes. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <igtl_header.h>
+#include <igtl_ndarray.h>
+#include <igtl_polydata.h>
+#include <igtl_position.h>
+#include <igtl_qtdata.h>
+#include <igtl_string.h>
+#include <igtl_transform.h>
+#include <igtl_util.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "runtime/stream/crc64.h"
+#include "runtime/stream/frame.h"
+#include "tests/runtime_fixture.h"
+
+static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
+  for (size_t i = 0; i < size; ++i) {
+    bytes[i] = (unsigned char)(127.5 * (1.0 + fixture_random(&seed)));
+  }
+}
+
+/* Every length, at every alignment of 8, through both routes, and cut anywhere. */
+static void test_crc_of_every_length_is_the_librarys(void **state) {
+  (void)state;
+  enum { LONGEST = 3000 };
+  unsigned char *bytes = fixture_allocate(LONGEST + 8, 1);
+  fill(bytes, LONGEST + 8, 4711);
+  for (size_t size = 0; size <= LONGEST; ++size) {
+    unsigned char *at = bytes + size % 8;
+    const uint64_t wanted = crc64(at, size, 0);
+    const size_t cut = size * 5 / 13;
+    assert_true(supine_stream_crc64(0, at, size) == wanted);
+    assert_true(supine_stream_crc64_tables(0, at, size) == wanted);
+    assert_true(supine_stream_crc64(supine_stream_crc64(0, at, cut), at + cut, size - cut) ==
+                wanted);
+    assert_true(supine_stream_crc64_join(supine_stream_crc64(0, at, cut),
+                                         supine_stream_crc64(0, at + cut, size - cut),
+                                         supine_stream_crc64_power(size - cut)) == wanted);
+  }
+  free(bytes);
+}
+
+static void test_crc_of_a_large_message_is_the_librarys(void **state) {
+  (void)state;
+  const size_t size = 6096012; /* 508,001 points */
+  unsigned char *bytes = fixture_allocate(size, 1);
+  fill(bytes, size, 99);
+  assert_true(supine_stream_crc64(0, bytes, size) == crc64(bytes, size, 0));
+  free(bytes);
+}
+
+static void test_header_is_the_librarys(void **state) {
+  (void)state;
+  igtl_header theirs = {
+      .version = 1, .timestamp = 0x0102030405060708u, .body_size = 48, .crc = 0xF0E1D2C3B4A59687u};
+  memcpy(theirs.name, "TRANSFORM", 9);
+  memcpy(theirs.device_name, "exactly20characters!", 20);
+  igtl_header_convert_byte_order(&theirs);
+  supine_stream_header header;
+  unsigned char bytes[SUPINE_STREAM_HEADER];
+  supine_error error;
+  assert_int_equal(sizeof theirs, SUPINE_STREAM_HEADER);
+  assert_int_equal(supine_stream_header_read((const unsigned char *)&theirs, &header, &error),
+                   SUPINE_OK);
+  assert_int_equal(header.version, 1);
+  assert_string_equal(header.type, "TRANSFORM");
+  assert_string_equal(header.device, "exactly20characters!");
+  assert_true(header.stamp == 0x0102030405060708u && header.size == 48 &&
+              header.crc == 0xF0E1D2C3B4A59687u);
+  supine_stream_header_write(&header, bytes);
+  assert_memory_equal(bytes, &theirs, sizeof bytes);
+}
+
+/* A header for a body, its checksum by the library. */
+static supine_stream_header header_of(const char *type, const char *device, unsigned version,
+                                      unsigned char *body, size_t size) {
+  supine_stream_header header = {.version = version, .size = size, .crc = crc64(body, size, 0)};
+  strcpy(header.type, type);
+  strcpy(header.device, device);
+  return header;
+}
+
+static supine_stream_message read_ok(const supine_stream_header *header, const unsigned char *body,
+                                     const char *device) {
+  supine_stream_message message;
+  supine_error error;
+  assert_int_equal(supine_stream_message_read(header, body, device, &message, &error), SUPINE_OK);
+  return message;
+}
+
+/* Rows 1 2 3 / 4 5 6 / 7 8 9, in the library's order. */
+static void make_transform(igtl_float32 transform[12]) {
+  const igtl_float32 columns[12] = {1, 4, 7, 2, 5, 8, 3, 6, 9, 10, 11, 12};
+  memcpy(transform, columns, sizeof columns);
+  igtl_transform_convert_byte_order(transform);
+}
+
+static void test_transform_is_read(void **state) {
+  (void)state;
+  igtl_float32 transform[12];
+  make_transform(transform);
+  unsigned char *body = (unsigned char *)transform;
+  supine_stream_header header = header_of("TRANSFORM", "Patient", 1, body, sizeof transform);
+  const char *const devices[] = {NULL, "Patient"};
+  for (int i = 0; i < 2; ++i) {
+    const supine_stream_message m = read_ok(&header, body, devices[i]);
+    assert_int_equal(m.kind, SUPINE_STREAM_ROTATION);
+    for (int k = 0; k < 9; ++k) {
+      assert_true(m.number[k] == (double)(k + 1));
+    }
+  }
+  assert_int_equal(read_ok(&header, body, "Probe").kind, SUPINE_STREAM_NOTHING);
+  supine_stream_message m;
+  supine_error error;
+  header.crc ^= 1;
+  assert_int_equal(supine_stream_message_read(&header, body, NULL, &m, &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
+}
+
+static void test_transform_of_version_2_is_read(void **state) {
+  (void)state;
+  igtl_float32 transform[12];
+  make_transform(transform);
+  /* By hand: an extension of 14 bytes, 2 more than known; one key "a" of value "bc". */
+  unsigned char body[14 + 48 + 10 + 3] = {0, 14, 0, 10, 0, 0, 0, 3, 0, 0, 0, 77, 0xAB, 0xCD};
+  const unsigned char metadata[13] = {0, 1, 0, 1, 0, 3, 0, 0, 0, 2, 'a', 'b', 'c'};
+  memcpy(body + 14, transform, 48);
+  memcpy(body + 14 + 48, metadata, sizeof metadata);
+  supine_stream_header header = header_of("TRANSFORM", "Patient", 2, body, sizeof body);
+  assert_true(read_ok(&header, body, NULL).number[8] == 9.0);
+  supine_stream_message m;
+  supine_error error;
+  for (size_t size = 0; size < sizeof body; ++size) { /* metadata that reaches into the content */
+    header = header_of("TRANSFORM", "Patient", 2, body, size);
+    assert_int_equal(supine_stream_message_read(&header, body, NULL, &m, &error),
+                     SUPINE_ERROR_FORMAT);
+    assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
+  }
+  static const unsigned char bad[][8] = {{0, 11, 0, 10, 0, 0, 0, 3},
+                                         {0xFF, 0xFF, 0, 10, 0, 0, 0, 3},
+                                         {0, 14, 0xFF, 0xFF, 0, 0, 0, 3},
+                                         {0, 14, 0, 10, 0xFF, 0xFF, 0xFF, 0xFF}};
+  for (size_t i = 0; i < 4; ++i) {
+    memcpy(body, bad[i], 8);
+    header = header_of("TRANSFORM", "Patient", 2, body, sizeof body);
+    assert_int_equal(supine_stream_message_read(&header, body, NULL, &m, &error),
+                     SUPINE_ERROR_FORMAT);
+  }
+}
+
+static void expect_quaternion(const supine_stream_message *m, double w, double x, double y,
+                              double z) {
+  const double wanted[4] = {w, x, y, z};
+  assert_int_equal(m->kind, SUPINE_STREAM_QUATERNION);
+  for (int i = 0; i < 4; ++i) {
+    assert_true(fabs(m->number[i] - wanted[i]) < 1e-7); /* 32-bit floats */
+  }
+}
+
+static void test_qtdata_is_read(void **state) {
+  (void)state;
+  igtl_qtdata_element element[3];
+  memset(element, 0, sizeof element);
+  memcpy(element[0].name, "Probe", 5);
+  memcpy(element[1].name, "Patient", 7);
+  memcpy(element[2].name, "Camera", 6);
+  for (int i = 0; i < 3; ++i) {
+    element[i].type = IGTL_QTDATA_TYPE_6D;
+    element[i].quaternion[i] = 0.6f;
+    element[i].quaternion[3] = 0.8f;
+  }
+  igtl_qtdata_convert_byte_order(element, 3);
+  unsigned char *body = (unsigned char *)element;
+  supine_stream_header header = header_of("QTDATA", "Tracker", 1, body, sizeof element);
+  supine_stream_message m = read_ok(&header, body, "Patient");
+  expect_quaternion(&m, 0.8, 0, 0.6, 0);
+  m = read_ok(&header, body, "Probe");
+  expect_quaternion(&m, 0.8, 0.6, 0, 0);
+  m = read_ok(&header, body, NULL); /* any: the last */
+  expect_quaternion(&m, 0.8, 0, 0, 0.6);
+  assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
+}
+
+static void test_position_is_read(void **state) {
+  (void)state;
+  igtl_position position = {.position = {1, 2, 3}, .quaternion = {0.48f, -0.36f, 0.48f, 0.64f}};
+  igtl_position_convert_byte_order(&position);
+  unsigned char *body = (unsigned char *)&position;
+  supine_stream_header header = header_of("POSITION", "Patient", 1, body, 28);
+  supine_stream_message m = read_ok(&header, body, NULL);
+  expect_quaternion(&m, 0.64, 0.48, -0.36, 0.48);
+  header = header_of("POSITION", "Patient", 1, body, 24); /* the fourth follows from the length */
+  m = read_ok(&header, body, NULL);
+  assert_true(fabs(m.number[0] - 0.64) < 1e-6);
+  header = header_of("POSITION", "Patient", 1, body, 12);
+  assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
+}
+
+/* An array of `type`, as the library packs it. */
+static size_t make_array(int type, size_t count, const double *values, unsigned char *body) {
+  igtl_ndarray_info info;
+  const igtl_uint16 size[1] = {(igtl_uint16)count};
+  igtl_ndarray_init_info(&info);
+  info.type = (igtl_uint8)type;
+  info.dim = 1;
+  assert_int_equal(igtl_ndarray_alloc_info(&info, size), 1);
+  for (size_t i = 0; i < count; ++i) {
+    if (type == IGTL_NDARRAY_STYPE_TYPE_FLOAT64) {
+      ((double *)info.array)[i] = values[i];
+    } else {
+      ((float *)info.array)[i] = (float)values[i];
+    }
+  }
+  assert_int_equal(igtl_ndarray_pack(&info, body, IGTL_TYPE_PREFIX_NONE), 1);
+  const size_t bytes = (size_t)igtl_ndarray_get_size(&info, IGTL_TYPE_PREFIX_NONE);
+  igtl_ndarray_free_info(&info);
+  return bytes;
+}
+
+static void test_arrays_and_sensors_are_read(void **state) {
+  (void)state;
+  unsigned char body[256];
+  const double down[4] = {0.25, -0.5, 1.5, 7.0};
+  for (int type = IGTL_NDARRAY_STYPE_TYPE_FLOAT32; type <= IGTL_NDARRAY_STYPE_TYPE_FLOAT64;
+       ++type) {
+    size_t size = make_array(type, 3, down, body);
+    supine_stream_header header = header_of("NDARRAY", "Tilt", 1, body, size);
+    supine_stream_message m = read_ok(&header, body, "Tilt");
+    assert_int_equal(m.kind, SUPINE_STREAM_DOWN);
+    assert_true(m.number[0] == 0.25 && m.number[1] == -0.5 && m.number[2] == 1.5);
+    size = make_array(type, 1, down, body);
+    header = header_of("NDARRAY", "VOLUME", 1, body, size);
+    m = read_ok(&header, body, "Tilt");
+    assert_int_equal(m.kind, SUPINE_STREAM_VOLUME);
+    assert_true(m.number[0] == 0.25);
+    size = make_array(type, 4, down, body);
+    header = header_of("NDARRAY", "Tilt", 1, body, size);
+    assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
+  }
+  /* An accelerometer that lies still: 9.5 upwards along its y. By hand: 3, status, unit, doubles.
+   */
+  unsigned char sensor[10 + 24] = {3, 0, 1, 2, 3, 4, 5, 6, 7, 8};
+  const unsigned char nine_and_a_half[8] = {0x40, 0x23};
+  memcpy(sensor + 10 + 8, nine_and_a_half, 8);
+  supine_stream_header header = header_of("SENSOR", "Tilt", 1, sensor, sizeof sensor);
+  const supine_stream_message m = read_ok(&header, sensor, NULL);
+  assert_int_equal(m.kind, SUPINE_STREAM_DOWN);
+  assert_true(m.number[0] == 0.0 && m.number[1] == -9.5 && m.number[2] == 0.0);
+}
+
+static void test_strings_are_read(void **state) {
+  (void)state;
+  igtl_string_header head = {3, 8};
+  igtl_string_convert_byte_order(&head);
+  unsigned char body[4 + 100] = {0};
+  memcpy(body, &head, 4);
+  memcpy(body + 4, "rest+350", 8);
+  supine_stream_header header = header_of("STRING", "VOLUME", 1, body, 12);
+  supine_stream_message m = read_ok(&header, body, "Patient");
+  assert_int_equal(m.kind, SUPINE_STREAM_VOLUME_TEXT);
+  assert_string_equal(m.text, "rest+350");
+  header = header_of("STRING", "SEND", 1, body, 12);
+  assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_WISH);
+  header = header_of("STRING", "Patient", 1, body, 12);
+  assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
+  body[3] = 64; /* one more than is kept */
+  header = header_of("STRING", "VOLUME", 1, body, 4 + 64);
+  assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
+}
+
+/* Contents that end before they say: every length of each, checksum right. */
+static void test_every_truncation_is_refused(void **state) {
+  (void)state;
+  static const struct {
+    const char *type, *device;
+    size_t whole;
+    unsigned char begin[8];
+  } content[] = {{"TRANSFORM", "Patient", 48, {0}},
+                 {"QTDATA", "Patient", 50, {'P', 'a', 't', 'i', 'e', 'n', 't'}},
+                 {"NDARRAY", "Patient", 28, {11, 1, 0, 3}},
+                 {"NDARRAY", "VOLUME", 12, {11, 1, 0, 1}},
+                 {"SENSOR", "Patient", 34, {3}},
+                 {"STRING", "VOLUME", 34, {0, 3, 0, 30}}};
+  for (size_t i = 0; i < sizeof content / sizeof *content; ++i) {
+    for (size_t size = 0; size < content[i].whole; ++size) {
+      unsigned char *body = fixture_allocate(size + 1, 1); /* its end is watched by sanitizers */
+      unsigned char *end = body + size;
+      memcpy(body, content[i].begin, size < 8 ? size : 8);
+      supine_stream_header header =
+          header_of(content[i].type, content[i].device, 1, body, (size_t)(end - body));
+      supine_stream_message m;
+      supine_error error;
+      const supine_status status = supine_stream_message_read(&header, body, "Patient", &m, &error);
+      if (status == SUPINE_OK) { /* an empty list of instruments; sizes that say nothing */
+        assert_true(size == 0 || size < 4);
+      }
+      assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
+      free(body);
+    }
+  }
+}
+
+static void test_headers_that_are_none_are_refused(void **state) {
+  (void)state;
+  supine_stream_header good = {.version = 1};
+  strcpy(good.type, "TRANSFORM");
+  unsigned char bytes[SUPINE_STREAM_HEADER];
+  supine_stream_header header;
+  supine_error error;
+  for (unsigned version = 0; version < 5; ++version) {
+    good.version = version;
+    supine_stream_header_write(&good, bytes);
+    assert_int_equal(supine_stream_header_read(bytes, &header, &error),
+                     version == 1 || version == 2 ? SUPINE_OK : SUPINE_ERROR_FORMAT);
+  }
+  good.version = 1;
+  good.type[2] = '\x07';
+  supine_stream_header_write(&good, bytes);
+  assert_int_equal(supine_stream_header_read(bytes, &header, &error), SUPINE_ERROR_FORMAT);
+}
+
+/* The pieces of a message as one. */
+static unsigned char *gathered(const supine_stream_parcel *parcel) {
+  unsigned char *bytes = fixture_allocate(parcel->size, 1);
+  size_t at = 0;
+  for (int i = 0; i < parcel->count; ++i) {
+    memcpy(bytes + at, parcel->piece[i].iov_base, parcel->piece[i].iov_len);
+    at += parcel->piece[i].iov_len;
+  }
+  assert_int_equal(at, parcel->size);
+  return bytes;
+}
+
+typedef struct sample {
+  fixture *made;
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_stream_moment moment;
+} sample;
+
+static sample sample_create(void) {
+  sample s = {.made = fixture_create(2311, 6, 3, 2, false, true, 20.0, 17)};
+  size_t size = 0;
+  supine_error error;
+  s.bytes = fixture_bytes(s.made, &size);
+  assert_int_equal(supine_basis_open_memory(s.bytes, size, &s.basis, &error), SUPINE_OK);
+  s.moment = (supine_stream_moment){
+      .gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu, .scales = {0.7, -0.3}};
+  assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.weights), SUPINE_OK);
+  return s;
+}
+
+static void sample_destroy(sample *s) {
+  supine_basis_close(s->basis);
+  free(s->bytes);
+  fixture_destroy(s->made);
+}
+
+/* A message of version 1 whose body is `body`, by the library. */
+static void expect_message(const unsigned char *bytes, const char *type, uint64_t stamp,
+                           unsigned char *body, size_t size) {
+  igtl_header header = {
+      .version = 1, .timestamp = stamp, .body_size = size, .crc = crc64(body, size, 0)};
+  memcpy(header.name, type, strlen(type));
+  memcpy(header.device_name, "SUPINE", 6);
+  igtl_header_convert_byte_order(&header);
+  assert_memory_equal(bytes, &header, sizeof header);
+  assert_memory_equal(bytes + sizeof header, body, size);
+}
+
+/* The content of a message of version 2: what the protocol adds must be right, byte by byte. */
+static const unsigned char *unwrapped(const unsigned char *bytes, size_t size, uint32_t number) {
+  igtl_header header;
+  memcpy(&header, bytes, sizeof header);
+  igtl_header_convert_byte_order(&header);
+  assert_int_equal(header.version, 2);
+  assert_int_equal(header.body_size, size - sizeof header);
+  assert_true(header.crc ==
+              crc64((unsigned char *)(uintptr_t)(bytes + sizeof header), size - sizeof header, 0));
+  const unsigned char extension[12] = {0, 12, 0, 2, 0, 0, 0, 0, 0, 0, 0, (unsigned char)number};
+  assert_memory_equal(bytes + sizeof header, extension, 12);
+  assert_int_equal(bytes[size - 2], 0);
+  assert_int_equal(bytes[size - 1], 0);
+  return bytes + sizeof header + 12;
+}
+
+static void test_weights_are_the_librarys_ndarray(void **state) {
+  (void)state;
+  sample s = sample_create();
+  supine_stream_frames *frames = NULL;
+  supine_error error;
+  supine_stream_parcel parcel;
+  double values[8];
+  unsigned char body[64];
+  memcpy(values, s.moment.weights, 6 * sizeof *values);
+  memcpy(values + 6, s.moment.scales, 2 * sizeof *values);
+  const size_t size = make_array(IGTL_NDARRAY_STYPE_TYPE_FLOAT32, 8, values, body);
+  assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", false, &frames, &error),
+                   SUPINE_OK);
+  supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
+  assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_WEIGHTS, false, 1, &parcel));
+  unsigned char *bytes = gathered(&parcel);
+  assert_int_equal(parcel.size, SUPINE_STREAM_HEADER + size);
+  expect_message(bytes, "NDARRAY", s.moment.stamp, body, size);
+  free(bytes);
+  assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_WEIGHTS, false, 2, &parcel));
+  bytes = gathered(&parcel);
+  assert_memory_equal(unwrapped(bytes, parcel.size, 1), body, size);
+  free(bytes);
+  supine_stream_frame_leave(frames, frame);
+  supine_stream_frames_destroy(frames);
+  sample_destroy(&s);
+}
+
+/* The surface as the library packs it; `size` is written. */
+static unsigned char *make_polydata(const sample *s, bool triangles, double sign, size_t *size) {
+  const supine_basis_info *info = supine_basis_get_info(s->basis);
+  const uint32_t *corner = supine_basis_triangles(s->basis);
+  igtl_polydata_info surface;
+  igtl_polydata_init_info(&surface);
+  surface.header.npoints = (igtl_uint32)info->vertex_count;
+  surface.header.npolygons = triangles ? (igtl_uint32)info->triangle_count : 0;
+  surface.header.size_polygons = 16 * surface.header.npolygons;
+  assert_int_equal(igtl_polydata_alloc_info(&surface), 1);
+  supine_deform(s->basis, s->moment.weights, s->moment.scales, surface.points);
+  for (size_t i = 0; i < info->vertex_count; ++i) {
+    surface.points[3 * i] *= (float)sign;
+    surface.points[3 * i + 1] *= (float)sign;
+  }
+  for (size_t i = 0; i < surface.header.npolygons; ++i) {
+    surface.polygons[4 * i] = 3;
+    memcpy(surface.polygons + 4 * i + 1, corner + 3 * i, 3 * sizeof *corner);
+  }
+  *size = (size_t)igtl_polydata_get_size(&surface, IGTL_TYPE_PREFIX_NONE);
+  unsigned char *body = fixture_allocate(*size, 1);
+  assert_int_equal(igtl_polydata_pack(&surface, body, IGTL_TYPE_PREFIX_NONE), 1);
+  assert_int_equal(igtl_polydata_free_info(&surface), 1);
+  return body;
+}
+
+static void test_surface_is_the_librarys_polydata(void **state) {
+  (void)state;
+  sample s = sample_create();
+  supine_error error;
+  for (int ras = 0; ras < 2; ++ras) {
+    supine_stream_frames *frames = NULL;
+    assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", ras == 1, &frames, &error),
+                     SUPINE_OK);
+    supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
+    for (int triangles = 0; triangles < 2; ++triangles) {
+      size_t size = 0;
+      supine_stream_parcel parcel;
+      unsigned char *body = make_polydata(&s, triangles == 1, ras == 1 ? -1.0 : 1.0, &size);
+      assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_SURFACE, triangles == 1, 1,
+                                           &parcel));
+      unsigned char *bytes = gathered(&parcel);
+      assert_int_equal(parcel.size, SUPINE_STREAM_HEADER + size);
+      expect_message(bytes, "POLYDATA", s.moment.stamp, body, size);
+      free(bytes);
+      assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_SURFACE, triangles == 1, 2,
+                                           &parcel));
+      bytes = gathered(&parcel);
+      assert_memory_equal(unwrapped(bytes, parcel.size, 1), body, size);
+      free(bytes);
+      free(body);
+    }
+    supine_stream_frame_leave(frames, frame);
+    /* A frame that is used again holds the new moment's points. */
+    supine_stream_moment other = s.moment;
+    other.scales[0] = -0.1;
+    supine_stream_frame *again = supine_stream_frame_take(frames, &other);
+    supine_stream_parcel parcel;
+    assert_ptr_equal(again, frame);
+    assert_true(supine_stream_frame_wrap(frames, again, SUPINE_STREAM_POINTS, false, 1, &parcel));
+    float first[3];
+    supine_deform_range(s.basis, other.weights, other.scales, 0, 1, first);
+    unsigned char wanted[12];
+    supine_stream_put_points(1, first, ras, wanted);
+    assert_memory_equal(again->points, wanted, sizeof wanted);
+    supine_stream_frame_leave(frames, again);
+    supine_stream_frames_destroy(frames);
+  }
+  sample_destroy(&s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_crc_of_every_length_is_the_librarys),
+      cmocka_unit_test(test_crc_of_a_large_message_is_the_librarys),
+      cmocka_unit_test(test_header_is_the_librarys),
+      cmocka_unit_test(test_transform_is_read),
+      cmocka_unit_test(test_transform_of_version_2_is_read),
+      cmocka_unit_test(test_qtdata_is_read),
+      cmocka_unit_test(test_position_is_read),
+      cmocka_unit_test(test_arrays_and_sensors_are_read),
+      cmocka_unit_test(test_strings_are_read),
+      cmocka_unit_test(test_every_truncation_is_refused),
+      cmocka_unit_test(test_headers_that_are_none_are_refused),
+      cmocka_unit_test(test_weights_are_the_librarys_ndarray),
+      cmocka_unit_test(test_surface_is_the_librarys_polydata),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
