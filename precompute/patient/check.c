@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Whether pairs of points can be two states of one chest. */
+#include <math.h>
+#include <string.h>
+
+#include <gsl/gsl_linalg.h>
+
+#include "precompute/patient/pairs.h"
+
+#include "mesh/read/read.h"
+
+enum { PAIRS_LEAST = 12 };          /* an affine map has as many unknowns as 4 pairs; thrice that */
+static const double flattest = 1.0; /* mm RMS across the plane that fits best */
+static const double stillest = 0.05;  /* mm RMS: below what a landmark can be placed to */
+static const double size_most = 2.0;  /* a full breath makes a lung's sides 1.4 times as long */
+static const double turn_most = 25.0; /* degrees: more than a chest turns between two scans */
+static const double apart_most = 0.5; /* of the spread of the points */
+static const double unmatched = 0.7;  /* of the spread, left by the best affine map */
+
+typedef struct summary {
+  double mean[2][3];
+  double spread[2]; /* RMS distance from the mean, mm */
+  double side[2];   /* longest side of the box, mm */
+  double thinnest;  /* RMS across the flattest direction of the first points, mm */
+  double turn;      /* degrees; of the rotation in the best affine map */
+  double left;      /* RMS that it leaves, mm */
+  bool mirrored;
+} summary;
+
+static void measure(const supine_patient_pairs *pairs, summary *s) {
+  for (int state = 0; state < 2; ++state) {
+    const double *points = state == 0 ? pairs->from : pairs->to;
+    double low[3] = {INFINITY, INFINITY, INFINITY};
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * pairs->count; ++i) {
+      s->mean[state][i % 3] += points[i] / (double)pairs->count;
+      low[i % 3] = fmin(low[i % 3], points[i]);
+      high[i % 3] = fmax(high[i % 3], points[i]);
+    }
+    for (size_t i = 0; i < 3 * pairs->count; ++i) {
+      s->spread[state] += pow(points[i] - s->mean[state][i % 3], 2.0) / (double)pairs->count;
+    }
+    s->spread[state] = sqrt(s->spread[state]);
+    for (int k = 0; k < 3; ++k) {
+      s->side[state] = fmax(s->side[state], high[k] - low[k]);
+    }
+  }
+}
+
+static double second_moment(const supine_patient_pairs *pairs, const summary *s, int first,
+                            size_t a, int second, size_t b) {
+  double sum = 0.0;
+  const double *p = first == 0 ? pairs->from : pairs->to;
+  const double *q = second == 0 ? pairs->from : pairs->to;
+  for (size_t i = 0; i < pairs->count; ++i) {
+    sum += (p[3 * i + a] - s->mean[first][a]) * (q[3 * i + b] - s->mean[second][b]);
+  }
+  return sum / (double)pairs->count;
+}
+
+/* The affine map that fits best, and the rotation in it: with M = U S V^T, U V^T. */
+static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
+  double covariance[9];
+  double map[9];
+  double v[9];
+  double width[3];
+  double work[3];
+  double explained = 0.0;
+  gsl_matrix_view covariance_view = gsl_matrix_view_array(covariance, 3, 3);
+  gsl_matrix_view map_view = gsl_matrix_view_array(map, 3, 3);
+  gsl_matrix_view v_view = gsl_matrix_view_array(v, 3, 3);
+  gsl_vector_view width_view = gsl_vector_view_array(width, 3);
+  gsl_vector_view work_view = gsl_vector_view_array(work, 3);
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t b = 0; b < 3; ++b) {
+      covariance[3 * a + b] = second_moment(pairs, s, 0, a, 0, b);
+      map[3 * a + b] = second_moment(pairs, s, 1, a, 0, b); /* row a: to_a against from */
+    }
+  }
+  double copy[9];
+  for (size_t k = 0; k < 9; ++k) {
+    copy[k] = covariance[k];
+  }
+  gsl_matrix_view copy_view = gsl_matrix_view_array(copy, 3, 3);
+  if (gsl_linalg_SV_decomp(&copy_view.matrix, &v_view.matrix, &width_view.vector,
+                           &work_view.vector) != GSL_SUCCESS) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  s->thinnest = sqrt(width[2]);
+  if (s->thinnest < flattest) {
+    return SUPINE_OK; /* said by the caller */
+  }
+  if (gsl_linalg_cholesky_decomp1(&covariance_view.matrix) != GSL_SUCCESS) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    gsl_vector_view row = gsl_vector_view_array(map + 3 * a, 3);
+    double cross[3] = {row.vector.data[0], row.vector.data[1], row.vector.data[2]};
+    (void)gsl_linalg_cholesky_svx(&covariance_view.matrix, &row.vector);
+    for (size_t b = 0; b < 3; ++b) {
+      explained += cross[b] * map[3 * a + b];
+    }
+  }
+  s->left = sqrt(fmax(0.0, s->spread[1] * s->spread[1] - explained));
+  if (gsl_linalg_SV_decomp(&map_view.matrix, &v_view.matrix, &width_view.vector,
+                           &work_view.vector) != GSL_SUCCESS) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  double rotation[9];
+  double trace = 0.0;
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t b = 0; b < 3; ++b) {
+      rotation[3 * a + b] =
+          map[3 * a] * v[3 * b] + map[3 * a + 1] * v[3 * b + 1] + map[3 * a + 2] * v[3 * b + 2];
+    }
+    trace += rotation[4 * a];
+  }
+  const double *r = rotation;
+  s->mirrored = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                    r[2] * (r[3] * r[7] - r[4] * r[6]) <
+                0.0;
+  s->turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (trace - 1.0)))) * 180.0 / 3.14159265358979323846;
+  return SUPINE_OK;
+}
+
+/* How far the points move, RMS mm; without what they have in common where that is of no account. */
+static double motion(const supine_patient_pairs *pairs, const summary *s, bool moved) {
+  double sum = 0.0;
+  for (size_t i = 0; i < 3 * pairs->count; ++i) {
+    const double shift = moved ? s->mean[1][i % 3] - s->mean[0][i % 3] : 0.0;
+    sum += pow(pairs->to[i] - pairs->from[i] - shift, 2.0);
+  }
+  return sqrt(sum / (double)pairs->count);
+}
+
+supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
+                                         supine_error *error) {
+  summary s = {0};
+  if (pairs->count < PAIRS_LEAST) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%zu pairs of points determine no law: give at least %d, spread over "
+                            "both lungs",
+                            pairs->count, PAIRS_LEAST);
+  }
+  measure(pairs, &s);
+  for (int state = 0; state < 2; ++state) {
+    const char *unit = supine_mesh_unit_likely(s.side[state]);
+    if (unit != NULL) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "the points %s extend over %.3g: no lung in mm%s%s; landmarks are in "
+                              "mm, spread over the lungs",
+                              state == 0 ? "at rest" : "of the other state", s.side[state],
+                              strcmp(unit, "unknown") == 0 ? "" : ", but one in ",
+                              strcmp(unit, "unknown") == 0 ? "" : unit);
+    }
+  }
+  const double size = s.spread[1] / s.spread[0];
+  if (size > size_most || size < 1.0 / size_most) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the other state is %.3g times as large as rest: are both in mm?",
+                            size);
+  }
+  if (find_map(pairs, &s) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "no affine map fits the points");
+  }
+  if (s.thinnest < flattest) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "all points lie within %.2g mm of one plane: landmarks must spread "
+                            "over the lungs",
+                            s.thinnest);
+  }
+  if (s.left > unmatched * s.spread[1]) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the pairs do not match: the best affine map leaves %.0f mm RMS; are "
+                            "both lists in the same order?",
+                            s.left);
+  }
+  if (s.mirrored) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "one state is the mirror image of the other: one of them has an axis "
+                            "reversed (landmarks are LPS: x to the left, y to the back, z to the "
+                            "head)");
+  }
+  if (s.turn > turn_most) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "one state is turned by %.0f degrees against the other: they are in "
+                            "different axes (landmarks are LPS: x to the left, y to the back, z "
+                            "to the head)",
+                            s.turn);
+  }
+  const double apart =
+      sqrt(pow(s.mean[1][0] - s.mean[0][0], 2.0) + pow(s.mean[1][1] - s.mean[0][1], 2.0) +
+           pow(s.mean[1][2] - s.mean[0][2], 2.0));
+  if (!moved && apart > apart_most * s.spread[0]) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the two states are %.0f mm apart: different frames? --translation or "
+                            "--rigid finds the motion between two scans",
+                            apart);
+  }
+  const double distance = motion(pairs, &s, moved);
+  if (distance < stillest) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the other state is the same as rest (%.2g mm RMS%s): there is "
+                            "nothing to fit",
+                            distance, moved ? " beside a translation" : "");
+  }
+  return SUPINE_OK;
+}

@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What was measured, as rows: axis . (u + motion) = value. A landmark gives three, a point of a
+ * surface one, along the normal of the other surface. And the laws' fits to rows. */
+#ifndef SUPINE_PATIENT_ROWS_H
+#define SUPINE_PATIENT_ROWS_H
+
+#include "precompute/patient/patient.h"
+
+typedef struct supine_patient_row {
+  supine_patient_place place;
+  double force[4]; /* what the force 1, X - 1/2, Y - 1/2, Z - 1/2 comes to here */
+  double axis[3];
+  double value;  /* mm */
+  double weight; /* of its square */
+  size_t block;
+} supine_patient_row;
+
+/* Which motion between the scans is to be found with the law. */
+typedef enum supine_patient_moved {
+  SUPINE_PATIENT_STILL = 0,
+  SUPINE_PATIENT_TRANSLATION,
+  SUPINE_PATIENT_RIGID
+} supine_patient_moved;
+
+/* Three rows a pair into rows [3 count]. */
+void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
+                                  const supine_patient_pairs *pairs, supine_patient_row *rows);
+
+/* Gives each row its block, a cube of 40 mm, the grid's origin drawn from the seed; the number of
+ * blocks. */
+size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
+                                 size_t count, unsigned long seed);
+
+/* --- the paper's law ------------------------------------------------------------------------- */
+
+typedef struct supine_patient_power {
+  double powers[SUPINE_PATIENT_POWERS];
+  double linear[9]; /* c1, c3, c5 in mm; translation in mm; small rotation in rad */
+  double squares;   /* what is left, weighted, mm^2 */
+  bool at_bound[SUPINE_PATIENT_POWERS];
+} supine_patient_power;
+
+/* Bounds of c2, c4, c6 and of c7, c8, c9. */
+extern const double supine_patient_exponent_least, supine_patient_exponent_most,
+    supine_patient_slope_most;
+
+/* The six starts. */
+extern const double supine_patient_starts[SUPINE_PATIENT_STARTS][SUPINE_PATIENT_POWERS];
+
+/* Variable projection: what is linear is solved for at each step of the rest (GSL's
+ * multifit_nlinear, Levenberg-Marquardt).
+ * @param powers     where to start
+ * @param tolerance  of the unknowns' relative change in a step
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t count,
+                                       supine_patient_moved moved,
+                                       const double powers[SUPINE_PATIENT_POWERS], double tolerance,
+                                       supine_patient_power *fit, supine_error *error);
+
+/* What a fit leaves of a row, mm. */
+double supine_patient_power_residual(const supine_patient_power *fit,
+                                     const supine_patient_row *row);
+
+/* --- polynomials ----------------------------------------------------------------------------- */
+
+/* Normal equations of rows: enough to fit any polynomial and to score it. */
+typedef struct supine_patient_normals {
+  double matrix[SUPINE_PATIENT_POLYNOMIAL][SUPINE_PATIENT_POLYNOMIAL];
+  double right[SUPINE_PATIENT_POLYNOMIAL];
+  double squares; /* of the values, weighted */
+  double weight;
+} supine_patient_normals;
+
+void supine_patient_normals_add_row(supine_patient_normals *normals, const supine_patient_row *row);
+void supine_patient_normals_add(supine_patient_normals *normals,
+                                const supine_patient_normals *other);
+
+/* Ridge on each coefficient; INFINITY leaves it out. */
+void supine_patient_penalty_translation(double penalty[SUPINE_PATIENT_POLYNOMIAL]);
+void supine_patient_penalty_affine(bool by_lung, double penalty[SUPINE_PATIENT_POLYNOMIAL]);
+
+/* quadratic: of second-degree terms; lung: of what tells one lung from the other. */
+void supine_patient_penalty_quadratic(double quadratic, double lung, bool one_lung,
+                                      double penalty[SUPINE_PATIENT_POLYNOMIAL]);
+
+/* @retval SUPINE_ERROR_NUMERICAL */
+supine_status supine_patient_polynomial_fit(const supine_patient_normals *normals,
+                                            const double penalty[SUPINE_PATIENT_POLYNOMIAL],
+                                            double coefficients[SUPINE_PATIENT_POLYNOMIAL]);
+
+/* What coefficients leave of the rows behind the normals, mm^2, weighted. */
+double supine_patient_polynomial_squares(const supine_patient_normals *normals,
+                                         const double coefficients[SUPINE_PATIENT_POLYNOMIAL]);
+
+#endif
