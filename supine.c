@@ -11,10 +11,11 @@
 #include "runtime/options/command.h"
 
 static const supine_command *const commands[] = {
-    &supine_command_phantom, &supine_command_precompute, &supine_command_info,
-    &supine_command_deform,  &supine_command_compare,    &supine_command_render,
-    &supine_command_breathe, &supine_command_export,     &supine_command_bench,
-    &supine_command_solve,   &supine_command_pv,         &supine_command_stream,
+    &supine_command_phantom, &supine_command_precompute, &supine_command_fit,
+    &supine_command_info,    &supine_command_deform,     &supine_command_compare,
+    &supine_command_render,  &supine_command_breathe,    &supine_command_export,
+    &supine_command_bench,   &supine_command_solve,      &supine_command_pv,
+    &supine_command_stream,
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };

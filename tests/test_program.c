@@ -111,7 +111,7 @@ static void test_help_every_command_teaches(void **state) {
   (void)state;
   static const char *const commands[] = {"phantom", "precompute", "info",    "deform",
                                          "compare", "render",     "breathe", "export",
-                                         "bench",   "solve",      "pv"};
+                                         "bench",   "solve",      "pv",      "fit"};
   EXPECT(0, "precompute", "--help");
   EXPECT(0, "supine ", "--version");
   EXPECT(1, "Commands:", "%s", "");

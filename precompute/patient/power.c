@@ -10,7 +10,7 @@
 
 #include "precompute/patient/rows.h"
 
-enum { P = SUPINE_PATIENT_POWERS, LINEAR_MAX = 9, STEPS_MAX = 60 };
+enum { P = SUPINE_PATIENT_POWERS, LINEAR_MAX = 9, STEPS_MAX = 100 };
 
 /* Exponents beyond these bend all motion into a face; slopes beyond let the force change sign. */
 const double supine_patient_exponent_least = 0.5, supine_patient_exponent_most = 4.0,
@@ -19,7 +19,7 @@ const double supine_patient_exponent_least = 0.5, supine_patient_exponent_most =
 /* Pulls what the data leave open (mm^2 for a factor of e) towards a common exponent and an even
  * force; what they do say outweighs it by orders of magnitude. */
 static const double common_exponent = 1.5;
-static const double pull = 4.0;
+static const double pull = 0.25;
 
 /* As near to a bound as this share of the range is at it. */
 static const double bound_share = 0.002;
@@ -34,13 +34,14 @@ static void range_of(size_t k, double range[2]) {
   range[1] = k < 3 ? supine_patient_exponent_most : supine_patient_slope_most;
 }
 
-/* Unbounded variables for bounded ones. */
+/* Unbounded variables for bounded ones: middle + half sin(q), which does not go flat far from the
+ * bounds, so that a step that went too far comes back. */
 static void unbound(const double powers[P], gsl_vector *q) {
   for (size_t k = 0; k < P; ++k) {
     double range[2];
     range_of(k, range);
-    const double t = fmin(0.999, fmax(0.001, (powers[k] - range[0]) / (range[1] - range[0])));
-    gsl_vector_set(q, k, log(t / (1.0 - t)));
+    const double t = (2.0 * powers[k] - range[0] - range[1]) / (range[1] - range[0]);
+    gsl_vector_set(q, k, asin(fmin(0.99, fmax(-0.99, t))));
   }
 }
 
@@ -48,7 +49,8 @@ static void bound(const gsl_vector *q, double powers[P]) {
   for (size_t k = 0; k < P; ++k) {
     double range[2];
     range_of(k, range);
-    powers[k] = range[0] + (range[1] - range[0]) / (1.0 + exp(-gsl_vector_get(q, k)));
+    powers[k] =
+        0.5 * (range[0] + range[1]) + 0.5 * (range[1] - range[0]) * sin(gsl_vector_get(q, k));
   }
 }
 

@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine fit: a person's own law, from that person's scans and landmarks. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/patient/patient_file.h"
+#include "runtime/options/command.h"
+#include "runtime/options/posture_list.h"
+
+static const char name[] = "fit";
+
+typedef struct request {
+  const char *path, *landmarks;
+  bool reverse, translation, rigid, has_law, has_midline, has_gain, json;
+  int law;
+  double midline, gain;
+  supine_patient_scan rest, state;
+} request;
+
+/* "supine", "prone:rest", "supine+15:-3000" */
+static int read_scan(const char *command, const char *text, void *field) {
+  supine_patient_scan *scan = field;
+  const char *colon = strchr(text, ':');
+  const size_t length = colon != NULL ? (size_t)(colon - text) : strlen(text);
+  supine_posture_list list;
+  double litres;
+  if (length >= sizeof scan->posture ||
+      (colon != NULL && strcmp(colon + 1, "full") != 0 && strcmp(colon + 1, "rest") != 0 &&
+       !supine_options_parse_number(colon + 1, &litres)) ||
+      (colon != NULL && strlen(colon + 1) >= sizeof scan->volume)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  (void)snprintf(scan->posture, sizeof scan->posture, "%.*s", (int)length, text);
+  (void)snprintf(scan->volume, sizeof scan->volume, "%s", colon != NULL ? colon + 1 : "");
+  const int result = supine_options_posture_list_parse(command, scan->posture, &list);
+  if (result != SUPINE_EXIT_OK || list.count != 1) {
+    return result != SUPINE_EXIT_OK ? result : SUPINE_OPTION_MISFIT;
+  }
+  memcpy(scan->gravity, list.item[0].gravity, sizeof scan->gravity);
+  return SUPINE_EXIT_OK;
+}
+
+#define FILLS(member) SUPINE_FILLS(request, member)
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "what was found (JSON), for 'supine precompute --patient'", FILLS(path),
+     .file = SUPINE_FILE_OUT},
+    {"landmarks", 0, "FILE",
+     "matched points, mm, LPS: CSV with the columns x,y,z,to_x,to_y,to_z (from rest to the other "
+     "state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from 2 to "
+     "1)",
+     FILLS(landmarks), .required = true, .file = SUPINE_FILE_IN},
+    {"reverse", 0, NULL, "rest is the other one of the two", FILLS(reverse)},
+    {"rest", 0, "POSTURE[:VOLUME]",
+     "how the person lay at rest, and how full the lungs were: full, rest or mL", FILLS(rest),
+     .read = read_scan, .standard = "supine",
+     .wants = "a posture, and :full, :rest or :ML after it"},
+    {"other", 0, "POSTURE[:VOLUME]", "the same of the other state", FILLS(state), .read = read_scan,
+     .standard = "supine", .wants = "a posture, and :full, :rest or :ML after it"},
+    {"translation", 0, NULL,
+     "the scans' frames may be shifted against each other: finds the shift as well",
+     FILLS(translation), .rivals = "motion"},
+    {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
+    {"law", 0, "LAW",
+     "paper: c1 to c6 and the force of the published law; affine: one affine map; quadratic: one "
+     "of "
+     "second degree for each lung. Default: what leaves least of points that it has not seen",
+     FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
+    {"gain", 0, "G",
+     "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
+     "stays with the body; default 0.4, the 'deep' law's",
+     FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
+    {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
+     FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
+    {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
+    {.name = NULL}};
+
+/* The deep law's: a lung's lowest parts are emptied about 1.5 times as far as its uppermost. */
+static const double usual_gain = 0.4;
+
+static void print_row(const char *what, double fitted, double held_out, const char *after) {
+  (void)printf("  %-24s %7.2f   %7.2f%s\n", what, fitted, held_out, after);
+}
+
+static void print_scores(const supine_patient_fit_report *report, supine_patient_law kept) {
+  static const char *const laws[] = {"law paper, (15)-(18)", "law affine", "law quadratic"};
+  (void)printf("what is left of the displacement, mm RMS:\n"
+               "                             fitted  held out\n");
+  print_row("nothing moved", report->fitted.none, report->held_out.none, "");
+  print_row("translation", report->fitted.translation, report->held_out.translation, "");
+  print_row("affine, each lung", report->fitted.affine_lungs, report->held_out.affine_lungs, "");
+  for (int k = 0; k < SUPINE_PATIENT_LAW_COUNT; ++k) {
+    print_row(laws[k], report->fitted.law[k], report->held_out.law[k],
+              k == (int)kept ? "   <- kept" : "");
+  }
+  (void)printf("held out: %d folds of 40 mm blocks that the fit had not seen, %d times over\n",
+               SUPINE_PATIENT_FOLDS, SUPINE_PATIENT_SEEDS);
+}
+
+static void print_paper_law(const supine_patient *patient,
+                            const supine_patient_fit_report *report) {
+  double c[SUPINE_PATIENT_CONSTANTS];
+  supine_patient_constants(patient, c);
+  (void)printf(
+      "the paper's law, force 1 at the box's centre (95 %% intervals, block bootstrap):\n");
+  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
+    const bool bounded = k >= 6 ? report->at_bound[k - 3] : k % 2 == 1 && report->at_bound[k / 2];
+    (void)printf("  c%zu %8.3f   %8.3f to %8.3f%s\n", k + 1, c[k], report->low[k], report->high[k],
+                 bounded ? "   at the bound of its range" : "");
+  }
+  (void)printf("six starts: %zu of %d end within 1 %% of the best; the fields differ by up to %.2g "
+               "mm\n",
+               report->starts_agreeing, SUPINE_PATIENT_STARTS, report->start_apart);
+}
+
+static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
+                       const request *wanted) {
+  const supine_patient *patient = &record->patient;
+  const bool moved = wanted->translation || wanted->rigid;
+  (void)printf("%zu landmarks in %zu blocks of 40 mm\n", report->count, report->blocks);
+  print_scores(report, patient->law);
+  if (moved) {
+    const double *t = patient->motion;
+    (void)printf("motion between the scans, as the paper's law has it: %.1f,%.1f,%.1f mm", t[0],
+                 t[1], t[2]);
+    if (wanted->rigid) {
+      (void)printf(", turned by %.1f degrees",
+                   sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5]) * 57.29577951308232);
+    }
+    (void)putchar('\n');
+  }
+  print_paper_law(patient, report);
+  (void)printf("kept: %s, which explains %.0f %% of the squared displacement%s held out (%.0f %% "
+               "fitted)\n",
+               supine_patient_law_names[patient->law], 100.0 * report->explained,
+               moved ? " about the motion between the scans" : "",
+               100.0 * report->explained_fitted);
+  (void)printf("the paper's constants were accurate to 1 %%, its validation to 2 mm: here %.1f mm "
+               "are left\n",
+               record->held_out);
+  if (!wanted->has_gain) {
+    (void)printf("one posture cannot tell what turns with gravity from what stays with the body:\n"
+                 "gain %.2g is the deep law's, or --gain\n",
+                 record->force.gain);
+  }
+}
+
+static supine_status fit(const request *wanted, const char *made_by, supine_patient_record *record,
+                         supine_patient_fit_report *report, supine_error *error) {
+  const supine_patient_fit_options options = {.law_given = wanted->has_law,
+                                              .law = (supine_patient_law)wanted->law,
+                                              .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
+                                                       : wanted->translation
+                                                           ? SUPINE_PATIENT_TRANSLATION
+                                                           : SUPINE_PATIENT_STILL};
+  supine_patient_pairs pairs = {0};
+  supine_patient_row *rows = NULL;
+  supine_status status =
+      supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &pairs, error);
+  if (status == SUPINE_OK) {
+    status = supine_patient_pairs_check(&pairs, options.moved != SUPINE_PATIENT_STILL, error);
+  }
+  if (status == SUPINE_OK) {
+    const supine_patient_frame frame = supine_patient_frame_of_points(
+        pairs.count, pairs.from, wanted->has_midline ? &wanted->midline : NULL);
+    rows = malloc(3 * pairs.count * sizeof *rows);
+    if (rows == NULL) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks", pairs.count);
+    } else {
+      supine_patient_rows_of_pairs(&frame, &pairs, rows);
+      status = supine_patient_fit(&frame, rows, pairs.count, 3, &options, &record->patient, report,
+                                  error);
+    }
+  }
+  if (status == SUPINE_OK) {
+    const supine_patient_scores *held = &report->held_out;
+    const bool moved = options.moved != SUPINE_PATIENT_STILL;
+    record->rest = wanted->rest;
+    record->state = wanted->state;
+    record->inflation = supine_patient_inflation(&record->patient);
+    record->force = supine_patient_force(
+        &record->patient, wanted->has_gain ? wanted->gain : usual_gain, wanted->state.gravity);
+    record->points = pairs.count;
+    record->held_out = held->law[record->patient.law];
+    record->held_out_baseline = moved ? held->translation : held->none;
+    record->fitted = report->fitted.law[record->patient.law];
+    record->explained = report->explained;
+    if (wanted->path != NULL) {
+      status = supine_patient_write(wanted->path, record, report, made_by, error);
+    }
+  }
+  free(rows);
+  supine_patient_pairs_free(&pairs);
+  return status;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  supine_patient_record record = {0};
+  supine_patient_fit_report report;
+  supine_error error;
+  if (fit(wanted, given->made_by, &record, &report, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  if (wanted->json) {
+    char *text = supine_patient_text(&record, &report, given->made_by);
+    (void)puts(text != NULL ? text : "{}");
+    free(text);
+  } else {
+    print_text(&record, &report, wanted);
+  }
+  return supine_options_finish(name);
+}
+
+const supine_command supine_command_fit = {
+    name,
+    "a person's own law, from scans and landmarks",
+    .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]",
+    .about =
+        "Fits how one person's lungs move to matched points of two scans, and says how much of "
+        "the motion of points that it has not seen each law explains. 'supine precompute "
+        "--patient' makes a basis of what is kept.",
+    .options = table,
+    .notes = "Example:\n"
+             "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
+             "--other supine:full -o patient.json\n"
+             "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
+    .operands_least = 0,
+    .operands_most = 0,
+    .operands_missing = "landmarks are named by --landmarks",
+    .request_size = sizeof(request),
+    .run = run};

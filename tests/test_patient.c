@@ -1,0 +1,467 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A patient's law: from landmarks, held out, known constants found again; and what is refused. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_randist.h>
+#include <gsl/gsl_rng.h>
+
+#include "precompute/patient/fit.h"
+#include "precompute/patient/patient_file.h"
+
+#include "lungs_helpers.h"
+
+/* Fits pairs as the command does. */
+static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_moved moved,
+                      supine_patient *patient, supine_patient_fit_report *report) {
+  const supine_patient_frame frame =
+      supine_patient_frame_of_points(pairs->count, pairs->from, NULL);
+  const supine_patient_fit_options options = {.moved = moved};
+  supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
+  supine_error error;
+  assert_non_null(rows);
+  supine_patient_rows_of_pairs(&frame, pairs, rows);
+  if (supine_patient_fit(&frame, rows, pairs->count, 3, &options, patient, report, &error) !=
+      SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  free(rows);
+}
+
+/* Points over two lungs, about 230 by 150 by 240 mm. */
+static supine_patient_pairs scatter(size_t count, unsigned long seed) {
+  supine_patient_pairs pairs = {count, malloc(3 * count * sizeof(double)),
+                                malloc(3 * count * sizeof(double))};
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  gsl_rng_set(random, seed);
+  for (size_t i = 0; i < count; ++i) {
+    double *p = pairs.from + 3 * i;
+    p[0] = (i % 2 == 0 ? 1.0 : -1.0) * (17.3 + 97.1 * gsl_rng_uniform(random));
+    p[1] = -151.7 + 149.3 * gsl_rng_uniform(random);
+    p[2] = -203.1 + 241.9 * gsl_rng_uniform(random);
+  }
+  gsl_rng_free(random);
+  return pairs;
+}
+
+/* Moves points by a law, and each coordinate by noise. */
+static void move(supine_patient_pairs *pairs, const supine_patient *truth, double noise,
+                 unsigned long seed) {
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  gsl_rng_set(random, seed);
+  for (size_t i = 0; i < pairs->count; ++i) {
+    double u[3];
+    supine_patient_displacement(truth, pairs->from + 3 * i, u);
+    for (size_t k = 0; k < 3; ++k) {
+      pairs->to[3 * i + k] = pairs->from[3 * i + k] + u[k] + gsl_ran_gaussian(random, noise);
+    }
+  }
+  gsl_rng_free(random);
+}
+
+static supine_patient known(const supine_patient_pairs *pairs) {
+  return (supine_patient){.law = SUPINE_PATIENT_PAPER,
+                          .frame = supine_patient_frame_of_points(pairs->count, pairs->from, NULL),
+                          .powers = {2.1, 1.3, 1.6, 0.2, -0.7, 0.3},
+                          .lengths = {7.3, 5.9, 21.7}};
+}
+
+static void test_public_pairs_hold_out_as_measured(void **state) {
+  (void)state;
+  static const char *const cases[] = {"054", "055", "056", "094", "097"};
+  double mean[3] = {0.0, 0.0, 0.0};
+  for (size_t c = 0; c < 5; ++c) {
+    char path[512];
+    supine_patient_pairs pairs = {0};
+    supine_patient patient;
+    supine_patient_fit_report report;
+    supine_error error;
+    (void)snprintf(path, sizeof path, "%s/landmarks/case%s_landmarks_mm.csv", SUPINE_TEST_DATA,
+                   cases[c]);
+    if (access(path, R_OK) != 0) {
+      printf("skipped: the landmarks are not there\n");
+      skip();
+    }
+    assert_int_equal(supine_patient_pairs_load(path, false, &pairs, &error), SUPINE_OK);
+    assert_int_equal(supine_patient_pairs_check(&pairs, true, &error), SUPINE_OK);
+    fit_pairs(&pairs, SUPINE_PATIENT_TRANSLATION, &patient, &report);
+    const supine_patient_scores *held = &report.held_out;
+    printf("%s: translation %.1f, affine %.1f, each lung %.1f, paper %.1f, quadratic %.1f mm, "
+           "explained %.0f %%\n",
+           cases[c], held->translation, held->affine, held->affine_lungs,
+           held->law[SUPINE_PATIENT_PAPER], held->law[SUPINE_PATIENT_QUADRATIC],
+           100.0 * report.explained);
+    assert_int_equal(patient.law, SUPINE_PATIENT_QUADRATIC);
+    assert_true(held->law[SUPINE_PATIENT_QUADRATIC] < held->affine);
+    assert_true(report.explained >= 0.55);
+    /* What is held out is never better known than what was fitted. */
+    assert_true(held->law[SUPINE_PATIENT_PAPER] > report.fitted.law[SUPINE_PATIENT_PAPER]);
+    assert_true(held->law[SUPINE_PATIENT_QUADRATIC] > report.fitted.law[SUPINE_PATIENT_QUADRATIC]);
+    mean[0] += held->translation / 5.0;
+    mean[1] += held->law[SUPINE_PATIENT_PAPER] / 5.0;
+    mean[2] += held->law[SUPINE_PATIENT_QUADRATIC] / 5.0;
+    supine_patient_pairs_free(&pairs);
+  }
+  printf("mean: translation %.2f, paper %.2f, quadratic %.2f mm\n", mean[0], mean[1], mean[2]);
+  assert_true(mean[1] <= 8.8);
+  assert_true(mean[2] <= 6.8);
+  assert_true(mean[0] > 12.0); /* the motion itself, so that nothing was made small */
+}
+
+static void test_noisy_landmarks_return_the_constants(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(300, 4241);
+  const supine_patient truth = known(&pairs);
+  supine_patient found;
+  supine_patient_fit_report report;
+  double expected[SUPINE_PATIENT_CONSTANTS];
+  double c[SUPINE_PATIENT_CONSTANTS];
+  move(&pairs, &truth, 0.5, 917);
+  fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &report);
+  supine_patient_constants(&truth, expected);
+  supine_patient_constants(&found, c);
+  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
+    printf("c%zu %8.4f found %8.4f +- %.4f\n", k + 1, expected[k], c[k], report.error[k]);
+    assert_true(fabs(c[k] - expected[k]) <= 3.0 * report.error[k]);
+    assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k]))); /* and that says something */
+  }
+  for (size_t k = 0; k < SUPINE_PATIENT_STARTS; ++k) {
+    printf("start %zu leaves %.6f mm\n", k, report.starts[k]);
+  }
+  assert_int_equal(report.starts_agreeing, SUPINE_PATIENT_STARTS);
+  assert_true(report.start_apart < 0.15);
+  double worst = 0.0;
+  found.law = SUPINE_PATIENT_PAPER;
+  for (size_t i = 0; i < pairs.count; ++i) {
+    double u[3];
+    double v[3];
+    supine_patient_displacement(&truth, pairs.from + 3 * i, u);
+    supine_patient_displacement(&found, pairs.from + 3 * i, v);
+    worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
+  }
+  assert_true(worst < 0.5); /* no point is worse than one measurement */
+  supine_patient_pairs_free(&pairs);
+}
+
+/* A quadratic map of each lung is found to rounding, but for the ridge. */
+static void test_quadratic_field_is_recovered(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(400, 77);
+  supine_patient truth = known(&pairs);
+  supine_patient found;
+  supine_patient_fit_report report;
+  uint64_t seed = 31;
+  truth.law = SUPINE_PATIENT_QUADRATIC;
+  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
+    truth.polynomial[k] = 4.0 * random_signed(&seed);
+  }
+  move(&pairs, &truth, 0.1, 3);
+  fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &report);
+  assert_int_equal(found.law, SUPINE_PATIENT_QUADRATIC);
+  assert_true(report.held_out.law[SUPINE_PATIENT_QUADRATIC] <
+              3.0 * 0.1 * sqrt(3.0)); /* noise, and what the ridge holds down */
+  assert_true(report.held_out.affine > 1.0);
+  supine_patient_pairs_free(&pairs);
+}
+
+static void test_motion_between_scans_is_told_from_the_law(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(250, 5);
+  const supine_patient truth = known(&pairs);
+  supine_patient found;
+  supine_patient_fit_report report;
+  move(&pairs, &truth, 0.2, 8);
+  static const double shift[3] = {31.7, -12.3, 88.1};
+  for (size_t i = 0; i < 3 * pairs.count; ++i) {
+    pairs.to[i] += shift[i % 3];
+  }
+  fit_pairs(&pairs, SUPINE_PATIENT_TRANSLATION, &found, &report);
+  found.law = SUPINE_PATIENT_PAPER;
+  for (size_t k = 0; k < 3; ++k) {
+    assert_true(fabs(found.motion[k] - shift[k]) < 0.5);
+  }
+  supine_patient_pairs_free(&pairs);
+}
+
+static void test_derivatives_continue_beyond_the_frame(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(50, 6);
+  supine_patient patient = known(&pairs);
+  patient.law = SUPINE_PATIENT_QUADRATIC;
+  uint64_t seed = 12;
+  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
+    patient.polynomial[k] = random_signed(&seed);
+  }
+  double at[3] = {60.3, patient.frame.maximum[1], -70.1}; /* on the dorsal face */
+  double inside[3];
+  double face[3];
+  double outside[3];
+  supine_patient_displacement(&patient, at, face);
+  at[1] -= 1e-3;
+  supine_patient_displacement(&patient, at, inside);
+  at[1] += 2e-3;
+  supine_patient_displacement(&patient, at, outside);
+  for (size_t k = 0; k < 3; ++k) {
+    const double slope = (face[k] - inside[k]) / 1e-3;
+    assert_true(fabs((outside[k] - face[k]) / 1e-3 - slope) < 1e-5 * (1.0 + fabs(slope)));
+  }
+  supine_patient_pairs_free(&pairs);
+}
+
+/* --- what is refused ------------------------------------------------------------------------- */
+
+static supine_status check(const supine_patient_pairs *pairs, bool moved, char *message) {
+  supine_error error = {0};
+  const supine_status status = supine_patient_pairs_check(pairs, moved, &error);
+  (void)snprintf(message, sizeof error.message, "%s", error.message);
+  return status;
+}
+
+static void refused(const supine_patient_pairs *pairs, bool moved, const char *words) {
+  char message[sizeof((supine_error *)0)->message];
+  assert_int_equal(check(pairs, moved, message), SUPINE_ERROR_FORMAT);
+  if (strstr(message, words) == NULL) {
+    fail_msg("'%s' does not say '%s'", message, words);
+  }
+}
+
+static void test_impossible_pairs_are_refused(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(60, 99);
+  const supine_patient truth = known(&pairs);
+  char message[sizeof((supine_error *)0)->message];
+  const size_t n = pairs.count;
+  move(&pairs, &truth, 0.3, 1);
+  assert_int_equal(check(&pairs, false, message), SUPINE_OK);
+
+  pairs.count = 11;
+  refused(&pairs, false, "11 pairs of points determine no law");
+  pairs.count = n;
+  for (size_t i = 0; i < n; ++i) { /* an axis reversed in one of the two */
+    pairs.to[3 * i] *= -1.0;
+  }
+  refused(&pairs, false, "mirror image");
+  for (size_t i = 0; i < n; ++i) { /* RAS beside LPS */
+    pairs.to[3 * i + 1] *= -1.0;
+  }
+  refused(&pairs, true, "turned by 1");
+  move(&pairs, &truth, 0.3, 1);
+  for (size_t i = 0; i < 3 * n; ++i) {
+    pairs.to[i] += 150.0;
+  }
+  refused(&pairs, false, "mm apart");
+  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* --translation finds it */
+  for (size_t i = 0; i < 3 * n; ++i) {
+    pairs.to[i] = 0.1 * pairs.from[i];
+  }
+  refused(&pairs, false, "in cm");
+  for (size_t i = 0; i < 3 * n; ++i) {
+    pairs.to[i] = 2.2 * pairs.from[i];
+  }
+  refused(&pairs, true, "2.2 times as large");
+  memcpy(pairs.to, pairs.from, 3 * n * sizeof(double));
+  refused(&pairs, false, "the same as rest");
+  for (size_t i = 0; i < n; ++i) {
+    pairs.to[3 * i + 2] += 5.0;
+  }
+  refused(&pairs, true, "nothing to fit");
+  for (size_t i = 0; i < n; ++i) { /* each point's place that of another */
+    memcpy(pairs.to + 3 * i, pairs.from + 3 * ((i * 7 + 3) % n), 3 * sizeof(double));
+  }
+  refused(&pairs, false, "do not match");
+  for (size_t i = 0; i < n; ++i) {
+    pairs.from[3 * i + 1] = 17.0 + 0.3 * pairs.from[3 * i];
+    pairs.to[3 * i + 1] = pairs.from[3 * i + 1];
+  }
+  refused(&pairs, false, "one plane");
+  supine_patient_pairs_free(&pairs);
+}
+
+static supine_status load_text(const char *text, bool reverse, supine_patient_pairs *pairs,
+                               supine_error *error) {
+  char path[] = "/tmp/supine-pairs-XXXXXX";
+  const int file = mkstemp(path);
+  assert_true(file >= 0);
+  assert_int_equal(write(file, text, strlen(text)), (ssize_t)strlen(text));
+  assert_int_equal(close(file), 0);
+  const supine_status status = supine_patient_pairs_load(path, reverse, pairs, error);
+  (void)unlink(path);
+  return status;
+}
+
+static void test_pair_files_say_what_is_wrong(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *words;
+  } bad[] = {{"x,y,z,to_x,to_y\n1,2,3,4,5\n", "no column \"to_z\""},
+             {"im1_x,im1_y,im1_z,im2_x,im2_y\n1,2,3,4,5\n", "no column \"im2_z\""},
+             {"x,y,z,to_x,to_y,to_z\n", "no pairs"},
+             {"x,y,z,to_x,to_y,to_z\n1,2,3,4,nan,6\n", ":2: to_y \"nan\" is not a finite number"},
+             {"x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n7,8,9,1,1,1\n1,2,3,4,5,7\n",
+              "lines 2 and 4 both give the point 1,2,3"},
+             {"", "empty"}};
+  supine_patient_pairs pairs = {0};
+  supine_error error;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    assert_int_equal(load_text(bad[i].text, false, &pairs, &error), SUPINE_ERROR_FORMAT);
+    if (strstr(error.message, bad[i].words) == NULL) {
+      fail_msg("'%s' does not say '%s'", error.message, bad[i].words);
+    }
+    assert_null(pairs.from);
+  }
+  assert_int_equal(supine_patient_pairs_load("/no/such.csv", false, &pairs, &error),
+                   SUPINE_ERROR_READ);
+}
+
+static void test_pair_files_go_from_rest(void **state) {
+  (void)state;
+  static const char images[] = "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z\n1,2,3,4,5,6\n";
+  static const char plain[] = "x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n";
+  supine_patient_pairs pairs = {0};
+  supine_error error;
+  for (int reverse = 0; reverse < 2; ++reverse) {
+    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled: rest is image 2 */
+      assert_int_equal(load_text(file == 0 ? plain : images, reverse == 1, &pairs, &error),
+                       SUPINE_OK);
+      assert_int_equal((int)pairs.count, 1);
+      assert_true(pairs.from[0] == (reverse == file ? 1.0 : 4.0));
+      assert_true(pairs.to[2] == (reverse == file ? 6.0 : 3.0));
+      supine_patient_pairs_free(&pairs);
+    }
+  }
+}
+
+static void test_law_asked_for_needs_points_enough(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(40, 3);
+  const supine_patient truth = known(&pairs);
+  const supine_patient_fit_options options = {.law_given = true, .law = SUPINE_PATIENT_QUADRATIC};
+  supine_patient patient;
+  supine_patient_row *rows = malloc(3 * pairs.count * sizeof *rows);
+  supine_error error;
+  move(&pairs, &truth, 0.3, 2);
+  supine_patient_rows_of_pairs(&truth.frame, &pairs, rows);
+  assert_int_equal(
+      supine_patient_fit(&truth.frame, rows, pairs.count, 3, &options, &patient, NULL, &error),
+      SUPINE_ERROR_FORMAT);
+  assert_non_null(strstr(error.message, "fewer than the 60 unknowns of the quadratic law"));
+  free(rows);
+  supine_patient_pairs_free(&pairs);
+}
+
+/* --- patient.json and what it makes of a surface --------------------------------------------- */
+
+static supine_patient_record record_of(const supine_patient *patient) {
+  supine_patient_record record = {.patient = *patient,
+                                  .rest = {"supine", "rest", {0.0, 1.0, 0.0}},
+                                  .state = {"supine", "full", {0.0, 1.0, 0.0}},
+                                  .points = 300,
+                                  .held_out = 4.25,
+                                  .held_out_baseline = 10.5,
+                                  .fitted = 3.125,
+                                  .explained = 0.81};
+  record.inflation = supine_patient_inflation(patient);
+  record.force = supine_patient_force(patient, 0.4, record.state.gravity);
+  return record;
+}
+
+static void test_record_survives_text(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(30, 2);
+  supine_patient patient = known(&pairs);
+  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
+    patient.polynomial[k] = 0.1 * (double)k - 1.0 / 3.0;
+  }
+  patient.motion[1] = 1.0 / 7.0;
+  const supine_patient_record before = record_of(&patient);
+  supine_patient_record after;
+  supine_error error;
+  char *text = supine_patient_text(&before, NULL, "test");
+  assert_non_null(text);
+  assert_int_equal(supine_patient_parse("text", text, &after, &error), SUPINE_OK);
+  assert_int_equal(after.patient.law, before.patient.law);
+  assert_memory_equal(before.patient.frame.minimum, after.patient.frame.minimum,
+                      sizeof before.patient.frame.minimum);
+  assert_true(after.patient.frame.midline == before.patient.frame.midline);
+  assert_memory_equal(before.patient.powers, after.patient.powers, sizeof before.patient.powers);
+  assert_memory_equal(before.patient.lengths, after.patient.lengths, sizeof before.patient.lengths);
+  assert_memory_equal(before.patient.polynomial, after.patient.polynomial,
+                      sizeof before.patient.polynomial);
+  assert_memory_equal(before.patient.motion, after.patient.motion, sizeof before.patient.motion);
+  assert_memory_equal(&before.force, &after.force, sizeof before.force);
+  assert_string_equal(after.rest.volume, "rest");
+  assert_string_equal(after.state.posture, "supine");
+  assert_true(after.held_out == 4.25 && after.explained == 0.81 && after.points == 300);
+  /* Each part of it missing is named. */
+  static const char *const parts[] = {"frame", "law", "force", "rest", "motion", "format"};
+  for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
+    char key[32];
+    char *spoiled = strdup(text);
+    (void)snprintf(key, sizeof key, "\"%s\"", parts[i]);
+    char *at = strstr(spoiled, key);
+    assert_non_null(at);
+    at[1] = '#';
+    assert_int_equal(supine_patient_parse("text", spoiled, &after, &error), SUPINE_ERROR_FORMAT);
+    free(spoiled);
+  }
+  assert_int_equal(supine_patient_parse("text", "{\"format\"", &after, &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_patient_read("/no/such.json", &after, &error), SUPINE_ERROR_READ);
+  free(text);
+  supine_patient_pairs_free(&pairs);
+}
+
+static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(30, 2);
+  const supine_patient patient = known(&pairs);
+  static const double postures[4][3] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {0, 0, 1}};
+  for (size_t p = 0; p < 4; ++p) {
+    const double *g = postures[p];
+    const supine_force_law law = supine_patient_force(&patient, 0.37, g);
+    for (int corner = 0; corner < 8; ++corner) {
+      const double box[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
+      const double height = g[1] > 0.0   ? 1.0 - box[1]
+                            : g[1] < 0.0 ? box[1]
+                            : g[2] < 0.0 ? box[2]
+                                         : 1.0 - box[2];
+      const double force = law.base + law.gain * height + law.box[0] * box[0] +
+                           law.box[1] * box[1] + law.box[2] * box[2];
+      const double *c = patient.powers + 3;
+      const double expected =
+          1.0 + c[0] * (box[0] - 0.5) + c[1] * (box[1] - 0.5) + c[2] * (box[2] - 0.5);
+      assert_true(fabs(force - expected) < 1e-14);
+    }
+  }
+  /* The deep law's own, from its slope. */
+  supine_patient other = patient;
+  other.law = SUPINE_PATIENT_AFFINE;
+  const supine_force_law deep = supine_patient_force(&other, 0.4, postures[0]);
+  assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
+  supine_patient_pairs_free(&pairs);
+}
+
+int main(void) {
+  static const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_public_pairs_hold_out_as_measured),
+      cmocka_unit_test(test_noisy_landmarks_return_the_constants),
+      cmocka_unit_test(test_quadratic_field_is_recovered),
+      cmocka_unit_test(test_motion_between_scans_is_told_from_the_law),
+      cmocka_unit_test(test_derivatives_continue_beyond_the_frame),
+      cmocka_unit_test(test_impossible_pairs_are_refused),
+      cmocka_unit_test(test_pair_files_say_what_is_wrong),
+      cmocka_unit_test(test_pair_files_go_from_rest),
+      cmocka_unit_test(test_law_asked_for_needs_points_enough),
+      cmocka_unit_test(test_record_survives_text),
+      cmocka_unit_test(test_force_is_one_at_the_centre_in_the_fitted_posture)};
+  (void)gsl_set_error_handler_off();
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
