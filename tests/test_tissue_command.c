@@ -168,7 +168,7 @@ static void test_solve_bad_expandability_file_names_vertex(void **state) {
   (void)state;
   write_text("expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
-  assert_non_null(strstr(text, "a.csv:4: expandability of vertex 2 is -3"));
+  assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 must be positive"));
   write_text("expandability\n1\n1\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "vertex 2 of"));

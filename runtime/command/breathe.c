@@ -45,10 +45,9 @@ static int read_turn(const char *command, const char *value, void *field) {
     return supine_options_usage(command, "--turn takes a time above 0 s, not '%s'", value);
   }
   wanted->turns = true;
-  const int result = supine_options_orientation_posture(command, text, wanted->turn.from);
-  return result == SUPINE_EXIT_OK
-             ? supine_options_orientation_posture(command, colon[0] + 1, wanted->turn.to)
-             : result;
+  const int result = supine_options_posture(command, text, wanted->turn.from);
+  return result == SUPINE_EXIT_OK ? supine_options_posture(command, colon[0] + 1, wanted->turn.to)
+                                  : result;
 }
 
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
@@ -167,6 +166,24 @@ static void report(const request *wanted, const breath_course *course, const bre
                1e3 * most, 1e3 * budget);
 }
 
+static supine_status play_frames(const breath_course *course, breath_frames *frames,
+                                 breath_output *output, gauge *measured, float *xyz,
+                                 double *seconds, supine_error *error) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_status status = SUPINE_OK;
+  for (size_t t = 0; t < course->count && status == SUPINE_OK; ++t) {
+    seconds[t] = supine_breath_frames_next(frames, xyz);
+    gauge_frame(measured, xyz, course->volume[t]);
+    status = supine_command_breath_output_add(output, xyz, error);
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)course->count)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  supine_options_progress_end(&progress);
+  return status;
+}
+
 static supine_status play(const supine_basis *basis, const request *wanted, size_t count,
                           const char *made_by, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -178,7 +195,6 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   gauge measured = {0};
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
-  supine_progress progress = {0};
   supine_status status = SUPINE_OK;
   if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
       gauge_begin(&rest, &measured) != SUPINE_OK) {
@@ -202,21 +218,11 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  progress = supine_options_progress_begin(name);
-  for (size_t t = 0; t < count && status == SUPINE_OK; ++t) {
-    seconds[t] = supine_breath_frames_next(frames, xyz);
-    gauge_frame(&measured, xyz, course.volume[t]);
-    status = supine_command_breath_output_add(output, xyz, error);
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)count)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-    }
-  }
+  status = play_frames(&course, frames, output, &measured, xyz, seconds, error);
   if (status == SUPINE_OK) {
     status = supine_command_breath_output_commit(output, supine_breath_frames_volumes(frames),
                                                  made_by, error);
   }
-  supine_options_progress_end(&progress);
   if (status == SUPINE_OK) {
     report(wanted, &course, frames, &measured, seconds);
   }

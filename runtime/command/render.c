@@ -112,17 +112,45 @@ static void choose_size(const request *wanted, supine_picture *picture) {
   picture->height = wanted->height != 0 ? wanted->height : 120 + 480 * picture->view_count;
 }
 
+/* Draws and writes what states and colours were found for. */
+static int draw(const request *wanted, supine_renderer *renderer,
+                const supine_posture_list *postures, const char *reference, const state *states,
+                const double ends[2]) {
+  supine_panel panel[SUPINE_PANELS_MAX];
+  char label[128];
+  for (size_t i = 0; i < postures->count; ++i) {
+    panel[i] = (supine_panel){.title = postures->item[i].name,
+                              .subtitle = states[i].subtitle,
+                              .weights = states[i].weights,
+                              .scales = states[i].scales,
+                              .value = states[i].value};
+    memcpy(panel[i].gravity, postures->item[i].gravity, sizeof panel[i].gravity);
+  }
+  (void)snprintf(label, sizeof label, "%s%s, mm",
+                 reference != NULL ? "difference from " : "displacement from rest",
+                 reference != NULL ? reference : "");
+  supine_picture picture = {.panel = panel,
+                            .panel_count = postures->count,
+                            .view = wanted->view,
+                            .view_count = wanted->view_count,
+                            .heading = wanted->title,
+                            .bar_label = label,
+                            .largest = wanted->largest > 0.0 ? wanted->largest
+                                                             : supine_render_bar_end(ends[0]),
+                            .dark = wanted->theme == 1};
+  picture.beyond = ends[1] > picture.largest;
+  choose_size(wanted, &picture);
+  return write_picture(wanted, renderer, &picture);
+}
+
 static int render(const supine_basis *basis, const request *wanted,
                   const supine_posture_list *postures, const supine_posture_item *reference) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   const size_t count = postures->count;
   supine_compare *compare = NULL;
   supine_renderer *renderer = NULL;
-  supine_panel panel[SUPINE_PANELS_MAX];
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  double p95 = 0.0;
-  double largest = 0.0;
-  char label[128];
+  double ends[2] = {0.0, 0.0}; /* of the colours: 95th percentile, largest */
   int result = SUPINE_EXIT_OK;
   state *states = calloc(count + 1, sizeof *states); /* the reference is the last */
   float *values = malloc((count + 1) * n * sizeof *values);
@@ -143,30 +171,11 @@ static int render(const supine_basis *basis, const request *wanted,
     goto cleanup;
   }
   for (size_t i = 0; i < count; ++i) {
-    find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &p95,
-               &largest);
-    panel[i] = (supine_panel){.title = postures->item[i].name,
-                              .subtitle = states[i].subtitle,
-                              .weights = states[i].weights,
-                              .scales = states[i].scales,
-                              .value = states[i].value};
-    memcpy(panel[i].gravity, postures->item[i].gravity, sizeof panel[i].gravity);
+    find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &ends[0],
+               &ends[1]);
   }
-  (void)snprintf(label, sizeof label, "%s%s, mm",
-                 reference != NULL ? "difference from " : "displacement from rest",
-                 reference != NULL ? reference->name : "");
-  supine_picture picture = {.panel = panel,
-                            .panel_count = count,
-                            .view = wanted->view,
-                            .view_count = wanted->view_count,
-                            .heading = wanted->title,
-                            .bar_label = label,
-                            .largest = wanted->largest > 0.0 ? wanted->largest
-                                                             : supine_render_bar_end(p95),
-                            .dark = wanted->theme == 1};
-  picture.beyond = largest > picture.largest;
-  choose_size(wanted, &picture);
-  result = write_picture(wanted, renderer, &picture);
+  result =
+      draw(wanted, renderer, postures, reference != NULL ? reference->name : NULL, states, ends);
 cleanup:
   supine_render_destroy(renderer);
   supine_compare_destroy(compare);

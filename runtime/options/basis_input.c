@@ -35,8 +35,7 @@ void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char
 static size_t named_lung(const supine_basis *basis, const char *piece, size_t length) {
   const size_t count = supine_basis_get_info(basis)->lung_count;
   for (size_t lung = 0; lung < count; ++lung) {
-    char text[32];
-    supine_options_basis_lung_name(basis, lung, text, sizeof text);
+    const char *text = supine_basis_get_info(basis)->lung_names[lung];
     if (strlen(text) == length && strncmp(piece, text, length) == 0) {
       return lung;
     }
@@ -46,29 +45,21 @@ static size_t named_lung(const supine_basis *basis, const char *piece, size_t le
 
 /* "left=200,right=300" into volumes; false where it is anything else. */
 static bool parse_lung_volumes(const supine_basis *basis, const char *text, double *volumes) {
-  const size_t count = supine_basis_get_info(basis)->lung_count;
-  const char *at = text;
-  for (;;) {
-    const size_t length = strcspn(at, "=,");
-    const size_t lung = named_lung(basis, at, length);
-    if (at[length] != '=' || lung == count) {
-      return false;
-    }
+  for (const char *at = text;; ++at) {
     char number[64];
-    const char *value = at + length + 1;
-    const size_t digits = strcspn(value, ",");
-    if (digits >= sizeof number) {
+    const size_t name = strcspn(at, "=,");
+    const size_t lung = named_lung(basis, at, name);
+    const size_t digits = at[name] == '=' ? strcspn(at + name + 1, ",") : 0;
+    (void)snprintf(number, sizeof number, "%.*s", (int)digits, at + name + 1);
+    if (digits == 0 || digits >= sizeof number ||
+        lung == supine_basis_get_info(basis)->lung_count ||
+        !supine_options_parse_number(number, &volumes[lung])) {
       return false;
     }
-    memcpy(number, value, digits);
-    number[digits] = '\0';
-    if (!supine_options_parse_number(number, &volumes[lung])) {
-      return false;
-    }
-    if (value[digits] == '\0') {
+    at += name + 1 + digits;
+    if (*at == '\0') {
       return true;
     }
-    at = value + digits + 1;
   }
 }
 

@@ -7,11 +7,8 @@
 
 #include "runtime/options/orientation.h"
 
-int supine_options_orientation_posture(const char *command, const char *name, double gravity[3]) {
+static int unknown_posture(const char *command, const char *name) {
   enum { NAMES_MAX = 32 };
-  if (supine_posture_gravity(name, gravity) == SUPINE_OK) {
-    return SUPINE_EXIT_OK;
-  }
   const char *names[NAMES_MAX];
   const size_t count = supine_posture_count() < NAMES_MAX ? supine_posture_count() : NAMES_MAX;
   for (size_t i = 0; i < count; ++i) {
@@ -27,30 +24,67 @@ int supine_options_orientation_posture(const char *command, const char *name, do
                               name);
 }
 
+/* Makes a direction of a vector of any length, which it returns; 0 where it has none. */
+static double make_unit(double g[3]) {
+  const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
+  double square = 0.0;
+  for (int i = 0; i < 3 && largest > 0.0; ++i) {
+    g[i] /= largest; /* so that no square overflows or vanishes */
+    square += g[i] * g[i];
+  }
+  for (int i = 0; i < 3 && largest > 0.0; ++i) {
+    g[i] /= sqrt(square);
+  }
+  return largest * sqrt(square);
+}
+
+/* "supine+15", "prone-20"; untouched where it is none. */
+static bool parse_tilted(const char *name, double gravity[3]) {
+  const char *sign = name + strcspn(name, "+-");
+  char front[SUPINE_POSTURE_NAME_MAX];
+  double degrees = 0.0;
+  double level[3];
+  (void)snprintf(front, sizeof front, "%.*s", (int)(sign - name), name);
+  return supine_options_parse_number(sign, &degrees) &&
+         supine_posture_gravity(front, level) == SUPINE_OK &&
+         supine_posture_tilt(level, degrees, gravity) == SUPINE_OK;
+}
+
+int supine_options_posture(const char *command, const char *text, double gravity[3]) {
+  if (supine_posture_gravity(text, gravity) == SUPINE_OK || parse_tilted(text, gravity)) {
+    return SUPINE_EXIT_OK;
+  }
+  if (strchr(text, ':') == NULL) {
+    return unknown_posture(command, text);
+  }
+  char commas[SUPINE_POSTURE_NAME_MAX];
+  (void)snprintf(commas, sizeof commas, "%s", text);
+  for (char *c = commas; *c != '\0'; ++c) {
+    *c = (char)(*c == ':' ? ',' : *c);
+  }
+  if (!supine_options_parse_numbers(commas, 3, gravity)) {
+    return supine_options_usage(command, "'%s': gravity is three finite numbers, X:Y:Z", text);
+  }
+  return make_unit(gravity) > 0.0
+             ? SUPINE_EXIT_OK
+             : supine_options_usage(command, "gravity 0:0:0 has no direction; supine is 0:1:0");
+}
+
 static int read_posture(const char *command, const char *value, void *field) {
-  return supine_options_orientation_posture(command, value, field);
+  return supine_options_posture(command, value, field);
 }
 
 static int read_gravity(const char *command, const char *value, void *field) {
-  double *g = field;
-  if (!supine_options_parse_numbers(value, 3, g)) {
+  if (!supine_options_parse_numbers(value, 3, field)) {
     return SUPINE_OPTION_MISFIT;
   }
-  const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
-  if (largest == 0.0) {
+  const double length = make_unit(field);
+  if (length == 0.0) {
     return supine_options_usage(command, "gravity 0,0,0 has no direction; supine is 0,1,0");
   }
-  const double x = g[0] / largest; /* so that no square overflows or vanishes */
-  const double y = g[1] / largest;
-  const double z = g[2] / largest;
-  const double length = sqrt(x * x + y * y + z * z);
-  if (fabs(length * largest - 1.0) > 1e-6) {
-    supine_options_say(command, "note: gravity has length %g; only its direction counts",
-                       length * largest);
+  if (fabs(length - 1.0) > 1e-6) {
+    supine_options_say(command, "note: gravity has length %g; only its direction counts", length);
   }
-  g[0] = x / length;
-  g[1] = y / length;
-  g[2] = z / length;
   return SUPINE_EXIT_OK;
 }
 
@@ -69,7 +103,7 @@ const supine_option supine_options_orientation[] = {
     {.help = "Where gravity points (one of the first three):"},
     {"posture", 0, "NAME",
      "supine, prone, left, right (lying on that side), upright, inverted, or a DICOM patient "
-     "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR",
+     "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR; supine+15: tilted, as by --tilt 15",
      GRAVITY, .read = read_posture},
     {"gravity", 0, "X,Y,Z",
      "a direction in body axes: x to the left, y to the back, z to the head; supine is 0,1,0",

@@ -16,8 +16,12 @@ typedef struct supine_orientation {
   double tilt;       /* degrees */
 } supine_orientation;
 
-/* Reads a posture's name; unknown ones are answered with the nearest. */
-int supine_options_orientation_posture(const char *command, const char *name, double gravity[3]);
+enum { SUPINE_POSTURE_NAME_MAX = 48 };
+
+/* The unit direction of gravity of a posture as people write it: "prone"; "supine+15", tilted by
+ * degrees towards the head; "0.6:0:-0.8", gravity in body axes. An exit code; an unknown name is
+ * answered with the nearest. */
+int supine_options_posture(const char *command, const char *text, double gravity[3]);
 
 /* The unit direction of gravity, tilt included; supine where only a tilt was given. Where nothing
  * was given at all: a usage error. */

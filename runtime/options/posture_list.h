@@ -3,9 +3,9 @@
 #ifndef SUPINE_POSTURE_LIST_H
 #define SUPINE_POSTURE_LIST_H
 
-#include "runtime/options/command.h"
+#include "runtime/options/orientation.h"
 
-enum { SUPINE_POSTURE_LIST_MAX = 32, SUPINE_POSTURE_NAME_MAX = 48 };
+enum { SUPINE_POSTURE_LIST_MAX = 32 };
 
 /* One orientation: as the user wrote it, and its unit direction of gravity. */
 typedef struct supine_posture_item {

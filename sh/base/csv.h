@@ -25,7 +25,9 @@ typedef struct supine_csv {
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
 } supine_csv;
 
-/* Opens and reads the header; each of the first `required` of `names` must be there. */
+/* Opens and reads the header; each of the first `required` of `names` must be there. Without names
+ * (NULL) any header will do; it stays in `field` until the first row, and columns are in its order.
+ */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
 
