@@ -97,7 +97,7 @@ static supine_status project(pipeline *p, supine_error *error) {
   if (p->linear) {
     return supine_projection_linear(p->lungs, model, options->band, &p->projection, error);
   }
-  return supine_projection_sampled(p->lungs, model, options->band, 0.0, stage_progress, &part,
+  return supine_projection_sampled(p->lungs, model, options->band, stage_progress, &part,
                                    &p->projection, error);
 }
 

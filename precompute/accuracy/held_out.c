@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "precompute/accuracy/held_out.h"
-#include "precompute/projection/sampled.h"
+#include "precompute/projection/sampler.h"
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
   const double golden = M_PI * (3.0 - sqrt(5.0));
@@ -89,10 +89,10 @@ supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const 
                               count);
     goto cleanup;
   }
-  status = supine_projection_sampler_create(lungs, model, 0.0, &sampler, error);
+  status = supine_projection_sampler_create(lungs, model, &sampler, error);
   if (status == SUPINE_OK) {
     status =
-        supine_projection_sampler_solve(sampler, count, made.directions, made.fields, NULL, error);
+        supine_projection_sampler_solve(sampler, count, made.directions, false, made.fields, NULL, error);
   }
   for (size_t d = 0; d < count && closed && status == SUPINE_OK; ++d) {
     supine_volume_forms forms = {0};

@@ -1,177 +1,141 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Conjugate gradients in the form of Chronopoulos and Gear (1989): two passes over the vectors a
- * step instead of three, for the same iterates. For matrices of larger condition number. */
+/* Conjugate gradients in the form of Chronopoulos and Gear (1989): one image and one update a step,
+ * preconditioned by the diagonal or, where there are coarser stages, by the cycle over them. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "precompute/physics/equilibrium_internal.h"
+#include "precompute/physics/conjugate_gradients.h"
 
-/* out = B in for one row, B = I - weight. */
-static inline void row_product(const supine_equilibrium *eq, size_t i, size_t count,
-                               const double *in, double *out) {
-  const supine_network *net = eq->network;
-  const double *own = in + i * count;
-  for (size_t r = 0; r < count; ++r) {
-    out[r] = own[r];
+typedef struct pass {
+  const supine_gradients *work;
+  float first; /* share of inverse times residual that a cycle, or no cycle, starts at */
+  float alpha[SUPINE_RHS_MAX], beta[SUPINE_RHS_MAX];
+  double step[SUPINE_RHS_MAX]; /* alpha in the solution's units */
+} pass;
+
+double supine_physics_gradients_total(const double *sums, size_t rows, size_t lanes, size_t part,
+                                      size_t lane) {
+  double total = 0.0;
+  for (size_t block = 0; block * SUPINE_SUM_ROWS < rows; ++block) {
+    total += sums[(2 * block + part) * lanes + lane];
   }
-  for (size_t s = net->row_begin[i]; s < net->row_begin[i + 1]; ++s) {
-    const double weight = eq->weight[s];
-    const double *other = in + (size_t)net->neighbour[s] * count;
-    for (size_t r = 0; r < count; ++r) {
-      out[r] -= weight * other[r];
-    }
-  }
+  return total;
 }
 
-/* w = B r, with <r, r> and <r, w>. Inlined for each common count, so that the compiler keeps the
- * sums in registers. */
-static inline void image_rows(supine_pass *work, size_t count, size_t begin, size_t end,
-                              size_t thread) {
-  supine_equilibrium *eq = work->eq;
-  double rr[SUPINE_RHS_MAX] = {0.0};
-  double rw[SUPINE_RHS_MAX] = {0.0};
-  for (size_t i = begin; i < end; ++i) {
-    double out[SUPINE_RHS_MAX];
-    const double *own = eq->residual + i * count;
-    row_product(eq, i, count, eq->residual, out);
-    for (size_t r = 0; r < count; ++r) {
-      eq->image[i * count + r] = out[r];
-      rr[r] += own[r] * own[r];
-      rw[r] += own[r] * out[r];
+/* w = A z, with <r, z> and <z, w>. */
+SUPINE_INLINE void image_rows(size_t lanes, const pass *p, size_t begin, size_t end) {
+  const supine_stage *stage = &p->work->system->stage[0];
+  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
+    double rz[SUPINE_RHS_MAX] = {0.0};
+    double zw[SUPINE_RHS_MAX] = {0.0};
+    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
+      float out[SUPINE_RHS_MAX];
+      const float *z = stage->solution + i * lanes;
+      const float *right = stage->right + i * lanes;
+      float *restrict image = stage->work + i * lanes;
+      supine_physics_stage_image(lanes, stage, stage->solution, i, out);
+      SUPINE_EACH_LANE(r, lanes) {
+        image[r] = out[r];
+        rz[r] += (double)right[r] * (double)z[r];
+        zw[r] += (double)z[r] * (double)out[r];
+      }
     }
+    double *sums = p->work->sums + block / SUPINE_SUM_ROWS * 2 * lanes;
+    memcpy(sums, rz, lanes * sizeof *sums);
+    memcpy(sums + lanes, zw, lanes * sizeof *sums);
   }
-  memcpy(work->rr[thread], rr, sizeof rr);
-  memcpy(work->rw[thread], rw, sizeof rw);
 }
 
 SUPINE_CLONES static void image_range(void *context, size_t begin, size_t end, size_t thread) {
-  supine_pass *work = context;
-  switch (work->eq->count) {
-  case 1:
-    image_rows(work, 1, begin, end, thread);
-    break;
-  case 4:
-    image_rows(work, 4, begin, end, thread);
-    break;
-  case 5:
-    image_rows(work, 5, begin, end, thread);
-    break;
-  case 16:
-    image_rows(work, 16, begin, end, thread);
-    break;
-  default:
-    image_rows(work, work->eq->count, begin, end, thread);
-  }
-}
-
-/* p = r + beta p, q = w + beta q, v += alpha p, r -= alpha q. */
-static inline void step_rows(supine_pass *work, size_t count, size_t begin, size_t end) {
-  supine_equilibrium *eq = work->eq;
-  double *restrict v = eq->solution;
-  double *restrict residual = eq->residual;
-  double *restrict p = eq->direction;
-  double *restrict q = eq->product;
-  const double *restrict w = eq->image;
-  for (size_t i = begin; i < end; ++i) {
-    for (size_t r = 0; r < count; ++r) {
-      const size_t at = i * count + r;
-      p[at] = residual[at] + work->beta[r] * p[at];
-      q[at] = w[at] + work->beta[r] * q[at];
-      v[at] += work->alpha[r] * p[at];
-      residual[at] -= work->alpha[r] * q[at];
-    }
-  }
-}
-
-SUPINE_CLONES static void step_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
-  supine_pass *work = context;
-  switch (work->eq->count) {
-  case 1:
-    step_rows(work, 1, begin, end);
-    break;
-  case 4:
-    step_rows(work, 4, begin, end);
-    break;
-  case 5:
-    step_rows(work, 5, begin, end);
-    break;
-  case 16:
-    step_rows(work, 16, begin, end);
-    break;
-  default:
-    step_rows(work, work->eq->count, begin, end);
-  }
+  const pass *p = context;
+  SUPINE_FOR_LANES(p->work->system->lanes, image_rows, p, begin, end);
 }
 
-/* r = b - B v, and p = q = 0. */
-static void start_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const supine_pass *work = context;
-  supine_equilibrium *eq = work->eq;
-  for (size_t i = begin; i < end; ++i) {
-    double out[SUPINE_RHS_MAX];
-    row_product(eq, i, eq->count, eq->solution, out);
-    for (size_t r = 0; r < eq->count; ++r) {
-      const size_t at = i * eq->count + r;
-      eq->residual[at] = eq->right[at] - out[r];
-      eq->direction[at] = 0.0;
-      eq->product[at] = 0.0;
-    }
-  }
-}
-
-static supine_status allocate(supine_equilibrium *eq) {
-  const size_t values = eq->network->vertex_count * eq->rhs_max;
-  if (eq->image != NULL) {
-    return SUPINE_OK;
-  }
-  eq->residual = malloc(values * sizeof(double));
-  eq->direction = malloc(values * sizeof(double));
-  eq->product = malloc(values * sizeof(double));
-  eq->image = malloc(values * sizeof(double));
-  if (eq->residual != NULL && eq->direction != NULL && eq->product != NULL && eq->image != NULL) {
-    return SUPINE_OK;
-  }
-  free(eq->image);
-  eq->image = NULL; /* the others go with the equilibrium, or are replaced */
-  return SUPINE_ERROR_MEMORY;
-}
-
-supine_status supine_physics_conjugate_gradients(supine_pass *work, size_t steps_max,
-                                                 supine_solve_report *report) {
-  supine_equilibrium *eq = work->eq;
-  double last_rr[SUPINE_RHS_MAX] = {0.0};
-  bool done[SUPINE_RHS_MAX] = {false};
-  if (allocate(eq) != SUPINE_OK) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  supine_physics_pass_run(work, start_range);
-  for (size_t step = 0;; ++step) {
-    supine_physics_pass_run(work, image_range);
-    report->residual = 0.0;
-    bool all = true;
-    for (size_t r = 0; r < eq->count; ++r) {
-      const double rr = supine_physics_pass_total(work->rr, r);
-      const double rw = supine_physics_pass_total(work->rw, r);
-      const double relative = work->norm[r] > 0.0 ? sqrt(rr / work->norm[r]) : sqrt(rr);
-      report->residual = relative <= report->residual ? report->residual : relative; /* keeps NaN */
-      done[r] = done[r] || relative <= work->wanted;
-      all = all && done[r];
-      if (done[r]) {
-        work->alpha[r] = work->beta[r] = 0.0;
-        continue;
+/* p = z + beta p, q = w + beta q, v += alpha p, r -= alpha q, with <r, r / diagonal>; and the z
+ * that the next cycle starts at. */
+SUPINE_INLINE void update_rows(size_t lanes, const pass *p, size_t begin, size_t end) {
+  const supine_gradients *work = p->work;
+  const supine_stage *stage = &work->system->stage[0];
+  float *restrict z = stage->solution;
+  float *restrict residual = stage->right;
+  float *restrict direction = work->direction;
+  float *restrict product = work->product;
+  double *restrict solution = work->solution;
+  const float *restrict inverse = stage->inverse;
+  const float *restrict image = stage->work;
+  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
+    double rr[SUPINE_RHS_MAX] = {0.0};
+    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
+      SUPINE_EACH_LANE(r, lanes) {
+        const size_t at = i * lanes + r;
+        direction[at] = z[at] + p->beta[r] * direction[at];
+        product[at] = image[at] + p->beta[r] * product[at];
+        solution[at] += p->step[r] * (double)direction[at];
+        residual[at] -= p->alpha[r] * product[at];
+        const float scaled = inverse[at] * residual[at];
+        z[at] = p->first * scaled;
+        rr[r] += (double)(scaled * residual[at]);
       }
-      const bool first = last_rr[r] == 0.0;
-      work->beta[r] = first ? 0.0 : rr / last_rr[r];
-      work->alpha[r] = rr / (first ? rw : rw - work->beta[r] * rr / work->alpha[r]);
-      last_rr[r] = rr;
     }
-    if (all || step == steps_max || !isfinite(report->residual)) {
-      return SUPINE_OK;
-    }
-    supine_physics_pass_run(work, step_range);
-    ++report->iterations;
+    memcpy(work->sums + block / SUPINE_SUM_ROWS * 2 * lanes, rr, lanes * sizeof *rr);
   }
+}
+
+SUPINE_CLONES static void update_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const pass *p = context;
+  SUPINE_FOR_LANES(p->work->system->lanes, update_rows, p, begin, end);
+}
+
+/* z of the residual as it is given, and nothing behind it. */
+static void begin_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const pass *p = context;
+  const size_t lanes = p->work->system->lanes;
+  const supine_stage *stage = &p->work->system->stage[0];
+  for (size_t at = begin * lanes; at < end * lanes; ++at) {
+    stage->solution[at] = p->first * stage->inverse[at] * stage->right[at];
+    p->work->direction[at] = p->work->product[at] = 0.0F;
+  }
+}
+
+size_t supine_physics_conjugate_gradients(const supine_gradients *work, size_t steps_max) {
+  supine_system *system = work->system;
+  const size_t lanes = system->lanes;
+  const size_t rows = system->stage[0].links->count;
+  pass p = {.work = work, .first = system->stage_count > 1 ? SUPINE_DAMPING : 1.0F};
+  double last_rz[SUPINE_RHS_MAX] = {0.0};
+  double last_alpha[SUPINE_RHS_MAX] = {0.0};
+  bool done[SUPINE_RHS_MAX] = {false};
+  supine_physics_system_run(system->threads, rows, begin_range, &p);
+  for (size_t step = 0; step < steps_max; ++step) {
+    if (system->stage_count > 1) {
+      supine_physics_system_cycle(system);
+    }
+    supine_physics_system_run(system->threads, rows, image_range, &p);
+    for (size_t r = 0; r < lanes; ++r) {
+      const double rz = supine_physics_gradients_total(work->sums, rows, lanes, 0, r);
+      const double zw = supine_physics_gradients_total(work->sums, rows, lanes, 1, r);
+      const double beta = last_rz[r] == 0.0 ? 0.0 : rz / last_rz[r];
+      const double alpha = rz / (beta == 0.0 ? zw : zw - beta * rz / last_alpha[r]);
+      done[r] = done[r] || !isfinite(alpha) || alpha <= 0.0; /* nothing left, or lost to rounding */
+      p.alpha[r] = done[r] ? 0.0F : (float)alpha;
+      p.beta[r] = done[r] ? 0.0F : (float)beta;
+      p.step[r] = done[r] ? 0.0 : alpha * work->unit[r];
+      last_rz[r] = rz;
+      last_alpha[r] = alpha;
+    }
+    supine_physics_system_run(system->threads, rows, update_range, &p);
+    bool all = true;
+    for (size_t r = 0; r < lanes; ++r) {
+      done[r] = done[r] ||
+                !(supine_physics_gradients_total(work->sums, rows, lanes, 0, r) > work->wanted[r]);
+      all = all && done[r];
+    }
+    if (all) {
+      return step + 1;
+    }
+  }
+  return steps_max;
 }

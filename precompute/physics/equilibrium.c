@@ -1,14 +1,92 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium of (5), (12)-(14): springs eliminated, the matrix made symmetric and scaled. */
+/* The equilibrium of (5), (8), (12)-(14): springs eliminated, the matrix made symmetric, and solved
+ * in single precision until the residual, which is taken in double, is as small as wanted. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/physics/equilibrium_internal.h"
+#include "precompute/physics/conjugate_gradients.h"
 
-enum { ROWS_GRAIN = 4096, STEPS_MAX = 200, STEPS_MAX_WITH_REACH = 20000 };
+enum { STEPS_MAX = 400 };
 
-static const double default_tolerance = 1e-14;
+/* What single precision gains before the residual is taken anew. */
+static const double round_gain = 1e-5;
+
+/* Of a column of the transfer, most of which is small. */
+static const double column_tolerance = 1e-14;
+
+struct supine_equilibrium {
+  const supine_network *network;
+  size_t rhs_max;
+  double *stiffness; /* [N] E, geometric mean 1, file's order */
+  double *give;      /* [N] S = 1 / E, internal order */
+  double *lane_give; /* [N, lanes] the same where every lane has its own; NULL until one has */
+  size_t lane_count; /* of lane_give; 0: all lanes share one stiffness */
+  size_t prepared;   /* lanes that the system is set up for; 0: none */
+  size_t count;      /* of the last solve */
+  double *solution;  /* [N, lanes] t */
+  supine_system system;
+  float *lane_conductance; /* [2 E, lanes] without a reach, where every lane has its stiffness */
+  supine_rows links;       /* without a reach: the network's, with values of one stiffness */
+  supine_gradients gradients;
+};
+
+void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
+  if (equilibrium != NULL) {
+    for (size_t k = 0; k < SUPINE_LEVELS_MAX; ++k) {
+      supine_stage *stage = &equilibrium->system.stage[k];
+      free(stage->mass);
+      free(stage->inverse);
+      free(stage->solution);
+      free(stage->right);
+      free(stage->work);
+    }
+    free(equilibrium->lane_conductance);
+    free(equilibrium->links.value);
+    free(equilibrium->stiffness);
+    free(equilibrium->give);
+    free(equilibrium->lane_give);
+    free(equilibrium->solution);
+    free(equilibrium->gradients.direction);
+    free(equilibrium->gradients.product);
+    free(equilibrium->gradients.sums);
+    free(equilibrium);
+  }
+}
+
+static bool allocate_stage(supine_stage *stage, size_t values) {
+  stage->mass = malloc(values * sizeof(float));
+  stage->inverse = malloc(values * sizeof(float));
+  stage->solution = malloc(values * sizeof(float));
+  stage->right = malloc(values * sizeof(float));
+  stage->work = malloc(values * sizeof(float));
+  return stage->mass != NULL && stage->inverse != NULL && stage->solution != NULL &&
+         stage->right != NULL && stage->work != NULL;
+}
+
+/* The stages: those of the network's hierarchy, or the network alone. */
+static bool allocate_system(supine_equilibrium *eq) {
+  const supine_network *net = eq->network;
+  supine_system *system = &eq->system;
+  bool whole = true;
+  if (net->coarse == NULL) {
+    eq->links = net->links;
+    eq->links.value = malloc((net->links.begin[net->vertex_count] + 1) * sizeof(float));
+    system->stage[0].links = &eq->links;
+    system->stage_count = 1;
+    return eq->links.value != NULL &&
+           allocate_stage(&system->stage[0], net->vertex_count * eq->rhs_max);
+  }
+  system->stage_count = net->coarse->level_count;
+  for (size_t k = 0; k < system->stage_count && whole; ++k) {
+    const supine_level *level = &net->coarse->level[k];
+    system->stage[k].links = &level->links;
+    system->stage[k].part = &level->part;
+    system->stage[k].whole = &level->whole;
+    whole = allocate_stage(&system->stage[k], level->links.count * eq->rhs_max);
+  }
+  return whole;
+}
 
 supine_status supine_physics_equilibrium_create(const supine_network *network, size_t rhs_max,
                                                 size_t threads, supine_equilibrium **equilibrium) {
@@ -21,75 +99,27 @@ supine_status supine_physics_equilibrium_create(const supine_network *network, s
     return SUPINE_ERROR_MEMORY;
   }
   const size_t n = network->vertex_count;
-  const size_t links = network->row_begin[n];
-  const size_t used = threads == 0 ? supine_thread_count() : threads;
+  const size_t blocks = n / SUPINE_SUM_ROWS + 1;
+  supine_gradients *gradients = &made->gradients;
   made->network = network;
   made->rhs_max = rhs_max;
-  made->threads = used > SUPINE_SOLVE_THREADS_MAX ? SUPINE_SOLVE_THREADS_MAX : used;
+  made->system.threads = threads == 0 ? supine_thread_count() : threads;
   made->stiffness = malloc(n * sizeof(double));
-  made->inner = malloc(n * sizeof(double));
-  made->weight = malloc((links + 1) * sizeof(double));
-  made->scale = malloc(n * sizeof(double));
-  supine_status status = supine_physics_relaxation_prepare(made);
-  made->right = malloc(n * rhs_max * sizeof(double));
-  made->solution = malloc((n + made->halo_count) * rhs_max * sizeof(double));
-  if (status != SUPINE_OK || made->stiffness == NULL || made->inner == NULL ||
-      made->weight == NULL || made->scale == NULL || made->right == NULL ||
-      made->solution == NULL) {
+  made->give = malloc(n * sizeof(double));
+  made->solution = malloc(n * rhs_max * sizeof(double));
+  gradients->system = &made->system;
+  gradients->solution = made->solution;
+  gradients->direction = malloc(n * rhs_max * sizeof(float));
+  gradients->product = malloc(n * rhs_max * sizeof(float));
+  gradients->sums = malloc(blocks * 2 * rhs_max * sizeof(double));
+  if (!allocate_system(made) || made->stiffness == NULL || made->give == NULL ||
+      made->solution == NULL || gradients->direction == NULL || gradients->product == NULL ||
+      gradients->sums == NULL) {
     supine_physics_equilibrium_destroy(made);
     return SUPINE_ERROR_MEMORY;
   }
   *equilibrium = made;
   return SUPINE_OK;
-}
-
-void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
-  if (equilibrium != NULL) {
-    free(equilibrium->stiffness);
-    free(equilibrium->inner);
-    free(equilibrium->weight);
-    free(equilibrium->scale);
-    free(equilibrium->right);
-    free(equilibrium->solution);
-    free(equilibrium->halo);
-    free(equilibrium->column);
-    free(equilibrium->residual);
-    free(equilibrium->direction);
-    free(equilibrium->product);
-    free(equilibrium->image);
-    free(equilibrium);
-  }
-}
-
-/* Diagonal of the reduced matrix, and k_ij of its links. */
-static void matrix_rows(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  supine_equilibrium *eq = context;
-  const supine_network *net = eq->network;
-  for (size_t i = begin; i < end; ++i) {
-    const double own = eq->inner[i];
-    double diagonal = net->own == NULL ? 1.0 : net->own[i]; /* Z_i / S_i - sum of k_ij */
-    for (size_t s = net->row_begin[i]; s < net->row_begin[i + 1]; ++s) {
-      const double other = eq->inner[net->neighbour[s]];
-      const double d = net->distance[s];
-      const double spring = 0.5 * (own + other);
-      const double k = spring / (d * (net->spring_own * d * spring + 1.0 / own + 1.0 / other));
-      eq->weight[s] = k;
-      diagonal += own * spring / d - k;
-    }
-    eq->scale[i] = 1.0 / sqrt(diagonal);
-  }
-}
-
-static void scale_rows(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  supine_equilibrium *eq = context;
-  const supine_network *net = eq->network;
-  for (size_t i = begin; i < end; ++i) {
-    for (size_t s = net->row_begin[i]; s < net->row_begin[i + 1]; ++s) {
-      eq->weight[s] *= eq->scale[i] * eq->scale[net->neighbour[s]];
-    }
-  }
 }
 
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
@@ -105,74 +135,259 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
     equilibrium->stiffness[i] *= net->lesions[i];
   }
   for (size_t i = 0; i < net->vertex_count; ++i) {
-    equilibrium->inner[i] = equilibrium->stiffness[net->order[i]];
+    equilibrium->give[i] = 1.0 / equilibrium->stiffness[net->order[i]];
   }
-  supine_parallel_for(net->vertex_count, ROWS_GRAIN, equilibrium->threads, matrix_rows,
-                      equilibrium);
-  supine_parallel_for(net->vertex_count, ROWS_GRAIN, equilibrium->threads, scale_rows, equilibrium);
+  equilibrium->lane_count = equilibrium->prepared = 0;
   return SUPINE_OK;
 }
 
-/* Right-hand side b = scale own f / S in internal order, with <b, b>. */
-static void load_range(void *context, size_t begin, size_t end, size_t thread) {
-  supine_pass *work = context;
-  supine_equilibrium *eq = work->eq;
-  const size_t count = eq->count;
-  double sums[SUPINE_RHS_MAX] = {0.0};
+/* Softness to be given to every lane. */
+typedef struct soften_work {
+  const supine_equilibrium *eq;
+  size_t count;
+  const double *exponents;
+} soften_work;
+
+static void soften_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const soften_work *work = context;
+  const supine_equilibrium *eq = work->eq;
+  const size_t count = work->count;
   for (size_t i = begin; i < end; ++i) {
-    const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
-    const double factor = eq->scale[i] * eq->inner[i] * own;
-    const double *force = work->force + (size_t)eq->network->order[i] * count;
+    const double *exponent = work->exponents + (size_t)eq->network->order[i] * count;
     for (size_t r = 0; r < count; ++r) {
-      const double value = factor * force[r];
-      eq->right[i * count + r] = value;
-      sums[r] += value * value;
+      eq->lane_give[i * count + r] = eq->give[i] * exp(exponent[r]);
     }
   }
-  memcpy(work->rr[thread], sums, sizeof sums);
 }
 
-/* F = S y = S scale v, (4), back in the file's order. */
+supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium, size_t count,
+                                                const double *exponents) {
+  const supine_network *net = equilibrium->network;
+  const size_t n = net->vertex_count;
+  if (count < 1 || count > equilibrium->rhs_max) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  if (equilibrium->lane_give == NULL) {
+    equilibrium->lane_give = malloc(n * equilibrium->rhs_max * sizeof(double));
+  }
+  if (net->coarse == NULL && equilibrium->lane_conductance == NULL) {
+    equilibrium->lane_conductance =
+        malloc((net->links.begin[n] * equilibrium->rhs_max + 1) * sizeof(float));
+  }
+  if (equilibrium->lane_give == NULL ||
+      (net->coarse == NULL && equilibrium->lane_conductance == NULL)) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  soften_work work = {equilibrium, count, exponents};
+  supine_physics_system_run(equilibrium->system.threads, n, soften_range, &work);
+  equilibrium->lane_count = count;
+  equilibrium->prepared = 0;
+  return SUPINE_OK;
+}
+
+/* One solve. */
+typedef struct solve_pass {
+  supine_equilibrium *eq;
+  const double *give;            /* [N, lanes], or [N] */
+  size_t give_lanes;             /* of give */
+  const double *force;           /* [N, lanes] */
+  double *catch_;                /* [N, lanes] */
+  bool warm;                     /* catch_ holds a guess */
+  double unit[SUPINE_RHS_MAX];   /* norm of the force, that single precision counts in */
+  double wanted[SUPINE_RHS_MAX]; /* of the next round, squared */
+  double relative;               /* largest residual over the force's norm */
+} solve_pass;
+
+/* Without a reach: c of a link of distance d, and what the link adds to the mass of its first end
+ * beside S^2, which is what its spring catches. */
+SUPINE_INLINE void paper_link(double give, double other, double d, double *c, double *mass) {
+  const double product = give * other;
+  const double sum = d + 2.0 * product;
+  *c = product / (d * sum);
+  *mass = (give + other) / (2.0 * other * sum);
+}
+
+/* Masses and conductances in single precision. */
+static void prepare_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  supine_equilibrium *eq = pass->eq;
+  const supine_network *net = eq->network;
+  const size_t lanes = eq->count;
+  const size_t own = pass->give_lanes;
+  supine_stage *stage = &eq->system.stage[0];
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t r = 0; r < own; ++r) {
+      const double give = pass->give[i * own + r];
+      double mass = (net->own == NULL ? 1.0 : net->own[i]) * give * give;
+      for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->own == NULL; ++s) {
+        double c;
+        double more;
+        paper_link(give, pass->give[net->links.column[s] * own + r], net->distance[s], &c, &more);
+        mass += more;
+        if (own == 1) {
+          eq->links.value[s] = (float)c;
+        } else {
+          stage->conductance[s * own + r] = (float)c;
+        }
+      }
+      stage->mass[i * lanes + r] = (float)mass;
+    }
+    for (size_t r = own; r < lanes; ++r) {
+      stage->mass[i * lanes + r] = stage->mass[i * lanes];
+    }
+  }
+}
+
+/* Sets the system up for the lanes of this solve, where it is not. */
+static void prepare(solve_pass *pass) {
+  supine_equilibrium *eq = pass->eq;
+  eq->system.lanes = eq->count;
+  if (eq->prepared != eq->count) {
+    eq->system.stage[0].conductance =
+        eq->network->coarse == NULL && eq->lane_count > 0 ? eq->lane_conductance : NULL;
+    supine_physics_system_run(eq->system.threads, eq->network->vertex_count, prepare_range, pass);
+    supine_physics_system_set_masses(&eq->system);
+    eq->prepared = eq->count;
+  }
+}
+
+/* The norm of own f, and the t to begin with. */
+static void load_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  const supine_equilibrium *eq = pass->eq;
+  const size_t count = eq->count;
+  const float *inverse = eq->system.stage[0].inverse;
+  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
+    double sums[SUPINE_RHS_MAX] = {0.0};
+    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
+      const size_t file = (size_t)eq->network->order[i] * count;
+      const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
+      for (size_t r = 0; r < count; ++r) {
+        const double give = pass->give[pass->give_lanes == 1 ? i : i * count + r];
+        const double right = own * pass->force[file + r];
+        eq->solution[i * count + r] = pass->warm ? pass->catch_[file + r] / (give * give) : 0.0;
+        sums[r] += right * right * (double)inverse[i * count + r];
+      }
+    }
+    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * count, sums, count * sizeof *sums);
+  }
+}
+
+/* own f - A t in double, for the next round in single precision. */
+SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
+                                 size_t end) {
+  const supine_equilibrium *eq = pass->eq;
+  const supine_network *net = eq->network;
+  const supine_stage *stage = &eq->system.stage[0];
+  const double *give = pass->give;
+  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
+    double sums[SUPINE_RHS_MAX] = {0.0};
+    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
+      const double own = net->own == NULL ? 1.0 : net->own[i];
+      const double *force = pass->force + (size_t)net->order[i] * lanes;
+      const double *t = eq->solution + i * lanes;
+      const double *inner = give + (each ? i * lanes : i);
+      double out[SUPINE_RHS_MAX];
+      SUPINE_EACH_LANE(r, lanes) {
+        const double s = inner[each ? r : 0];
+        out[r] = own * (force[r] - s * s * t[r]);
+      }
+      for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
+        const size_t j = net->links.column[s];
+        const double *outer = give + (each ? j * lanes : j);
+        const double *other = eq->solution + j * lanes;
+        const double d = net->distance[s];
+        double c = 0.0;
+        double mass = 0.0;
+        if (net->own == NULL && each) {
+          SUPINE_EACH_LANE(r, lanes) {
+            paper_link(inner[r], outer[r], d, &c, &mass);
+            out[r] -= c * (t[r] - other[r]) + mass * t[r];
+          }
+          continue;
+        }
+        if (net->own == NULL) {
+          paper_link(*inner, *outer, d, &c, &mass);
+        } else {
+          c = net->conductance[s];
+        }
+        SUPINE_EACH_LANE(r, lanes) {
+          out[r] -= c * (t[r] - other[r]) + mass * t[r];
+        }
+      }
+      const float *inverse = stage->inverse + i * lanes;
+      float *restrict right = stage->right + i * lanes;
+      SUPINE_EACH_LANE(r, lanes) {
+        sums[r] += out[r] * out[r] * (double)inverse[r];
+        right[r] = (float)(out[r] / pass->unit[r]);
+      }
+    }
+    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * lanes, sums, lanes * sizeof *sums);
+  }
+}
+
+SUPINE_CLONES static void residual_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  if (pass->give_lanes > 1) {
+    SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, true, begin, end);
+  } else {
+    SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, false, begin, end);
+  }
+}
+
+/* F = S^2 t, back in the file's order. */
 static void store_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
-  const supine_pass *work = context;
-  const supine_equilibrium *eq = work->eq;
+  const solve_pass *pass = context;
+  const supine_equilibrium *eq = pass->eq;
+  const size_t count = eq->count;
   for (size_t i = begin; i < end; ++i) {
-    const double factor = eq->scale[i] / eq->inner[i];
-    double *out = work->catch_ + (size_t)eq->network->order[i] * eq->count;
-    for (size_t r = 0; r < eq->count; ++r) {
-      out[r] = factor * eq->solution[i * eq->count + r];
+    double *out = pass->catch_ + (size_t)eq->network->order[i] * count;
+    for (size_t r = 0; r < count; ++r) {
+      const double give = pass->give[pass->give_lanes == 1 ? i : i * count + r];
+      out[r] = give * give * eq->solution[i * count + r];
     }
   }
 }
 
-/* A range function and its context, called with denormals flushed. */
-typedef struct flushed {
-  supine_range_function *function;
-  void *context;
-} flushed;
-
-static void flushed_range(void *context, size_t begin, size_t end, size_t thread) {
-  const flushed *call = context;
-  const unsigned saved = supine_denormals_flush();
-  call->function(call->context, begin, end, thread);
-  supine_denormals_restore(saved);
+static void run(const solve_pass *pass, supine_range_function *function) {
+  supine_physics_system_run(pass->eq->system.threads, pass->eq->network->vertex_count, function,
+                            (void *)pass);
 }
 
-void supine_physics_pass_run(supine_pass *work, supine_range_function *function) {
-  flushed call = {function, work};
-  memset(work->rr, 0, sizeof work->rr);
-  memset(work->rw, 0, sizeof work->rw);
-  supine_parallel_for(work->eq->network->vertex_count, ROWS_GRAIN, work->eq->threads, flushed_range,
-                      &call);
+static double total(const solve_pass *pass, size_t lane) {
+  const supine_equilibrium *eq = pass->eq;
+  return supine_physics_gradients_total(eq->gradients.sums, eq->network->vertex_count, eq->count, 0,
+                                        lane);
 }
 
-double supine_physics_pass_total(double sums[SUPINE_SOLVE_THREADS_MAX][SUPINE_RHS_MAX], size_t r) {
-  double sum = 0.0;
-  for (size_t t = 0; t < SUPINE_SOLVE_THREADS_MAX; ++t) {
-    sum += sums[t][r];
+/* Takes the residual, and sets what the next round shall bring it to. */
+static void look(solve_pass *pass, double tolerance) {
+  run(pass, residual_range);
+  pass->relative = 0.0;
+  for (size_t r = 0; r < pass->eq->count; ++r) {
+    const double relative = sqrt(total(pass, r)) / pass->unit[r];
+    const double next = fmax(round_gain * relative, 0.5 * tolerance);
+    pass->wanted[r] = next * next;
+    pass->relative = relative <= pass->relative ? pass->relative : relative; /* keeps NaN */
   }
-  return sum;
+}
+
+/* Rounds until the residual is as wanted, or no longer halves. */
+static size_t iterate(solve_pass *pass, double tolerance) {
+  size_t steps = 0;
+  double last = INFINITY;
+  for (look(pass, tolerance);
+       pass->relative > tolerance && pass->relative < 0.5 * last && steps < STEPS_MAX;
+       look(pass, tolerance)) {
+    last = pass->relative;
+    steps += supine_physics_conjugate_gradients(&pass->eq->gradients, STEPS_MAX - steps);
+  }
+  return steps;
 }
 
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
@@ -180,44 +395,31 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                                                double *catch_, supine_solve_report *report,
                                                supine_error *error) {
   supine_equilibrium *eq = equilibrium;
-  const bool reach = eq->network->reach > 0.0;
-  supine_solve_report made = {0, INFINITY};
-  supine_status status = SUPINE_OK;
-  if (count < 1 || count > eq->rhs_max) {
+  const double wanted = tolerance > 0.0 ? tolerance : SUPINE_SOLVE_TOLERANCE;
+  if (count < 1 || count > eq->rhs_max || (eq->lane_count > 0 && count != eq->lane_count)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu right-hand sides asked, 1 to %zu set up", count, eq->rhs_max);
+                            "%zu right-hand sides in a solver made for %zu", count,
+                            eq->lane_count > 0 ? eq->lane_count : eq->rhs_max);
   }
-  supine_pass *work = malloc(sizeof *work);
-  if (work == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a solve");
-  }
-  if (!warm || eq->count != count) {
-    memset(eq->solution, 0, eq->network->vertex_count * count * sizeof(double));
-  }
+  solve_pass pass = {.eq = eq,
+                     .give = eq->lane_count > 0 ? eq->lane_give : eq->give,
+                     .give_lanes = eq->lane_count > 0 ? count : 1,
+                     .force = force,
+                     .catch_ = catch_,
+                     .warm = warm};
   eq->count = count;
-  *work = (supine_pass){.eq = eq, .force = force, .catch_ = catch_};
-  work->wanted = tolerance > 0.0 ? tolerance : default_tolerance;
-  supine_physics_pass_run(work, load_range);
+  prepare(&pass);
+  run(&pass, load_range);
   for (size_t r = 0; r < count; ++r) {
-    work->norm[r] = supine_physics_pass_total(work->rr, r);
+    const double norm = sqrt(total(&pass, r));
+    pass.unit[r] = norm > 0.0 ? norm : 1.0;
   }
-  /* A reach couples far beyond a link, and sweeps get slow; alone, a right-hand side has each row
-   * wait for the last. Conjugate gradients take those, and what sweeps leave. */
-  if (!reach && count > 1) {
-    supine_physics_relaxation(work, &made);
-  }
-  if (made.residual > work->wanted) {
-    status =
-        supine_physics_conjugate_gradients(work, reach ? STEPS_MAX_WITH_REACH : STEPS_MAX, &made);
-  }
-  supine_physics_pass_run(work, store_range);
-  const double wanted = work->wanted;
-  free(work);
+  eq->gradients.unit = pass.unit;
+  eq->gradients.wanted = pass.wanted;
+  const supine_solve_report made = {iterate(&pass, wanted), pass.relative};
+  run(&pass, store_range);
   if (report != NULL) {
     *report = made;
-  }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no memory for a solve");
   }
   if (!(made.residual <= wanted)) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -231,21 +433,24 @@ void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibri
                                              const supine_topology *topology, double *catch_) {
   const supine_equilibrium *eq = equilibrium;
   const supine_network *net = eq->network;
+  const size_t lanes = eq->lane_count > 0 ? eq->count : 1;
+  const double *all = eq->lane_count > 0 ? eq->lane_give : eq->give;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     const size_t i = net->rank[topology->edges[2 * e]];
     const size_t j = net->rank[topology->edges[2 * e + 1]];
-    size_t s = net->row_begin[i];
-    while (net->neighbour[s] != j) {
+    size_t s = net->links.begin[i];
+    while (net->links.column[s] != j) {
       ++s;
     }
-    const double d = net->distance[s];
-    const double spring = 0.5 * (eq->inner[i] + eq->inner[j]);
-    const double own = net->spring_own * spring; /* S_e / D(e, e) */
-    const double z = own + (1.0 / eq->inner[i] + 1.0 / eq->inner[j]) / d;
     for (size_t r = 0; r < eq->count; ++r) { /* F_e = S_e x_e / Z_e, x_e = S_e (y_i + y_j) / D */
-      const double y = eq->scale[i] * eq->solution[i * eq->count + r] +
-                       eq->scale[j] * eq->solution[j * eq->count + r];
-      catch_[e * eq->count + r] = own / z * spring / d * y;
+      const double give = all[i * lanes + (lanes > 1 ? r : 0)];
+      const double other = all[j * lanes + (lanes > 1 ? r : 0)];
+      const double spring = 0.5 * (1.0 / give + 1.0 / other);
+      const double d = net->distance[s];
+      const double z = spring + (give + other) / d;
+      const double y = give * eq->solution[i * eq->count + r] +
+                       other * eq->solution[j * eq->count + r]; /* y = S t */
+      catch_[e * eq->count + r] = net->own == NULL ? spring / z * spring / d * y : 0.0;
     }
   }
 }
@@ -262,8 +467,8 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu forces", n);
   }
   force[vertex] = 1.0;
-  const supine_status status =
-      supine_physics_equilibrium_solve(equilibrium, 1, force, 0.0, false, column, NULL, error);
+  const supine_status status = supine_physics_equilibrium_solve(
+      equilibrium, 1, force, column_tolerance, false, column, NULL, error);
   free(force);
   return status;
 }

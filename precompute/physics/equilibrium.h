@@ -6,16 +6,18 @@
  * With S = 1/E on masses and S = E on springs, D the distance (at least 1 mm; 1 to itself) and
  * Z_j = sum over l in clique(j) of S_l / D(l, j):
  *
- *     Te[j->i] = S_i / (D(j, i) Z_j)                                        (8), columns sum to 1:
- * (3) x = f + A x,  A[i, j] = Te[j->i] for i != j;    F_i = Te[i->i] x_i     (5), (12)-(14)
+ *     Te[j->i] = S_i / (D(j, i) Z_j), every column of which sums to 1          (8), (3)
+ *     x = f + A x,  A[i, j] = Te[j->i] for i != j;    F_i = Te[i->i] x_i       (5), (12)-(14)
  *
- * With y = x / Z the springs eliminate exactly, and one unknown a vertex is left:
+ * With y = x / Z the springs eliminate exactly, and with y = S t what is left, one unknown a
+ * vertex, is a mass and a graph's Laplacian:
  *
- *     (Z_i / S_i - sum over edges ij of k_ij) y_i - sum over edges ij of k_ij y_j = f_i / S_i
- *     k_ij = S_e / (D_e^2 Z_e) = E_e / (D_e (D_e E_e + S_i + S_j)),  F_i = S_i y_i
+ *     mass_i t_i + sum over edges ij of c_ij (t_i - t_j) = f_i,     F_i = S_i^2 t_i
+ *     c_ij = S_i S_j / (D (D + 2 S_i S_j))
+ *     mass_i = S_i^2 + sum over edges ij of (S_i + S_j) / (2 S_j (D + 2 S_i S_j))
  *
- * a symmetric positive definite system of small condition number, solved by conjugate gradients
- * with Jacobi scaling.
+ * symmetric, positive definite and of small condition number: conjugate gradients scaled by its
+ * diagonal solve it, in single precision, corrected in double until the residual is as wanted.
  *
  * The transfer spreads over links, and the share that a mass catches falls with its number of
  * links, so results drift as links shrink. A reach R in mm takes the drift away. It is the same
@@ -24,9 +26,14 @@
  *
  *     w = 4 (R^2 / mean area) a / h^2      a: a third of the link's triangles' area, h its length
  *
- * Columns still sum to 1, the matrix stays symmetric positive definite, and for E = 1 it is a
- * discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance decays as exp(-r / R)
- * whatever the mesh. What balances is then own F: sum of own_i F_i = sum of own_i f_i.
+ * Columns still sum to 1, and the system is even simpler: the stiffness is in the masses alone,
+ *
+ *     own_i S_i^2 t_i + sum over edges ij of (w_ij / 2) (t_i - t_j) = own_i f_i
+ *
+ * which for E = 1 is a discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance
+ * decays as exp(-r / R) whatever the mesh. What balances is then own F: sum of own_i F_i = sum of
+ * own_i f_i. The finer the mesh, the larger the condition number; a cycle over coarser and coarser
+ * graphs keeps the number of steps what it is (coarse.h).
  *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
  * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf. Technol.
@@ -70,27 +77,42 @@ supine_status supine_physics_equilibrium_create(const supine_network *network, s
                                                 size_t threads, supine_equilibrium **equilibrium);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
-/** Sets the stiffness and computes the matrix: one pass over the edges.
+/** Sets the stiffness of all right-hand sides.
  * @param stiffness  [N] E > 0, relative: scaled here to geometric mean 1; NULL: 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error);
 
+/** Gives each of `count` right-hand sides a stiffness of its own: E exp(-exponent) of what was set
+ * last, whose mean exponent should be 0 (the geometric mean of E stays 1).
+ * @param exponents  [N, count]
+ * @retval SUPINE_ERROR_ARGUMENT  count out of range
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium, size_t count,
+                                                const double *exponents);
+
 /** How a solve went. */
 typedef struct supine_solve_report {
   size_t iterations;
-  double residual; /**< largest over the right-hand sides, relative to theirs */
+  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = own f, which were computed
+                      in double, each square divided by A's diagonal */
 } supine_solve_report;
+
+/** Relative residual that is asked for by 0. A basis file keeps 6e-8 of a number, and the solve
+ * does not magnify: F is as good as the residual. */
+#define SUPINE_SOLVE_TOLERANCE 1e-10
 
 /** The catch F for `count` applied forces.
  * @param force      [N, count] f on the masses (nothing is applied to springs)
- * @param tolerance  relative residual to stop at; 0: 1e-14
- * @param warm       start from this equilibrium's previous solution (same count) instead of zero
+ * @param tolerance  relative residual to stop at; 0: SUPINE_SOLVE_TOLERANCE. Doubles reach 1e-14,
+ * and with a reach some 1e-16 (R / link)^2
+ * @param warm       start from what is in catch_ instead of zero
  * @param catch_     [N, count] F, written
  * @param report     optional
- * @retval SUPINE_ERROR_ARGUMENT   count out of range
- * @retval SUPINE_ERROR_NUMERICAL  200 steps (20,000 with a reach) did not reach the tolerance */
+ * @retval SUPINE_ERROR_ARGUMENT   count out of range, or not that of the stiffnesses
+ * @retval SUPINE_ERROR_NUMERICAL  the residual stopped falling above the tolerance, as it does
+ * where a force is not finite */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double tolerance, bool warm,
                                                double *catch_, supine_solve_report *report,
@@ -103,7 +125,7 @@ void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibri
 
 /** Column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force on that
  * vertex alone.
- * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
+ * @retval SUPINE_ERROR_ARGUMENT  no such vertex, or every right-hand side has a stiffness */
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error);
 

@@ -19,13 +19,14 @@ typedef struct supine_model {
   const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
   const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL: 1 */
   double reach;            /**< spreading length, mm; 0: the paper's, a fixed number of links */
+  double tolerance;        /**< relative residual of every solve; 0: SUPINE_SOLVE_TOLERANCE
+                              (equilibrium.h),        where directions are sampled 1e-6 */
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
 } supine_model;
 
 supine_model supine_physics_model_default(void);
 
-/** The network of lungs with the model's lesions and reach: what solves are set up with. The number
- * of steps of a solve grows as the reach over the links' length.
+/** The network of lungs with the model's lesions and reach: what solves are set up with.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_model_network(const supine_lungs *lungs, const supine_model *model,
                                            supine_network **network);

@@ -83,13 +83,13 @@ supine_status supine_physics_network_create(const supine_mesh *mesh,
     goto fail;
   }
   made->vertex_count = n;
-  made->spring_own = 1.0;
-  made->row_begin = malloc((n + 1) * sizeof *made->row_begin);
-  made->neighbour = malloc((links + 1) * sizeof *made->neighbour);
+  made->links.count = n;
+  made->links.begin = malloc((n + 1) * sizeof *made->links.begin);
+  made->links.column = malloc((links + 1) * sizeof *made->links.column);
   made->distance = malloc((links + 1) * sizeof *made->distance);
   made->order = malloc((n + 1) * sizeof *made->order);
   made->rank = malloc((n + 1) * sizeof *made->rank);
-  if (made->row_begin == NULL || made->neighbour == NULL || made->distance == NULL ||
+  if (made->links.begin == NULL || made->links.column == NULL || made->distance == NULL ||
       made->order == NULL || made->rank == NULL) {
     goto fail;
   }
@@ -104,14 +104,14 @@ supine_status supine_physics_network_create(const supine_mesh *mesh,
   size_t slot = 0;
   for (size_t i = 0; i < n; ++i) {
     const uint32_t v = made->order[i];
-    made->row_begin[i] = slot;
+    made->links.begin[i] = slot;
     for (size_t s = row_begin[v]; s < row_begin[v + 1]; ++s, ++slot) {
-      made->neighbour[slot] = made->rank[neighbour[s]];
+      made->links.column[slot] = made->rank[neighbour[s]];
       made->distance[slot] = supine_physics_link_distance(
           mesh->vertices + 3 * (size_t)v, mesh->vertices + 3 * (size_t)neighbour[s]);
     }
   }
-  made->row_begin[n] = slot;
+  made->links.begin[n] = slot;
   free(row_begin);
   free(neighbour);
   *network = made;
@@ -125,12 +125,13 @@ fail:
 
 void supine_physics_network_destroy(supine_network *network) {
   if (network != NULL) {
-    free(network->row_begin);
-    free(network->neighbour);
+    supine_physics_hierarchy_destroy(network->coarse);
+    supine_physics_rows_free(&network->links);
     free(network->distance);
     free(network->order);
     free(network->rank);
     free(network->own);
+    free(network->conductance);
     free(network->lesions);
     free(network);
   }

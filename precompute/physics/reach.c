@@ -9,8 +9,8 @@
 
 /* Slot of the link from internal vertex i to j. */
 static size_t find_link(const supine_network *network, size_t i, size_t j) {
-  size_t s = network->row_begin[i];
-  while (network->neighbour[s] != j) {
+  size_t s = network->links.begin[i];
+  while (network->links.column[s] != j) {
     ++s;
   }
   return s;
@@ -41,27 +41,28 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 0.5 * sqrt(square);
 }
 
-/* With springs that catch nothing and E = 1 the reduced system is (equilibrium.h)
+/* With springs that catch nothing the system is (equilibrium.h)
  *
- *     own_i F_i + sum over links of (w / 2) (F_i - F_j) = own_i f_i
+ *     own_i F_i + sum over links of (w / 2) (E_i^2 F_i - E_j^2 F_j) = own_i f_i
  *
- * which is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where own_i is the vertex's
- * area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that make
+ * which for E = 1 is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where own_i is the
+ * vertex's area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that make
  * sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third of
  * its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions alike;
  * unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within a
- * tenth or so. It is kept as 1 / w in place of
- * the distance. */
+ * tenth or so. */
 supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
                                                const supine_topology *topology, double reach) {
   const size_t n = network->vertex_count;
   double *area = malloc(n * sizeof *area);
-  double *link = calloc(network->row_begin[n] + 1, sizeof *link);
+  const size_t links = network->links.begin[n];
+  double *link = calloc(links + 1, sizeof *link); /* its area, then its conductance */
   network->own = malloc(n * sizeof *network->own);
-  if (area == NULL || link == NULL || network->own == NULL) {
+  network->conductance = link;
+  network->links.value = malloc((links + 1) * sizeof *network->links.value);
+  if (area == NULL || link == NULL || network->own == NULL || network->links.value == NULL) {
     free(area);
-    free(link);
-    return SUPINE_ERROR_MEMORY;
+    return SUPINE_ERROR_MEMORY; /* the rest goes with the network */
   }
   supine_mesh_vertex_area(mesh, area);
   double mean = 0.0;
@@ -92,13 +93,13 @@ supine_status supine_physics_network_set_reach(supine_network *network, const su
     const double a = link[s] > least ? link[s] : least;
     const double h2 = squared_length(mesh, edge[0], edge[1]);
     const double weight = 2.0 * reach * reach / mean * 2.0 * a / (h2 > least ? h2 : least);
-    network->distance[s] = network->distance[find_link(network, j, i)] = 1.0 / weight;
+    link[s] = link[find_link(network, j, i)] = 0.5 * weight;
   }
-  network->spring_own = 0.0;
-  network->reach = reach;
+  for (size_t s = 0; s < links; ++s) {
+    network->links.value[s] = (float)link[s];
+  }
   free(area);
-  free(link);
-  return SUPINE_OK;
+  return supine_physics_hierarchy_create(&network->links, &network->coarse);
 }
 
 supine_status supine_physics_model_network(const supine_lungs *lungs, const supine_model *model,

@@ -50,8 +50,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     goto cleanup;
   }
   supine_physics_force(lungs, &model->force, g, minimum, maximum, work);
-  status = supine_physics_equilibrium_solve(equilibrium, 1, work, 0.0, false, made.catch_,
-                                            &made.report, error);
+  status = supine_physics_equilibrium_solve(equilibrium, 1, work, model->tolerance, false,
+                                            made.catch_, &made.report, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

@@ -113,8 +113,8 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
     goto cleanup;
   }
   supine_physics_force_columns(lungs, law, force);
-  status = supine_physics_equilibrium_solve(equilibrium, rank, force, 0.0, false, made.columns,
-                                            &report, error);
+  status = supine_physics_equilibrium_solve(equilibrium, rank, force, model->tolerance, false,
+                                            made.columns, &report, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

@@ -35,7 +35,6 @@ typedef bool supine_progress_function(void *context, double fraction);
 
 /** The linear route: one solve for all columns of the force, and the quadrature of its functions of
  * gravity. Exact for laws with soften = 0.
- * @param stiffness  [N] or NULL
  * @retval SUPINE_ERROR_ARGUMENT  soften is not 0, a band above SUPINE_SH_BAND_MAX, bad stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_linear(const supine_lungs *lungs, const supine_model *model,
@@ -51,14 +50,13 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
 /** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
  * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
  * coefficients themselves; memory is one ring of fields and those.
- * @param tolerance  relative residual of each solve; 0: the solver's default
- * @param progress   optional
+ * @param progress  optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_model *model,
-                                        size_t band, double tolerance,
-                                        supine_progress_function *progress, void *context,
-                                        supine_projection *projection, supine_error *error);
+                                        size_t band, supine_progress_function *progress,
+                                        void *context, supine_projection *projection,
+                                        supine_error *error);
 
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */
