@@ -239,8 +239,9 @@ static void test_compare_csv_has_six_fields_a_row(void **state) {
     assert_int_equal(count_words(line, ","), 5);
     ++rows;
   }
-  /* A heading; for each posture 4 statistics, 2 lungs, 10 slabs twice; 3 pairs; 3 energies. */
-  assert_int_equal(rows, 1 + 3 * (4 + 2 + 20) + 3 * 4 + 3);
+  /* A heading; for each posture gravity, scale, 4 statistics, 2 lungs, 4 numbers of 10 slabs; 3 pairs;
+   * 3 energies; 3 directions found and their 3 distances; directions, area, vertices, inflation. */
+  assert_int_equal(rows, 1 + 3 * (3 + 1 + 4 + 2 + 40) + 3 * 4 + 3 + (9 + 3) + 4);
   free(text);
 }
 

@@ -65,30 +65,33 @@ static double lightness(const double rgb[3]) {
 static void test_colours_grow_lighter_in_even_steps(void **state) {
   (void)state;
   enum { STEPS = 64 };
-  double before = 0;
-  for (int i = 0; i <= STEPS; ++i) {
-    double rgb[3];
-    supine_render_colour(i / (double)STEPS, rgb);
-    const double here = lightness(rgb);
-    for (int k = 0; k < 3; ++k) {
-      assert_true(rgb[k] >= 0 && rgb[k] <= 1);
+  for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
+    double before = 0;
+    for (int i = 0; i <= STEPS; ++i) {
+      double rgb[3];
+      supine_render_colour(map, i / (double)STEPS, rgb);
+      const double here = lightness(rgb);
+      for (int k = 0; k < 3; ++k) {
+        assert_true(rgb[k] >= 0 && rgb[k] <= 1);
+      }
+      if (i > 0) {
+        assert_true(here - before > 0.5 && here - before < 1.8); /* about 70 in 64 steps */
+      }
+      before = here;
     }
-    if (i > 0) {
-      assert_true(here - before > 0.5 && here - before < 1.8); /* about 70 in 64 steps */
-    }
-    before = here;
   }
 }
 
 static void test_colours_beyond_the_ends_are_the_ends(void **state) {
   (void)state;
+  static const supine_colours map = SUPINE_COLOURS_DIFFERENCE;
   double a[3];
   double b[3];
-  supine_render_colour(-3, a);
-  supine_render_colour(0, b);
+  supine_render_colour(map, -3, a);
+  supine_render_colour(map, 0, b);
   assert_memory_equal(a, b, sizeof a);
-  supine_render_colour(7, a);
-  supine_render_colour(1, b);
+  supine_render_colour(map, 7, a);
+  supine_render_colour(map, 1, b);
   assert_memory_equal(a, b, sizeof a);
 }
 

@@ -129,15 +129,16 @@ static int draw(const request *wanted, supine_renderer *renderer,
   (void)snprintf(label, sizeof label, "%s%s, mm",
                  reference != NULL ? "difference from " : "displacement from rest",
                  reference != NULL ? reference : "");
-  supine_picture picture = {.panel = panel,
-                            .panel_count = postures->count,
-                            .view = wanted->view,
-                            .view_count = wanted->view_count,
-                            .heading = wanted->title,
-                            .bar_label = label,
-                            .largest = wanted->largest > 0.0 ? wanted->largest
-                                                             : supine_render_bar_end(ends[0]),
-                            .dark = wanted->theme == 1};
+  supine_picture picture = {
+      .panel = panel,
+      .panel_count = postures->count,
+      .view = wanted->view,
+      .view_count = wanted->view_count,
+      .heading = wanted->title,
+      .bar_label = label,
+      .colours = reference != NULL ? SUPINE_COLOURS_DIFFERENCE : SUPINE_COLOURS_DISPLACEMENT,
+      .largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(ends[0]),
+      .dark = wanted->theme == 1};
   picture.beyond = ends[1] > picture.largest;
   choose_size(wanted, &picture);
   return write_picture(wanted, renderer, &picture);

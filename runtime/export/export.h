@@ -6,6 +6,8 @@
 
 #include <supine/runtime.h>
 
+enum { EXPORT_RESTING_TERMS = 9 };
+
 /** An open basis, and what it shows, at hand. */
 typedef struct export_source {
   supine_basis *basis;
@@ -19,6 +21,7 @@ typedef struct export_source {
   const double *linear;      /**< [G, K], mL; NULL where the surface is open; likewise: */
   const double *quadratic;   /**< [G, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
+  const double *resting;     /**< [9], mL at rest over Y_lm of bands 0 to 2; NULL where unknown */
 } export_source;
 
 /** Opens a basis file.

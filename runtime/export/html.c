@@ -7,6 +7,7 @@
 
 #include "runtime/export/base64.h"
 #include "runtime/export/export.h"
+#include "runtime/render/render.h"
 #include "runtime/template/template.h"
 
 extern const supine_asset supine_export_assets[]; /* page/, put in by the build */
@@ -23,6 +24,25 @@ static void write_tensor(FILE *file, const char *name, const void *bytes, size_t
   (void)fputs("</script>\n", file);
 }
 
+/* Each map's 256 colours as hexadecimal digits. */
+static json_t *colours(void) {
+  static const char *const names[SUPINE_COLOURS_COUNT] = {"displacement", "difference"};
+  enum { COLOURS = 256 };
+  json_t *maps = json_object();
+  for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
+    char text[6 * COLOURS + 1];
+    for (int i = 0; i < COLOURS; ++i) {
+      double rgb[3];
+      supine_render_colour(map, i / (double)(COLOURS - 1), rgb);
+      for (int k = 0; k < 3; ++k) {
+        (void)snprintf(text + 6 * i + 2 * k, 3, "%02x", (unsigned)(255 * rgb[k] + 0.5) & 255U);
+      }
+    }
+    (void)json_object_set_new(maps, names[map], json_string(text));
+  }
+  return maps;
+}
+
 /* Sizes and metadata. */
 static json_t *describe(const page *p) {
   static const char *const keys[] = {"lungs",
@@ -32,6 +52,9 @@ static json_t *describe(const page *p) {
                                      "direction_constants",
                                      "stiffness",
                                      "rest_volume_ml",
+                                     "scan_volume_ml",
+                                     "scanned",
+                                     "law",
                                      "error_rms_percent",
                                      "error_p95_percent",
                                      "error_rms_mm",
@@ -51,10 +74,11 @@ static json_t *describe(const page *p) {
     }
   }
   json_t *title = json_string(p->title);
-  return json_pack("{s:I, s:I, s:I, s:I, s:o, s:b, s:f, s:f, s:f, s:o, s:o}", "vertices",
+  return json_pack("{s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o}", "vertices",
                    (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
                    "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band,
-                   "lungBegin", lungs, "hasVolume", (int)info->has_volume, "breathVolume",
+                   "lungBegin", lungs, "hasVolume", (int)info->has_volume, "hasResting",
+                   (int)(p->source->resting != NULL), "colours", colours(), "breathVolume",
                    p->breath->volume, "breathLargest", p->breath->largest, "breathScale",
                    p->breath->scale, "metadata", metadata, "title",
                    title != NULL ? title : json_string("lungs"));
@@ -74,6 +98,9 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   write_tensor(file, "coefficients", s->coefficients, n * k * sizeof *s->coefficients);
   write_tensor(file, "triangles", s->triangles, 3 * s->info->triangle_count * sizeof *s->triangles);
   write_tensor(file, "modes", s->modes, k * s->terms * sizeof *s->modes);
+  if (s->resting != NULL) {
+    write_tensor(file, "resting", s->resting, EXPORT_RESTING_TERMS * sizeof *s->resting);
+  }
   if (s->info->has_volume) {
     write_tensor(file, "linear", s->linear, g * k * sizeof *s->linear);
     write_tensor(file, "quadratic", s->quadratic, g * k * k * sizeof *s->quadratic);

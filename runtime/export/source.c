@@ -22,6 +22,7 @@ supine_status supine_export_source_open(const char *path, export_source *source,
   made.linear = made.info->volume_linear;
   made.quadratic = made.info->volume_quadratic;
   made.cubic = made.info->volume_cubic;
+  made.resting = made.info->resting_volume;
   *source = made;
   return SUPINE_OK;
 }

@@ -255,7 +255,7 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
   glEnable(GL_DEPTH_TEST);
   glUseProgram(r->program);
   glBindVertexArray(r->array);
-  glBindTexture(GL_TEXTURE_2D, r->colours);
+  glBindTexture(GL_TEXTURE_2D, r->colours[scene->colours]);
   load_camera(r, scene);
   load_state(r, scene);
   uniform(r, "largest", 1, &scene->largest);

@@ -41,7 +41,7 @@ struct supine_renderer {
   GLuint program;
   GLuint array;
   GLuint buffer[4]; /* vertices; displacements, where not packed; normals, values; triangles */
-  GLuint colours;
+  GLuint colours[SUPINE_COLOURS_COUNT];
   bool packed; /* the basis has at most 16 modes and one direction a vertex: the GPU displaces */
   size_t index_begin[SUPINE_LUNGS_MAX + 1]; /* triangles of each lung */
   float *scratch;                           /* [N, 7]: positions, normals, values */

@@ -181,6 +181,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .value = panel->value,
                               .largest = bar->largest,
                               .line_step = bar->step,
+                              .colours = picture->colours,
                               .view = view,
                               .dark = picture->dark,
                               .width = (size_t)width,
@@ -251,7 +252,7 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   cairo_pattern_t *fade = cairo_pattern_create_linear(x, 0, x + width, 0);
   for (int i = 0; i <= STOPS; ++i) {
     double rgb[3];
-    supine_render_colour(i / (double)STOPS, rgb);
+    supine_render_colour(picture->colours, i / (double)STOPS, rgb);
     cairo_pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
   }
   cairo_rectangle(cr, x, y, width, height);

@@ -33,10 +33,17 @@ const char *supine_render_view_name(supine_view view);
 /** Rows of the rotation from body axes to the viewer's: right, up, towards the viewer. */
 void supine_render_view_axes(supine_view view, double axes[3][3]);
 
-/** A colour of the map, sRGB 0 to 1, for 0 <= t <= 1, from blue-violet over teal to yellow:
- * lightness and hue of OKLab [Ottosson2020] change at constant rates, so that equal steps look
- * equal and grey copies keep the order. */
-void supine_render_colour(double t, double rgb[3]);
+/** Maps of colours: what is shown of one state, and of a state against another. */
+typedef enum supine_colours {
+  SUPINE_COLOURS_DISPLACEMENT = 0, /**< violet over teal to yellow */
+  SUPINE_COLOURS_DIFFERENCE,       /**< blue over red to cream */
+  SUPINE_COLOURS_COUNT
+} supine_colours;
+
+/** A colour of a map, sRGB 0 to 1, for 0 <= t <= 1: lightness in OKLab [Ottosson2020] rises all the
+ * way, in steps that look equal, so that grey copies keep the order. The same in pictures, report
+ * and page. */
+void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
 /** An OpenGL context with the surface of one basis. For the thread that made it. */
 typedef struct supine_renderer supine_renderer;
@@ -56,6 +63,7 @@ typedef struct supine_scene {
   const float *value;    /**< [N] what colours show, mm */
   double largest;        /**< value at the end of the colours, > 0 */
   double line_step;      /**< thin lines at multiples of this; 0: none */
+  supine_colours colours;
   supine_view view;
   bool one_lung; /**< draw `lung` alone */
   size_t lung;
@@ -105,7 +113,8 @@ typedef struct supine_picture {
   const char *heading; /**< or NULL */
   const char *bar_label;
   double largest; /**< mm at the end of the colours */
-  bool beyond;    /**< some values are larger: the bar ends in a point */
+  supine_colours colours;
+  bool beyond; /**< some values are larger: the bar ends in a point */
   bool dark;
   size_t width, height; /**< pixels */
 } supine_picture;

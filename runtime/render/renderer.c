@@ -13,18 +13,17 @@ static void attribute(GLuint location, GLint count, size_t stride, size_t offset
                         (const void *)(uintptr_t)(offset * sizeof(float)));
 }
 
-static void load_colours(supine_renderer *r) {
+static void load_colours(supine_renderer *r, supine_colours map) {
   unsigned char texels[COLOURS][4];
   for (int i = 0; i < COLOURS; ++i) {
     double rgb[3];
-    supine_render_colour(i / (double)(COLOURS - 1), rgb);
+    supine_render_colour(map, i / (double)(COLOURS - 1), rgb);
     for (int k = 0; k < 3; ++k) {
       texels[i][k] = (unsigned char)(255 * rgb[k] + 0.5);
     }
     texels[i][3] = 255;
   }
-  glGenTextures(1, &r->colours);
-  glBindTexture(GL_TEXTURE_2D, r->colours);
+  glBindTexture(GL_TEXTURE_2D, r->colours[map]);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, COLOURS, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -123,7 +122,10 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
   r->program = supine_render_gl_program(error);
   status = r->program != 0 ? load_surface(r, error) : SUPINE_ERROR_UNSUPPORTED;
   if (status == SUPINE_OK) {
-    load_colours(r);
+    glGenTextures(SUPINE_COLOURS_COUNT, r->colours);
+    for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
+      load_colours(r, map);
+    }
     *renderer = r;
     r = NULL;
   }
@@ -135,7 +137,8 @@ cleanup:
 void supine_render_destroy(supine_renderer *renderer) {
   if (renderer != NULL) {
     if (renderer->program != 0 && supine_render_gl_use(&renderer->gl)) {
-      glDeleteTextures(1, &renderer->colours); /* names that are 0 are passed over */
+      glDeleteTextures(SUPINE_COLOURS_COUNT,
+                       renderer->colours); /* names that are 0 are passed over */
       glDeleteBuffers(4, renderer->buffer);
       glDeleteVertexArrays(1, &renderer->array);
       glDeleteProgram(renderer->program);

@@ -123,6 +123,7 @@ static json_t *map_cells(const supine_comparison *c) {
             cells,
             json_pack("{s:o, s:i, s:i}", "hex",
                       supine_report_hex(
+                          SUPINE_COLOURS_DIFFERENCE,
                           c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0),
                       "x", MAP_LEFT + column * CELL, "y", MAP_TOP + row * CELL));
       }

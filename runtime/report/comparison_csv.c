@@ -19,6 +19,11 @@ static void statistics(FILE *file, const char *quantity, const char *posture, co
 static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   const supine_compared_posture *posture = &c->posture[i];
   const char *name = c->postures.item[i].name;
+  const double *g = c->postures.item[i].gravity;
+  row(file, "gravity", name, "", "left", g[0] + 0.0, "1");
+  row(file, "gravity", name, "", "posterior", g[1] + 0.0, "1");
+  row(file, "gravity", name, "", "head", g[2] + 0.0, "1");
+  row(file, "scale", name, "", "", posture->scales[0], "1");
   statistics(file, "displacement", name, "rest", &posture->displacement);
   if (!supine_basis_get_info(c->basis)->has_volume) {
     return;
@@ -28,12 +33,29 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
     supine_options_basis_lung_name(c->basis, lung, lung_name, sizeof lung_name);
     row(file, "gain", name, "rest", lung_name, posture->volume[lung], "mL");
   }
+  const double total = supine_report_gain(c, i);
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
     char part[32];
     (void)snprintf(part, sizeof part, "height %zu-%zu %%", 100 - 10 * (s + 1), 100 - 10 * s);
     row(file, "slab volume", name, "rest", part, posture->slab[s].volume, "mL");
     row(file, "slab gain", name, "rest", part, posture->slab[s].gain, "mL");
+    row(file, "slab expansion", name, "rest", part,
+        posture->slab[s].volume > 0.0 ? posture->slab[s].gain / posture->slab[s].volume : 0.0, "1");
+    row(file, "slab share", name, "rest", part, total != 0.0 ? posture->slab[s].gain / total : 0.0,
+        "1");
   }
+}
+
+/* A direction that the search found, and its RMS distance from another. */
+static void extreme(FILE *file, const char *quantity, const char *part, const double g[3],
+                    const char *other, double rms) {
+  static const char *const axes[] = {"left", "posterior", "head"};
+  for (int axis = 0; axis < 3; ++axis) {
+    char name[32];
+    (void)snprintf(name, sizeof name, "%s%s", part, axes[axis]);
+    row(file, quantity, "all", other, name, g[axis] + 0.0, "1");
+  }
+  row(file, quantity, "all", other, "rms", rms, "mm");
 }
 
 void supine_report_csv(const supine_comparison *c, FILE *file) {
@@ -51,4 +73,13 @@ void supine_report_csv(const supine_comparison *c, FILE *file) {
   row(file, "energy", "all", "", "constant", c->constant, "1");
   row(file, "energy", "all", "", "odd", c->odd, "1");
   row(file, "energy", "all", "", "even", c->even, "1");
+  const supine_extremes *e = &c->extremes;
+  extreme(file, "differ most", "a ", e->pair[0], "", e->pair_rms);
+  extreme(file, "differ most", "b ", e->pair[1], "", e->pair_rms);
+  extreme(file, "farthest", "", e->farthest, "supine", e->farthest_rms);
+  row(file, "directions", "all", "", "", (double)e->directions, "1");
+  row(file, "area", "rest", "", "", supine_compare_area(c->compare), "mm2");
+  row(file, "vertices", "rest", "", "", (double)supine_basis_get_info(c->basis)->vertex_count, "1");
+  row(file, "inflation", "all", "", "", c->inflation.amount,
+      c->inflation.kind == SUPINE_INFLATION_VOLUME ? "mL" : "mm");
 }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A comparison as one HTML file that needs nothing else: what fills page/report.html. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <supine/version.h>
 
@@ -23,18 +25,27 @@ static json_t *named(const supine_comparison *c, size_t posture) {
                    supine_report_line(posture));
 }
 
+/* Where gravity points in the body, by its letters. */
+static json_t *points(const double g[3]) {
+  static const char *const ends[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (fabs(g[axis]) > 1.0 - 1e-6) {
+      return json_sprintf("to the %s", ends[axis][g[axis] < 0.0]);
+    }
+  }
+  return json_sprintf("L %.2f P %.2f H %.2f", g[0] + 0.0, g[1] + 0.0, g[2] + 0.0);
+}
+
 static json_t *postures(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
-    const double *g = c->postures.item[i].gravity;
     json_t *row = named(c, i);
     json_t *gains = json_array();
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
       (void)json_array_append_new(gains, json_sprintf("%+.1f", c->posture[i].volume[lung]));
     }
-    (void)json_object_set_new(row, "gravity",
-                              json_sprintf("%.3g, %.3g, %.3g", g[0] + 0.0, g[1] + 0.0, g[2] + 0.0));
+    (void)json_object_set_new(row, "gravity", points(c->postures.item[i].gravity));
     (void)json_object_set_new(row, "gains", gains);
     set_statistics(row, &c->posture[i].displacement);
     (void)json_array_append_new(list, row);
@@ -53,14 +64,19 @@ static json_t *lungs(const supine_comparison *c) {
   return list;
 }
 
+static double largest_pair(const supine_comparison *c) {
+  double largest = 0.0;
+  for (size_t i = 0; i < c->postures.count * c->postures.count; ++i) {
+    largest = fmax(largest, c->pair[i].rms);
+  }
+  return largest;
+}
+
 /* RMS distances between postures, coloured. */
 static json_t *matrix(const supine_comparison *c) {
   const size_t count = c->postures.count;
-  double largest = 0.0;
+  const double largest = largest_pair(c);
   json_t *rows = json_array();
-  for (size_t i = 0; i < count * count; ++i) {
-    largest = fmax(largest, c->pair[i].rms);
-  }
   for (size_t i = 0; i < count; ++i) {
     json_t *cells = json_array();
     for (size_t j = 0; j < count; ++j) {
@@ -68,13 +84,15 @@ static json_t *matrix(const supine_comparison *c) {
       const double t = largest > 0.0 ? rms / largest : 0.0;
       (void)json_array_append_new(
           cells, i == j ? json_object()
-                        : json_pack("{s:o, s:s, s:o}", "hex", supine_report_hex(t), "ink",
-                                    supine_report_ink(t), "between", json_sprintf("%.2f", rms)));
+                        : json_pack("{s:o, s:s, s:o}", "hex",
+                                    supine_report_hex(SUPINE_COLOURS_DIFFERENCE, t), "ink",
+                                    supine_report_ink(SUPINE_COLOURS_DIFFERENCE, t), "between",
+                                    json_sprintf("%.2f", rms)));
     }
     (void)json_array_append_new(
         rows, json_pack("{s:s, s:o}", "name", c->postures.item[i].name, "cells", cells));
   }
-  return rows;
+  return supine_report_parts(c, rows);
 }
 
 static json_t *pairs(const supine_comparison *c) {
@@ -96,19 +114,62 @@ static json_t *slabs(const supine_comparison *c) {
     json_t *cells = json_array();
     for (size_t i = 0; i < c->postures.count; ++i) {
       const supine_slab *slab = &c->posture[i].slab[s];
-      (void)json_array_append_new(cells,
-                                  json_sprintf("%+.1f of %.0f mL", slab->gain, slab->volume));
+      (void)json_array_append_new(cells, json_sprintf("%+.1f of %.0f", slab->gain, slab->volume));
     }
     (void)json_array_append_new(
         rows,
         json_pack("{s:o, s:o}", "height",
                   json_sprintf("%zu to %zu", 100 - 10 * (s + 1), 100 - 10 * s), "cells", cells));
   }
-  return json_pack("{s:o, s:o}", "profiles", supine_report_profiles(c), "rows", rows);
+  return json_pack("{s:o, s:o}", "profiles", supine_report_profiles(c), "parts",
+                   supine_report_parts(c, rows));
 }
 
-static json_t *direction(const double g[3]) {
-  return json_sprintf("%.3f, %.3f, %.3f", g[0], g[1], g[2]);
+/* A share as %, and what rounds to nothing as 0. */
+static json_t *percent(double share) {
+  return fabs(100.0 * share) < 0.005 ? json_string("0 %") : json_sprintf("%.2f %%", 100.0 * share);
+}
+
+/* Today, or what SOURCE_DATE_EPOCH says, so that a report can be made again byte for byte. */
+static json_t *date(void) {
+  const char *epoch = getenv("SOURCE_DATE_EPOCH"); /* NOLINT(concurrency-mt-unsafe) */
+  const time_t now = epoch != NULL ? (time_t)strtoll(epoch, NULL, 10) : time(NULL);
+  struct tm day;
+  char text[16] = "";
+  if (gmtime_r(&now, &day) != NULL) {
+    (void)strftime(text, sizeof text, "%Y-%m-%d", &day);
+  }
+  return json_string(text);
+}
+
+static void add_fact(json_t *list, const char *name, json_t *value) {
+  (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
+}
+
+/* The command that makes this report again, and all that the basis says of itself. */
+static json_t *provenance(const supine_comparison *c, json_t *file) {
+  json_t *list = json_array();
+  char command[2048];
+  size_t used = (size_t)snprintf(
+      command, sizeof command, "supine compare %s --%s %g --postures ", json_string_value(file),
+      c->inflation.kind == SUPINE_INFLATION_VOLUME ? "volume" : "rms", c->inflation.amount);
+  for (size_t i = 0; i < c->postures.count && used < sizeof command; ++i) {
+    used += (size_t)snprintf(command + used, sizeof command - used, "%s%s", i > 0 ? "," : "",
+                             c->postures.item[i].name);
+  }
+  size_t count = 0;
+  const supine_metadata *metadata = supine_basis_all_metadata(c->basis, &count);
+  add_fact(list, "command", json_string(command));
+  add_fact(list, "program", json_string("supine " SUPINE_VERSION));
+  add_fact(list, "date", date());
+  add_fact(list, "basis", json_incref(file));
+  for (size_t i = 0; i < count; ++i) {
+    json_t *value = json_string(metadata[i].value);
+    if (value != NULL) { /* it is UTF-8 */
+      add_fact(list, metadata[i].key, value);
+    }
+  }
+  return list;
 }
 
 /* The head's facts and the foot's. */
@@ -116,19 +177,23 @@ static json_t *facts(const supine_comparison *c) {
   const supine_extremes *e = &c->extremes;
   const char *slash = strrchr(c->path, '/');
   json_t *file = json_string(slash != NULL ? slash + 1 : c->path);
+  if (file == NULL) { /* it is no UTF-8 */
+    file = json_string("a basis");
+  }
   char inflation[64];
   supine_report_inflation(c, inflation, sizeof inflation);
+  json_t *list = provenance(c, file);
   return json_pack(
-      "{s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "file",
-      file != NULL ? file : json_string("a basis"), "count",
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
+      "file", file, "provenance", list, "date", date(), "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
       "inflation", inflation, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
       "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
-      SUPINE_VERSION, "directions", (json_int_t)e->directions, "most_a", direction(e->pair[0]),
-      "most_b", direction(e->pair[1]), "most_rms", json_sprintf("%.2f", e->pair_rms), "farthest",
-      direction(e->farthest), "farthest_rms", json_sprintf("%.2f", e->farthest_rms), "largest",
-      json_sprintf("%.1f", e->farthest_rms), "constant", json_sprintf("%.2f", 100.0 * c->constant),
-      "odd", json_sprintf("%.2f", 100.0 * c->odd), "even", json_sprintf("%.2f", 100.0 * c->even));
+      SUPINE_VERSION, "directions", (json_int_t)e->directions, "most_a",
+      supine_report_direction(e->pair[0]), "most_b", supine_report_direction(e->pair[1]),
+      "most_rms", json_sprintf("%.2f", e->pair_rms), "farthest",
+      supine_report_direction(e->farthest), "farthest_rms", json_sprintf("%.2f", e->farthest_rms),
+      "constant", percent(c->constant), "odd", percent(c->odd), "even", percent(c->even));
 }
 
 void supine_report_html(const supine_comparison *c, FILE *file) {
@@ -138,6 +203,9 @@ void supine_report_html(const supine_comparison *c, FILE *file) {
   (void)json_object_set_new(data, "postures", postures(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
   (void)json_object_set_new(data, "map", supine_report_map(c));
+  (void)json_object_set_new(data, "map_bar",
+                            supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,
+                                              "RMS distance from supine, mm"));
   if (pictures != NULL) {
     (void)json_object_set_new(data, "pictures", pictures);
   } else {
@@ -145,7 +213,10 @@ void supine_report_html(const supine_comparison *c, FILE *file) {
   }
   if (c->postures.count > 1) {
     (void)json_object_set_new(data, "matrix",
-                              json_pack("{s:o, s:o}", "rows", matrix(c), "pairs", pairs(c)));
+                              json_pack("{s:o, s:o, s:o}", "parts", matrix(c), "pairs", pairs(c),
+                                        "between_bar",
+                                        supine_report_bar(SUPINE_COLOURS_DIFFERENCE,
+                                                          largest_pair(c), "RMS distance, mm")));
   }
   if (supine_basis_get_info(c->basis)->has_volume) {
     (void)json_object_set_new(data, "slabs", slabs(c));

@@ -5,16 +5,31 @@
 
 #include <jansson.h>
 
+#include "runtime/render/render.h"
 #include "runtime/report/comparison.h"
 
-/* "#rrggbb" of the colour map at 0 <= t <= 1. */
-json_t *supine_report_hex(double t);
+/* "#rrggbb" of a colour map at 0 <= t <= 1. */
+json_t *supine_report_hex(supine_colours map, double t);
 
 /* Black or white, whichever reads on that colour. */
-const char *supine_report_ink(double t);
+const char *supine_report_ink(supine_colours map, double t);
 
 /* Colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
+
+enum { SUPINE_REPORT_COLUMNS = 6 }; /* of a table or a row of pictures, so that they fit a sheet */
+
+/* A table of `rows` (objects with a list `cells`, one of each posture) in {{parts}} that fit a
+ * sheet: each with the names of its {{columns}}, and what they are in words, {{part}}. Takes
+ * `rows`. */
+json_t *supine_report_parts(const supine_comparison *comparison, json_t *rows);
+
+/* A bar of colours up to `largest`: {{stops}}, {{ticks}} and {{words}}. */
+json_t *supine_report_bar(supine_colours map, double largest, const char *words);
+
+/* A direction of gravity in words: a posture's name, or how far it is from the nearest and the
+ * numbers that commands take. */
+json_t *supine_report_direction(const double g[3]);
 
 /* {{profiles}}: regional expansion and share of the volume gained, by height. */
 json_t *supine_report_profiles(const supine_comparison *comparison);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Heat-map pictures of each lung for the HTML report. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,6 +61,43 @@ static json_t *encoded(const void *bytes, size_t size) {
   return made;
 }
 
+/* What lies at the picture's four sides. */
+static json_t *ends(supine_view view) {
+  static const char *const letters[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
+  static const char *const sides[2][2] = {{"right", "left"}, {"top", "bottom"}};
+  double axes[3][3];
+  json_t *list = json_array();
+  supine_render_view_axes(view, axes);
+  for (int row = 0; row < 2; ++row) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int end = 0; end < 2 && fabs(axes[row][axis]) > 0.5; ++end) {
+        const int letter = axes[row][axis] > 0 ? end : 1 - end;
+        (void)json_array_append_new(list, json_pack("{s:s, s:s}", "side", sides[row][end], "letter",
+                                                    letters[axis][letter]));
+      }
+    }
+  }
+  return list;
+}
+
+/* Gravity as the viewer sees it: an arrow `along` so many degrees, `towards` him, or `away`. */
+static void set_gravity(supine_view view, const double g[3], json_t *shot) {
+  double axes[3][3];
+  double seen[3] = {0.0, 0.0, 0.0};
+  supine_render_view_axes(view, axes);
+  for (int row = 0; row < 3; ++row) {
+    for (int axis = 0; axis < 3; ++axis) {
+      seen[row] += axes[row][axis] * g[axis];
+    }
+  }
+  if (hypot(seen[0], seen[1]) > 0.35) {
+    (void)json_object_set_new(shot, "along",
+                              json_sprintf("%.1f", -atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));
+  } else {
+    (void)json_object_set_new(shot, seen[2] > 0.0 ? "towards" : "away", json_true());
+  }
+}
+
 static json_t *picture(const supine_comparison *c, supine_renderer *renderer, const look *from,
                        size_t posture, double largest, float *value, supine_error *error) {
   const supine_compared_posture *shown = &c->posture[posture];
@@ -72,8 +110,10 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, co
   scene.line_step = supine_render_bar_step(largest);
   json_t *made = NULL;
   if (supine_render_png(renderer, &scene, &png, &size, error) == SUPINE_OK) {
-    made =
-        json_pack("{s:s, s:o}", "name", c->postures.item[posture].name, "png", encoded(png, size));
+    made = json_pack("{s:s, s:o, s:o, s:o}", "name", c->postures.item[posture].name, "png",
+                     encoded(png, size), "ends", ends(from->view), "points",
+                     supine_report_direction(c->postures.item[posture].gravity));
+    set_gravity(from->view, c->postures.item[posture].gravity, made);
   }
   free(png);
   return made;
@@ -95,23 +135,7 @@ static json_t *row(const supine_comparison *c, supine_renderer *renderer, look *
       return NULL;
     }
   }
-  return json_pack("{s:s, s:o}", "view", from->title, "images", images);
-}
-
-/* The bar of colours below them. */
-static void add_bar(double largest, json_t *pictures) {
-  enum { STOPS = 16 };
-  const double step = supine_render_bar_step(largest);
-  json_t *stops = json_array();
-  json_t *ticks = json_array();
-  for (int i = 0; i <= STOPS; ++i) {
-    (void)json_array_append_new(stops, supine_report_hex(i / (double)STOPS));
-  }
-  for (int i = 0; i * step <= largest * (1.0 + 1e-9); ++i) {
-    (void)json_array_append_new(ticks, json_sprintf("%g", i * step));
-  }
-  (void)json_object_set_new(pictures, "stops", stops);
-  (void)json_object_set_new(pictures, "ticks", ticks);
+  return json_pack("{s:s, s:o}", "view", from->title, "cells", images);
 }
 
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
@@ -136,8 +160,12 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
       goto cleanup;
     }
   }
-  pictures = json_pack("{s:I, s:O}", "columns", (json_int_t)c->postures.count, "rows", rows);
-  add_bar(largest, pictures);
+  pictures =
+      supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest,
+                        "displacement from rest, mm; lines at the ticks; the last colour also "
+                        "shows what lies beyond");
+  (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));
+  (void)json_object_set_new(pictures, "parts", supine_report_parts(c, json_incref(rows)));
 cleanup:
   json_decref(rows);
   supine_render_destroy(renderer);

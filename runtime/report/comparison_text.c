@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A comparison for the terminal. */
+#include <math.h>
 #include <string.h>
 
 #include "runtime/options/basis_input.h"
@@ -77,7 +78,17 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
   }
 }
 
+/* A share as %; what rounds to nothing is 0. */
+static const char *percent(double share, char text[32]) {
+  if (fabs(share) < 5e-6) {
+    return "0 %";
+  }
+  (void)snprintf(text, 32, "%.3f %%", 100.0 * share);
+  return text;
+}
+
 void supine_report_text(const supine_comparison *c, FILE *file) {
+  char text[3][32];
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   const supine_extremes *e = &c->extremes;
   const int width = widest_name(c);
@@ -100,7 +111,6 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
                 e->pair[1][1], e->pair[1][2], e->pair_rms, e->farthest[0], e->farthest[1],
                 e->farthest[2], e->farthest_rms);
   (void)fprintf(file,
-                "  energy                constant %.3f %%, odd %.3f %% (turns over with gravity), "
-                "even %.3f %%\n",
-                100.0 * c->constant, 100.0 * c->odd, 100.0 * c->even);
+                "  energy                constant %s, odd %s (turns over with gravity), even %s\n",
+                percent(c->constant, text[0]), percent(c->odd, text[1]), percent(c->even, text[2]));
 }

@@ -23,8 +23,35 @@ function takeTensor(name, Numbers) {
   return new Numbers(fromBase64(text).buffer);
 }
 
+/** Triangles in the order of their lungs, and where each lung's corners begin. */
+function groupByLung(basis) {
+  const lungOf = (vertex) => basis.lungBegin.findIndex((begin, lung) => vertex < (basis.lungBegin[lung + 1] ?? Infinity));
+  const lungs = basis.lungBegin.length - 1;
+  const parts = Array.from({ length: lungs }, () => []);
+  for (let t = 0; t < basis.corners.length; t += 3) parts[lungOf(basis.corners[t])].push(t);
+  const grouped = new Uint32Array(basis.corners.length);
+  basis.cornerBegin = [0];
+  let at = 0;
+  for (const part of parts) {
+    for (const t of part) {
+      grouped.set(basis.corners.subarray(t, t + 3), at);
+      at += 3;
+    }
+    basis.cornerBegin.push(at);
+  }
+  basis.corners = grouped;
+}
+
+/** RGBA bytes of colours written as hexadecimal digits. */
+function readColours(text) {
+  const bytes = new Uint8Array((text.length / 6) * 4).fill(255);
+  for (let i = 0; i < text.length; i += 2) bytes[4 * Math.floor(i / 6) + (i % 6) / 2] = parseInt(text.slice(i, i + 2), 16);
+  return bytes;
+}
+
 function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
+  for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
   basis.rest = takeTensor('vertices', Float32Array);
   basis.direction = takeTensor('direction', Float32Array);
   basis.coefficients = takeTensor('coefficients', Float32Array);
@@ -35,8 +62,11 @@ function readBasis() {
     basis.quadratic = takeTensor('quadratic', Float64Array);
     basis.cubic = takeTensor('cubic', Float64Array);
   }
+  basis.resting = basis.hasResting ? takeTensor('resting', Float64Array) : null;
   basis.lungs = basis.lungBegin.length - 1;
-  basis.lungNames = (basis.metadata.lungs ?? '').split(',');
+  const names = (basis.metadata.lungs ?? '').split(',');
+  basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => names[i] || `lung ${i}`);
+  groupByLung(basis);
   return basis;
 }
 
@@ -137,8 +167,16 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Everything about one moment: the weights with the breath scale in them, and each lung's gain.
- * `depth` is mL where the surface is closed, else mm of the largest displacement when supine. */
+/** Resting volume for gravity along a unit vector, mL relative to the basis' surface; that surface is
+ * at rest where the basis does not say. */
+function restFor(basis, gravity) {
+  if (!basis.resting) return 0;
+  return harmonics(2, gravity).reduce((sum, y, i) => sum + y * basis.resting[i], 0);
+}
+
+/** Everything about one moment: the weights with the breath scale in them, and each lung's gain over
+ * rest in that posture. `depth` is mL above rest where the surface is closed, else mm of the largest
+ * displacement when supine. */
 function momentFor(basis, gravity, depth) {
   const w = weightsFor(basis, gravity);
   let scale;
@@ -146,22 +184,29 @@ function momentFor(basis, gravity, depth) {
   if (basis.hasVolume) {
     const cubics = Array.from({ length: basis.lungs }, (_, lung) => lungCubic(basis, lung, w));
     const all = [0, 1, 2].map((i) => cubics.reduce((sum, c) => sum + c[i], 0));
-    scale = scaleForVolume(all, depth);
-    gains = cubics.map((c) => cubicAt(c, scale));
+    const rest = restFor(basis, gravity);
+    scale = scaleForVolume(all, rest + depth);
+    const still = rest === 0 ? 0 : scaleForVolume(all, rest);
+    gains = cubics.map((c) => cubicAt(c, scale) - cubicAt(c, still));
   } else {
     scale = (depth / basis.breathLargest) * basis.breathScale;
   }
   return { gravity, scale, gains, weights: w.map((x) => x * scale) };
 }
 
-/** Displacements of a few thousand vertices, for the range of the colours. */
-function sampleField(basis, moment) {
-  const stride = Math.max(1, Math.ceil(basis.vertices / 6000));
-  const field = [];
-  for (let i = 0; i < basis.vertices; i += stride) {
-    let amount = 0;
-    for (let k = 0; k < basis.modes; ++k) amount += moment.weights[k] * basis.coefficients[i * basis.modes + k];
-    for (let axis = 0; axis < 3; ++axis) field.push(amount * basis.direction[3 * i + axis]);
+/** Where a vertex is. */
+function placeOf(basis, moment, vertex) {
+  let amount = 0;
+  for (let k = 0; k < basis.modes; ++k) amount += moment.weights[k] * basis.coefficients[vertex * basis.modes + k];
+  return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + amount * basis.direction[3 * vertex + axis]);
+}
+
+/** A few thousand triangles, for the range of the colours: the places of their corners. */
+function samplePlaces(basis, moment) {
+  const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
+  const places = [];
+  for (let t = 0; t < basis.corners.length; t += stride) {
+    for (let i = 0; i < 3; ++i) places.push(placeOf(basis, moment, basis.corners[t + i]));
   }
-  return field;
+  return places;
 }

@@ -3,29 +3,39 @@
 
 const $ = (id) => document.getElementById(id);
 
-/** Calls drag(dx, dy) for one pointer, pinch(ratio) for two. */
-function onDrag(element, drag, pinch) {
+/** Calls drag(dx, dy, moves) for one pointer, where `moves` says that it shifts rather than turns; for
+ * two pinch(ratio, dx, dy, x, y); tap(event) for one that went nowhere. */
+function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
+  let far = 0; // how far the pointers have gone since the first came down
   const spread = () => {
     const [a, b] = [...pointers.values()];
-    return Math.hypot(a.x - b.x, a.y - b.y);
+    return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
   };
   element.addEventListener('pointerdown', (event) => {
-    if (event.button !== 0) return;
     element.setPointerCapture(event.pointerId);
+    if (pointers.size === 0) far = 0;
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
   });
   element.addEventListener('pointermove', (event) => {
     const last = pointers.get(event.pointerId);
     if (!last) return;
-    const before = pointers.size === 2 ? spread() : 0;
+    const before = pointers.size === 2 ? spread() : null;
     const [dx, dy] = [event.clientX - last.x, event.clientY - last.y];
+    far += Math.abs(dx) + Math.abs(dy);
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (pointers.size === 1) drag(dx, dy);
-    else if (pointers.size === 2 && pinch && before > 0) pinch(spread() / before);
+    if (pointers.size === 1) drag(dx, dy, event.buttons > 1 || event.shiftKey);
+    else if (before && pinch && before.size > 0) {
+      const after = spread();
+      pinch(after.size / before.size, after.x - before.x, after.y - before.y, after.x, after.y);
+    }
   });
-  for (const end of ['pointerup', 'pointercancel']) element.addEventListener(end, (event) => pointers.delete(event.pointerId));
-  return () => pointers.size > 0;
+  element.addEventListener('pointerup', (event) => {
+    if (pointers.delete(event.pointerId) && pointers.size === 0 && far < 6 && event.button === 0) tap?.(event);
+  });
+  element.addEventListener('pointercancel', (event) => pointers.delete(event.pointerId));
+  element.addEventListener('contextmenu', (event) => event.preventDefault());
+  return () => pointers.size > 0 && far >= 6;
 }
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -35,11 +45,32 @@ function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
 
-/** Sets a slider, and says its value as `text`. */
-function setSlider(slider, value, text) {
+/** Sets a text where it is another. */
+function write(id, text) {
+  const element = $(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Sets a slider, the number beside it, and what it says. */
+function setSlider(id, value, text, digits = 0) {
+  const slider = $(id);
+  const number = $(`${id}-number`);
+  if (document.activeElement !== number && Number(number.value) !== Number(value.toFixed(digits))) number.value = value.toFixed(digits);
+  if (slider.getAttribute('aria-valuetext') === text) return;
   slider.value = value;
   slider.setAttribute('aria-valuetext', text);
   fill(slider);
+}
+
+/** Both of them act. */
+function onSlider(id, act) {
+  const take = (input) => {
+    const value = input.valueAsNumber;
+    const slider = $(id);
+    if (Number.isFinite(value)) act(Math.max(Number(slider.min), Math.min(Number(slider.max), value)));
+  };
+  $(id).addEventListener('input', () => take($(id)));
+  $(`${id}-number`).addEventListener('change', () => take($(`${id}-number`)));
 }
 
 function makePostureButtons(choose) {
@@ -57,19 +88,25 @@ function makePostureButtons(choose) {
   });
 }
 
-/** The colour bar and its ticks. */
-function drawLegend(kind, range, pinnedName) {
-  const bytes = colourMap(kind);
-  const stops = Array.from({ length: 33 }, (_, i) => `rgb(${bytes.slice(4 * Math.round((i * 255) / 32), 4 * Math.round((i * 255) / 32) + 3).join(' ')})`);
-  $('colours').style.background = `linear-gradient(to right, ${stops.join(', ')})`;
-  $('legend-title').textContent = kind === 'displacement' ? 'Displacement from rest' : `Difference from ${pinnedName}`;
-  const count = Math.round(range.end / range.step);
+/** The colour bar and its ticks; its ends are pointed where values lie beyond. */
+function drawLegend(kind, range, title, colours) {
+  $('colours').style.background = gradient(colours);
+  $('colours').classList.toggle('beyond', range.beyond);
+  write('legend-title', title);
+  write('legend-unit', KINDS[kind].unit);
+  const size = range.end - range.begin;
+  const first = Math.ceil(range.begin / range.step - 1e-9);
+  const count = Math.floor(range.end / range.step + 1e-9) - first;
   $('ticks').replaceChildren(...Array.from({ length: count + 1 }, (_, i) => {
     const tick = document.createElement('span');
-    tick.style.left = `${(100 * i) / count}%`;
-    tick.textContent = String(Number((i * range.step).toPrecision(4)));
+    tick.style.left = `${(100 * ((first + i) * range.step - range.begin)) / size}%`;
+    tick.textContent = plain((first + i) * range.step);
     return tick;
   }));
+  for (const [id, value] of [['range-begin', range.begin], ['range-end', range.end]]) {
+    if (document.activeElement !== $(id)) $(id).value = Number(value.toPrecision(4));
+  }
+  write('range-unit', KINDS[kind].unit);
 }
 
 /** A place in the patient in words: L 97 P 12 H -45. */

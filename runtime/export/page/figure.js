@@ -1,19 +1,26 @@
 // SPDX-License-Identifier: MIT
 // The patient as a small figure of ellipsoids on a 2-D canvas: on the ball, and as the postures' icons.
 
-// Centre and half axes, patient's axes (x left, y back, z head), and a tone.
+// Centre and half axes, patient's axes (x left, y back, z head), and a tone. Face, lungs and toes are
+// in front, hair behind.
 const BODY = [
   { at: [0, 0, 0.2], size: [0.25, 0.145, 0.3], tone: 'body' },
   { at: [0, 0.01, -0.14], size: [0.2, 0.14, 0.17], tone: 'body' },
   { at: [0.1, -0.09, 0.24], size: [0.085, 0.07, 0.17], tone: 'lung' },
   { at: [-0.1, -0.09, 0.24], size: [0.085, 0.07, 0.17], tone: 'lung' },
-  { at: [0, -0.01, 0.64], size: [0.115, 0.135, 0.155], tone: 'body' },
-  { at: [0, -0.15, 0.63], size: [0.025, 0.04, 0.035], tone: 'body' },
+  { at: [0, 0.03, 0.66], size: [0.125, 0.125, 0.15], tone: 'hair' },
+  { at: [0, -0.045, 0.62], size: [0.1, 0.1, 0.13], tone: 'face' },
+  { at: [0, -0.16, 0.62], size: [0.025, 0.04, 0.035], tone: 'face' },
   { at: [0.31, 0, 0.13], size: [0.06, 0.065, 0.33], tone: 'body' },
   { at: [-0.31, 0, 0.13], size: [0.06, 0.065, 0.33], tone: 'body' },
   { at: [0.105, 0, -0.52], size: [0.085, 0.095, 0.38], tone: 'body' },
   { at: [-0.105, 0, -0.52], size: [0.085, 0.095, 0.38], tone: 'body' },
+  { at: [0.105, -0.09, -0.87], size: [0.055, 0.12, 0.04], tone: 'body' },
+  { at: [-0.105, -0.09, -0.87], size: [0.055, 0.12, 0.04], tone: 'body' },
 ];
+
+/** The ends of the patient's axes. */
+const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
 /** Draws the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
@@ -60,9 +67,18 @@ function freshContext(canvas) {
   return context;
 }
 
-const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-const figureTones = () => ({ body: [css('--figure-light'), css('--figure-dark')], lung: [css('--figure-lung'), css('--figure-lung-dark')] });
+/** The theme's colours, read once a theme. */
+const theme = {};
+function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  const get = (name) => style.getPropertyValue(`--${name}`).trim();
+  for (const name of ['ink', 'soft', 'line', 'gravity', 'paper-solid', 'back-inner', 'back-outer', 'ball-light', 'ball-dark']) theme[name] = get(name);
+  theme.tones = {
+    body: [get('figure-light'), get('figure-dark')], lung: [get('figure-lung'), get('figure-lung-dark')],
+    hair: [get('figure-hair'), get('figure-hair')], face: [get('figure-face'), get('figure-light')],
+  };
+}
+const css = (name) => theme[name.slice(2)];
 
 /** The ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
 function drawBall(canvas, toEye, gravity) {
@@ -115,14 +131,39 @@ function drawBall(canvas, toEye, gravity) {
     }
     context.globalAlpha = 1;
   };
+  const letters = (front) => {
+    context.font = '650 12px system-ui, sans-serif';
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    for (const [letter, end] of Object.entries(ENDS)) {
+      const at = rotate(toEye, end);
+      if (at[2] >= 0 !== front) continue;
+      context.fillStyle = front ? css('--ink') : css('--soft');
+      context.fillText(letter, centre + (radius - 9) * at[0], centre - (radius - 9) * at[1]);
+    }
+  };
   graticule(false);
+  letters(false);
   if (down[2] < 0) arrow();
-  drawFigure(context, toEye, centre, centre, radius * 0.92, figureTones());
+  drawFigure(context, toEye, centre, centre, radius * 0.92, theme.tones);
   graticule(true);
+  letters(true);
   if (down[2] >= 0) arrow();
+  if (down[2] < 0) { // seen through the patient
+    context.save();
+    context.globalAlpha = 0.6;
+    arrow();
+    context.restore();
+  }
 }
 
-/** The icon of a posture: the figure as it lies in the room, seen from its side. */
+/** How far down the figure reaches, turned by q: a table's height. */
+function lowestPart(q) {
+  const up = rotate(inverse(q), [0, 1, 0]);
+  return Math.min(...BODY.map((part) => dot(up, part.at) - Math.hypot(...part.size.map((s, i) => s * up[i]))));
+}
+
+/** The icon of a posture: the figure as it lies in the room on a table, seen from its side. */
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
   const { clientWidth: width, clientHeight: height } = canvas;
@@ -130,5 +171,9 @@ function drawIcon(canvas, bodyToRoom) {
   const q = compose(camera, bodyToRoom);
   const along = rotate(q, [0, 0, 0.86]);
   const scale = Math.min(width / 2 / (Math.abs(along[0]) + 0.12), height / 2 / (Math.abs(along[1]) + 0.2));
-  drawFigure(context, q, width / 2, height / 2 + 0.05 * scale * along[1], scale, figureTones());
+  const middle = height / 2 + 0.05 * scale * along[1] - 2;
+  drawFigure(context, q, width / 2, middle, scale, theme.tones);
+  context.fillStyle = css('--soft');
+  const slope = bodyToRoom === IDENTITY ? 0 : Math.abs(rotate(bodyToRoom, [0, 0, 1])[2]);
+  if (slope < 0.05 || slope > 0.95 || slope === 0) context.fillRect(width * 0.08, Math.min(height - 2, middle - scale * lowestPart(q)), width * 0.84, 2);
 }

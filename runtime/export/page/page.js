@@ -2,6 +2,12 @@
 // The page: state in, picture out, and the controls between.
 
 const VIEW_ANGLE = 0.5; // radians, of the camera from top to bottom
+const KIND_TEXT = {
+  displacement: 'How far each place is from where it was at rest.',
+  difference: 'How far each place is from where it is in the reference posture at the same breath.',
+  expansion: 'How much the surface has grown around each place since rest, in area.',
+  height: 'How high each place is above the lowest one, along gravity.',
+};
 
 function bounds(basis) {
   const low = [Infinity, Infinity, Infinity];
@@ -13,7 +19,7 @@ function bounds(basis) {
   const centre = low.map((x, i) => (x + high[i]) / 2);
   let radius = 0;
   for (let i = 0; i < basis.rest.length; i += 3) radius = Math.max(radius, Math.hypot(basis.rest[i] - centre[0], basis.rest[i + 1] - centre[1], basis.rest[i + 2] - centre[2]));
-  return { centre, radius: radius || 1 };
+  return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
 /** The rotation that takes the arrow's -z to a direction. */
@@ -28,70 +34,184 @@ const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 25
 function start() {
   const basis = readBasis();
   const state = new State(basis);
+  takeLink(location.hash, state);
   const canvas = $('picture');
-  const picture = new Picture(canvas, basis);
-  const { centre, radius } = bounds(basis);
+  let picture = new Picture(canvas, basis);
+  const body = bounds(basis);
+  const { centre, radius } = body;
+  const letters = new Letters($('letters'), 2);
+  const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // vertices are not where the state says
   let unseen = true;    // the picture is not what the state says
   let pointer = null;   // where on the canvas, CSS pixels
   let asked = true;     // what is there has been asked, for this picture
+  let wanted = null;    // what is done with the next answer, where a click asked
   let before = null;    // time of the last frame, when frames follow each other
   let streak = 0;       // frames that have followed each other
   let frameTime = NaN;  // ms, smoothed
-  let view = null;
+  let idle = null;      // when the link is written
+  let panes = [];
+  const marks = [];
 
-  const modelTurn = () => slerp(IDENTITY, state.q, state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend));
+  const ratio = () => canvas.width / Math.max(1, canvas.clientWidth);
+  const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
+  const modelTurn = (q = state.q) => slerp(IDENTITY, q, blend());
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** How far the lungs reach from their centre along gravity, mm. */
-  function lowest(gravity) {
-    let reach = 0;
-    const stride = 3 * Math.ceil(basis.vertices / 4000);
-    for (let i = 0; i < basis.rest.length; i += stride) {
-      reach = Math.max(reach, dot(gravity, [basis.rest[i] - centre[0], basis.rest[i + 1] - centre[1], basis.rest[i + 2] - centre[2]]));
-    }
+  /** How far the lungs reach along gravity, mm: some of their vertices, as they are. */
+  function lowest(moment) {
+    let reach = -Infinity;
+    const stride = Math.ceil(basis.vertices / 1200);
+    for (let i = 0; i < basis.vertices; i += stride) reach = Math.max(reach, dot(moment.gravity, placeOf(basis, moment, i)));
     return reach;
   }
 
-  function makeView() {
-    const aspect = canvas.width / canvas.height;
-    const fit = radius * 1.2 * Math.max(1, 0.86 / aspect);
-    const distance = fit / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
-    const q = compose(cameraTurn(), modelTurn());
-    const away = rotate(q, centre);
-    const gravity = state.gravity;
-    const tail = rotate(q, gravity).map((x) => x * (lowest(gravity) + 0.06 * radius));
-    const arrow = rigid(compose(q, arrowTurn(gravity)), [tail[0], tail[1], tail[2] - distance]);
-    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.24;
+  const distanceNow = (aspect) => (radius * 1.32 * Math.max(1, 0.86 / aspect)) / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
+
+  function makePane(name, moment, q, box) {
+    const aspect = box[2] / box[3];
+    const distance = distanceNow(aspect);
+    const { pan } = state.camera;
+    const pivot = state.camera.pivot ?? centre;
+    const toRoom = compose(cameraTurn(), modelTurn(q));
+    const away = rotate(toRoom, pivot);
+    const offset = [pan[0] - away[0], pan[1] - away[1], -away[2] - distance];
+    const { gravity } = moment;
+    const lowestAt = pane_lowest(name, moment);
+    const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
+    const tailAt = rotate(toRoom, centre.map((c, i) => c + gravity[i] * tail));
+    const arrow = rigid(compose(toRoom, arrowTurn(gravity)), tailAt.map((x, i) => x + offset[i]));
+    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.34;
+    const reach = 2.5 * radius + Math.hypot(...pivot.map((x, i) => x - centre[i]));
+    const { axis, at } = state.cut;
+    const kind = KINDS[state.kind];
     return {
-      toEye: rigid(q, [-away[0], -away[1], -away[2] - distance]),
-      projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - 2.5 * radius, distance * 0.02), distance + 2.5 * radius),
-      arrowToEye: arrow, kind: state.kind, range: state.ranges[state.kind], contours: state.contours, dark: isDark(), tint: rgb(css('--gravity')),
+      name, state: name, origin: state.kind === 'difference' ? 'pinned' : 'ghost', box, canvasHeight: canvas.height,
+      toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
+      arrowToEye: arrow, gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
+      contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
+      opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
+      cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), body.low[axis] + at * (body.high[axis] - body.low[axis])],
     };
+  }
+
+  const depths = {}; // the lowest point of each state, kept while it does not move
+  function pane_lowest(name, moment) {
+    if (depths[name]?.moment !== moment) depths[name] = { moment, value: lowest(moment) };
+    return depths[name].value;
+  }
+
+  function makePanes() {
+    const [w, h] = [canvas.width, canvas.height];
+    if (!state.beside) return [makePane('now', state.moment, state.q, [0, 0, w, h])];
+    const half = Math.floor(w / 2);
+    return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
+  }
+
+  /** The pane at a place of the canvas (CSS pixels), and where in it, from -1 to 1 each way. */
+  function paneAt({ x, y }) {
+    const [px, py] = [x * ratio(), canvas.height - y * ratio()];
+    const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
+    return { pane, x: (2 * (px - pane.box[0])) / pane.box[2] - 1, y: (2 * (py - pane.box[1])) / pane.box[3] - 1 };
   }
 
   /** Shows what is under the pointer once the graphics card has said it, and asks again where the
    * picture or the pointer has changed since. */
   function point() {
     const found = picture.picked();
+    if (found !== undefined && wanted) {
+      wanted(found);
+      wanted = null;
+    }
     if (!pointer) showPointed(null);
     else if (found !== undefined) showPointed(found);
-    if (!asked && pointer && view && !picture.picking) {
+    if (!asked && pointer && panes.length && !picture.picking) {
       asked = true;
-      picture.pick(view, (2 * pointer.x) / canvas.clientWidth - 1, 1 - (2 * pointer.y) / canvas.clientHeight);
+      const { pane, x, y } = paneAt(pointer);
+      picture.pick(pane, x, y);
     }
   }
+
+  const valueText = (value) => `${value.toFixed(KINDS[state.kind].unit === 'mm' ? 2 : 1)} ${KINDS[state.kind].unit}`.replace('-', '\u2212');
 
   function showPointed(found) {
     const tip = $('pointed');
     tip.hidden = $('needle').hidden = !found;
     if (!found) return;
-    tip.firstChild.textContent = `${found.value.toFixed(2)} mm`;
-    tip.lastChild.textContent = placeText(found.at);
-    const [x, y] = [Math.min(pointer.x + 16, canvas.clientWidth - tip.offsetWidth - 8), Math.max(8, pointer.y - tip.offsetHeight - 10)];
+    const { range } = state;
+    tip.firstChild.textContent = valueText(found.value);
+    tip.lastChild.textContent = `${basis.lungNames[found.lung]} lung   ${placeText(found.at)}`;
+    const [x, y] = [Math.max(4, Math.min(pointer.x + 16, canvas.clientWidth - tip.offsetWidth - 8)), Math.max(8, pointer.y - tip.offsetHeight - 10)];
     tip.style.transform = `translate(${x}px, ${y}px)`;
-    $('needle').style.left = `${100 * Math.min(1, found.value / view.range.end)}%`;
+    $('needle').style.left = `${100 * Math.min(1, Math.max(0, (found.value - range.begin) / (range.end - range.begin)))}%`;
+  }
+
+  /* Probes: places of the tissue that stay marked. */
+  const originMoment = () => (state.kind === 'difference' ? state.pinned : state.ghostMoment);
+  function probeValue(vertex) {
+    const at = placeOf(basis, state.moment, vertex);
+    if (state.kind === 'height') return pane_lowest('now', state.moment) - dot(state.gravity, at);
+    if (state.kind === 'expansion') return null;
+    const from = placeOf(basis, originMoment(), vertex);
+    return Math.hypot(...at.map((x, i) => x - from[i]));
+  }
+
+  function showProbes() {
+    while (marks.length < state.probes.length) {
+      const mark = document.createElement('span');
+      mark.className = 'probe';
+      mark.textContent = String(marks.length + 1);
+      $('letters').append(mark);
+      marks.push(mark);
+    }
+    const pane = panes.at(-1);
+    marks.forEach((mark, i) => {
+      const at = i < state.probes.length ? project(pane, placeOf(basis, state.moment, state.probes[i]), ratio()) : null;
+      placed(mark, at, Boolean(at) && at.x > pane.box[0] / ratio());
+    });
+    const list = $('probes');
+    while (list.children.length > state.probes.length) list.lastChild.remove();
+    while (list.children.length < state.probes.length) {
+      const item = document.createElement('li');
+      const button = document.createElement('button');
+      const number = list.children.length;
+      button.type = 'button';
+      button.className = 'quiet';
+      button.textContent = 'Remove';
+      button.setAttribute('aria-label', `Remove probe ${number + 1}`);
+      button.addEventListener('click', () => { state.probes.splice(number, 1); look(); });
+      item.append(document.createElement('span'), button);
+      list.append(item);
+    }
+    state.probes.forEach((vertex, i) => {
+      const value = probeValue(vertex);
+      const text = `${i + 1}  ${basis.lungNames[lungOf(basis, vertex)]} lung${value === null ? '' : `  ${valueText(value)}`}  ${placeText(placeOf(basis, state.moment, vertex))}`;
+      const line = list.children[i].firstChild;
+      if (line.textContent !== text) line.textContent = text;
+    });
+    const between = () => {
+      const places = (moment) => state.probes.slice(-2).map((vertex) => placeOf(basis, moment, vertex));
+      const apart = ([a, b]) => Math.hypot(...a.map((x, i) => x - b[i]));
+      const n = state.probes.length;
+      return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm, at rest ${apart(places(state.ghostMoment)).toFixed(1)} mm`;
+    };
+    write('probes-text', state.probes.length === 0 ? 'Click or tap the lungs to keep a probe; two measure the distance between them.' : state.probes.length === 1 ? 'A second probe measures the distance.' : between());
+    $('probes-clear').hidden = state.probes.length === 0;
+  }
+
+  /** What is at a place of the canvas, when the graphics card has said it. */
+  function ask(at, then) {
+    pointer = at;
+    asked = false;
+    wanted = then;
+  }
+
+  function addProbe(found) {
+    if (!found || state.probes.length === 8) return;
+    const moment = paneAt(pointer ?? { x: 0, y: 0 }).pane.name === 'pinned' ? state.pinned : state.moment;
+    state.probes.push(nearestVertex(basis, picture.readPositions(moment), found.at));
+    look();
   }
 
   const buttons = makePostureButtons((i) => {
@@ -99,37 +219,59 @@ function start() {
     touch();
   });
 
+  const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
+
   function showState() {
     const gravity = state.gravity;
-    const name = postureName(gravityOf(tilted(state.standing.q, state.standing.tilt)));
-    if ($('posture-name').textContent !== name) $('posture-name').textContent = name;
-    for (const { button, posture } of buttons) button.setAttribute('aria-pressed', String(posture.name === name));
-    $('gravity').textContent = `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '−').replaceAll('−0.00', '0.00');
-    setSlider($('tilt'), state.standing.tilt, `${state.standing.tilt} degrees`);
-    $('tilt-value').textContent = `${state.standing.tilt}°`.replace('-', '−');
-    const depth = `${state.depth.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
-    setSlider($('depth'), state.depth, depth);
-    $('depth-value').textContent = `+${depth}`;
-    setSlider($('tidal'), state.tidal, `${state.tidal} ${state.unit}`);
-    $('tidal-value').textContent = `${state.tidal} ${state.unit}`;
-    setSlider($('rate'), state.rate, `${state.rate} per minute`);
-    $('rate-value').textContent = `${state.rate} /min`;
-    $('play').setAttribute('aria-pressed', String(state.playing));
-    $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
-    $('gains').textContent = state.moment?.gains ? state.moment.gains.map((gain, i) => `${basis.lungNames[i] ?? `lung ${i}`} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '−') : 'open surface: the largest displacement, supine, instead of a volume';
+    const name = postureText(gravityOf(state.goal));
+    if (document.activeElement !== $('posture-name') && $('posture-name').value !== name) $('posture-name').value = name;
+    for (const { button, posture } of buttons) {
+      const pressed = String(posture.name === name);
+      if (button.getAttribute('aria-pressed') !== pressed) button.setAttribute('aria-pressed', pressed);
+    }
+    write('gravity', `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '\u2212').replaceAll('\u22120.00', '0.00'));
+    const digits = basis.hasVolume ? 0 : 1;
+    setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
+    setSlider('depth', state.depth, amount(state.depth), digits);
+    write('depth-value', basis.hasVolume ? `rest + ${amount(state.depth)}` : amount(state.depth));
+    setSlider('tidal', state.tidal, amount(state.tidal), digits);
+    setSlider('rate', state.rate, `${state.rate} per minute`);
+    if ($('play').getAttribute('aria-pressed') !== String(state.playing)) {
+      $('play').setAttribute('aria-pressed', String(state.playing));
+      $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
+    }
+    const gains = state.moment?.gains?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
+    const rest = restFor(basis, gravity) - restFor(basis, state.firstGravity);
+    write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
+    for (const [id, place] of [['left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`], ['right-name', name]]) {
+      if ($(id).hidden === state.beside) $(id).hidden = !state.beside;
+      write(id, place);
+    }
+  }
+
+  function legendTitle() {
+    const rest = basis.resting ? 'rest, supine' : 'rest';
+    return { displacement: `Displacement from ${rest}`, difference: `Difference from ${postureText(gravityOf(state.pinnedQ))}`, expansion: `Growth of area from ${rest}`, height: 'Height above the lowest point' }[state.kind];
   }
 
   function showLegend() {
-    const pinnedName = postureName(state.pinnedGravity);
-    drawLegend(state.kind, state.ranges[state.kind], pinnedName);
-    $('pinned').textContent = `pinned: ${pinnedName}`;
+    drawLegend(state.kind, state.range, legendTitle(), basis.colours[KINDS[state.kind].map]);
+    write('kind-text', KIND_TEXT[state.kind]);
+    write('pinned', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
     for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
+    for (const id of ['contours', 'ghost', 'arrows', 'wires', 'beside']) $(id).checked = state[id];
+    state.opacity.forEach((opacity, lung) => { for (const input of document.getElementsByName(`lung-${lung}`)) input.checked = Number(input.value) === opacity; });
+    $('cut-axis').value = String(state.cut.axis);
+    $('cut').disabled = state.cut.axis < 0;
+    $('cut').value = state.cut.at;
+    fill($('cut'));
   }
 
   function showTheme() {
     $('theme').textContent = isDark() ? 'Light' : 'Dark';
+    readTheme();
     for (const { icon, posture } of buttons) drawIcon(icon, tilted(posture.q, posture.tilt));
   }
 
@@ -139,9 +281,9 @@ function start() {
 
   function frame(now) {
     requestAnimationFrame(frame);
+    if (!picture) return;
     point();
-    const seconds = before === null ? 0 : Math.min(0.1, (now - before) / 1000);
-    const moving = state.advance(seconds);
+    const moving = state.advance(before === null ? 0 : (now - before) / 1000);
     if (moving) stale = unseen = true;
     if (!unseen) {
       before = null;
@@ -155,49 +297,115 @@ function start() {
       const good = state.compute();
       $('message').hidden = good;
       if (!good) {
-        $('message').className = 'trouble';
-        $('message').textContent = `No breath of ${state.depth.toFixed(0)} mL in this posture: the surface would fold.`;
+        $('message').className = 'trouble plate';
+        $('message').textContent = `No breath of ${amount(state.depth)} in this posture: the surface would fold.`;
       }
-      if (state.moment) picture.deform(state.moment, state.kind === 'difference' ? state.pinned : null);
+      deform();
     }
-    view = makeView();
-    picture.draw(view);
+    if (state.moment) draw();
     asked = false;
     showState();
     stale = unseen = false;
     const gpu = Number.isNaN(picture.gpuTime) ? '' : `, drawing ${picture.gpuTime.toFixed(1)} ms`;
-    if (!Number.isNaN(frameTime)) $('frame-time').textContent = `frame ${frameTime.toFixed(1)} ms${gpu}`;
+    if (!Number.isNaN(frameTime)) write('frame-time', `frame ${frameTime.toFixed(1)} ms${gpu}`);
+    clearTimeout(idle);
+    idle = setTimeout(keepLink, 400);
+  }
+
+  let kept = null; // the rest that the graphics card holds
+  function deform() {
+    if (!state.moment) return;
+    if (kept !== picture) {
+      picture.deform('ghost', state.ghostMoment);
+      kept = picture;
+    }
+    picture.deform('now', state.moment);
+    if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
+  }
+
+  function draw() {
+    panes = makePanes();
+    picture.draw(panes);
+    letters.show(panes, body, ratio());
+    if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
+  }
+
+  function keepLink() {
+    try {
+      history.replaceState(null, '', `#${linkOf(state)}`);
+    } catch {
+      // some browsers allow none on pages from disk
+    }
   }
 
   /* The camera. */
   const orbit = (dx, dy) => {
     state.camera.azimuth += dx;
-    state.camera.elevation = Math.max(-1.55, Math.min(1.55, state.camera.elevation + dy));
+    state.camera.elevation = Math.max(-RIGHT_ANGLE, Math.min(RIGHT_ANGLE, state.camera.elevation + dy));
     look();
   };
-  const zoom = (ratio) => {
-    state.camera.zoom = Math.max(0.4, Math.min(8, state.camera.zoom * ratio));
+  const boxSize = () => (state.beside ? { width: canvas.clientWidth / 2, height: canvas.clientHeight } : { width: canvas.clientWidth, height: canvas.clientHeight });
+  const shift = (dx, dy) => { // CSS pixels
+    const { width, height } = boxSize();
+    const mm = (2 * tangent * distanceNow(width / height)) / height;
+    state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     look();
   };
-  const dragging = onDrag(canvas, (dx, dy) => orbit(dx * 0.008, dy * 0.008), zoom);
+  /** What is at a place of the canvas stays there, as far as it is as deep as the pivot. */
+  const zoom = (ratioOfSizes, at) => {
+    const { width, height } = boxSize();
+    const aspect = width / height;
+    const first = distanceNow(aspect);
+    state.camera.zoom = Math.max(0.4, Math.min(20, state.camera.zoom * ratioOfSizes));
+    const grown = distanceNow(aspect) - first;
+    if (at && panes.length) {
+      const { x, y } = paneAt(at);
+      state.camera.pan = [state.camera.pan[0] + x * tangent * aspect * grown, state.camera.pan[1] + y * tangent * grown];
+    }
+    look();
+  };
+  const within = (x, y) => {
+    const box = canvas.getBoundingClientRect();
+    return { x: x - box.left, y: y - box.top };
+  };
+  const dragging = onDrag(canvas, (dx, dy, moves) => (moves ? shift(dx, dy) : orbit(dx * 0.008, dy * 0.008)),
+    (size, dx, dy, x, y) => { shift(dx, dy); zoom(size, within(x, y)); },
+    (event) => {
+      const at = within(event.clientX, event.clientY);
+      if (event.detail < 2) ask(at, addProbe);
+    });
+  canvas.addEventListener('dblclick', (event) => ask(within(event.clientX, event.clientY), (found) => {
+    if (!found) return;
+    state.probes.pop(); // the first click's
+    state.camera.pivot = found.at;
+    state.camera.pan = [0, 0];
+    look();
+  }));
   canvas.addEventListener('wheel', (event) => {
     event.preventDefault();
-    zoom(Math.exp(-event.deltaY * (event.ctrlKey ? 0.01 : 0.0015)));
+    zoom(Math.exp(-event.deltaY * (event.ctrlKey ? 0.01 : 0.0015)), within(event.clientX, event.clientY));
   }, { passive: false });
-  for (const type of ['pointermove', 'pointerdown', 'pointerup']) {
+  for (const type of ['pointermove', 'pointerdown']) {
     canvas.addEventListener(type, (event) => {
-      pointer = dragging() && event.pointerType === 'mouse' ? null : { x: event.offsetX, y: event.offsetY };
+      if (event.pointerType === 'touch' && type === 'pointermove') return; // a tap says what is there
+      pointer = dragging() ? null : { x: event.offsetX, y: event.offsetY };
       asked = false;
     });
   }
-  canvas.addEventListener('pointerleave', () => { pointer = null; });
+  canvas.addEventListener('pointerleave', (event) => { if (event.pointerType !== 'touch') pointer = null; });
   canvas.addEventListener('keydown', (event) => {
     const arrow = ARROWS[event.key];
-    if (arrow) orbit(arrow[0] * 0.09, arrow[1] * 0.09);
+    if (arrow && event.shiftKey) shift(-arrow[0] * 24, -arrow[1] * 24);
+    else if (arrow) orbit(arrow[0] * 0.09, arrow[1] * 0.09);
     if (event.key === '+' || event.key === '=') zoom(1.12);
     if (event.key === '-') zoom(1 / 1.12);
     if (arrow) event.preventDefault();
   });
+  const lookFrom = (letter) => {
+    const { azimuth, elevation } = VIEWS[letter];
+    Object.assign(state.camera, { azimuth, elevation, pan: [0, 0] });
+    look();
+  };
 
   /* The ball: what the hand does to the patient, or, with the patient still, to gravity. */
   const spin = (dx, dy) => {
@@ -218,64 +426,158 @@ function start() {
   });
 
   /* The panel. */
-  const slide = (id, act) => $(id).addEventListener('input', () => { act($(id).valueAsNumber); touch(); });
   const remeasure = () => { state.measure(); showLegend(); };
+  const slide = (id, act) => onSlider(id, (value) => { act(value); touch(); });
   slide('tilt', (value) => state.settle(state.standing.q, value, 0));
   slide('depth', (value) => { state.playing = false; state.depth = value; remeasure(); });
   slide('tidal', (value) => { state.tidal = value; if (!state.playing) state.depth = value; remeasure(); });
   slide('rate', (value) => { state.rate = value; });
+  $('posture-name').addEventListener('change', () => {
+    const found = postureFrom($('posture-name').value);
+    $('posture-trouble').hidden = Boolean(found);
+    if (!found) {
+      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d: supine, prone, left, right, upright, inverted, a tilt as supine+15, or gravity as 0.6:0:-0.8`);
+      return;
+    }
+    state.settle(found.q, found.tilt, 0.7);
+    touch();
+  });
   const play = () => {
     state.playing = !state.playing;
     const part = Math.min(1, state.depth / state.tidal);
     if (state.playing) state.phase = Math.acos(1 - 2 * part) / (2 * Math.PI);
     touch();
   };
-  const pin = () => { state.pinnedGravity = state.gravity; showLegend(); touch(); };
-  const colourBy = (kind) => { state.kind = kind; showLegend(); touch(); };
-  const holdStill = (room) => { state.room = room; showLegend(); touch(); };
+  const change = (act) => () => { act(); showLegend(); touch(); };
+  const pin = change(() => { state.pinnedQ = state.goal; });
+  const colourBy = (kind) => change(() => { state.kind = kind; })();
+  const holdStill = (room) => change(() => { state.room = room; })();
+  const flip = (name) => change(() => { state[name] = !state[name]; })();
   const reset = () => { state.camera = { ...FIRST_CAMERA }; look(); };
   $('play').addEventListener('click', play);
   $('pin').addEventListener('click', pin);
   $('reset').addEventListener('click', reset);
-  $('contours').addEventListener('change', () => { state.contours = $('contours').checked; look(); });
+  for (const id of ['contours', 'ghost', 'arrows', 'wires', 'beside']) $(id).addEventListener('change', () => flip(id));
   for (const input of document.getElementsByName('kind')) input.addEventListener('change', () => colourBy(input.value));
   for (const input of document.getElementsByName('frame')) input.addEventListener('change', () => holdStill(input.value === 'room'));
+  $('cut-axis').addEventListener('change', change(() => { state.cut.axis = Number($('cut-axis').value); }));
+  $('cut').addEventListener('input', change(() => { state.cut.at = $('cut').valueAsNumber; }));
+  for (const id of ['range-begin', 'range-end']) {
+    $(id).addEventListener('change', change(() => {
+      const [begin, end] = [$('range-begin').valueAsNumber, $('range-end').valueAsNumber];
+      if (end > begin) state.ownRanges[state.kind] = { begin, end };
+    }));
+  }
+  $('range-auto').addEventListener('click', change(() => { delete state.ownRanges[state.kind]; }));
+  $('probes-clear').addEventListener('click', () => { state.probes = []; look(); });
+  for (const [letter, { name }] of Object.entries(VIEWS)) {
+    const button = document.createElement('button');
+    button.type = 'button';
+    button.textContent = letter;
+    button.title = `${name} (${letter.toLowerCase()})`;
+    button.setAttribute('aria-label', `${letter}: ${name.toLowerCase()}`);
+    button.addEventListener('click', () => lookFrom(letter));
+    $('views').append(button);
+  }
+  basis.lungNames.forEach((name, lung) => {
+    const row = document.createElement('div');
+    row.className = 'lung';
+    row.append(name);
+    const choice = document.createElement('div');
+    choice.className = 'choice';
+    choice.setAttribute('role', 'radiogroup');
+    choice.setAttribute('aria-label', `${name} lung`);
+    for (const [words, opacity] of [['Whole', 1], ['Faded', 0.35], ['Hidden', 0]]) {
+      const label = document.createElement('label');
+      const input = document.createElement('input');
+      Object.assign(input, { type: 'radio', name: `lung-${lung}`, value: opacity, checked: opacity === state.opacity[lung] });
+      input.addEventListener('change', change(() => { state.opacity = state.opacity.with(lung, opacity); }));
+      const text = document.createElement('span');
+      text.textContent = words;
+      label.append(input, text);
+      choice.append(label);
+    }
+    row.append(choice);
+    $('lungs').append(row);
+  });
   $('theme').addEventListener('click', () => {
     document.documentElement.dataset.theme = isDark() ? 'light' : 'dark';
     showTheme();
     look();
   });
+  $('full').hidden = !document.fullscreenEnabled;
+  $('full').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
+  const picturePng = () => savePicture(canvas, draw, document.title,
+    [`${state.beside ? `left ${postureText(gravityOf(state.pinnedQ))}, right ` : ''}${postureText(gravityOf(state.goal))}, ${$('depth-value').textContent}`, 'computed, not for diagnosis'],
+    { ...state.range, title: `${legendTitle()}, ${KINDS[state.kind].unit}` }, basis.colours[KINDS[state.kind].map],
+    [...$('letters').querySelectorAll(':not([hidden])')].map((element) => {
+      const [box, stage] = [element.getBoundingClientRect(), canvas.getBoundingClientRect()];
+      return { x: box.x + box.width / 2 - stage.x, y: box.y + box.height / 2 - stage.y, words: element.textContent };
+    }));
+  $('save').addEventListener('click', async () => {
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(await picturePng());
+    link.download = `${document.title.replace(/[^\w.-]+/g, '-')}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  });
+  $('link').addEventListener('click', async () => {
+    keepLink();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      write('link', 'Copied');
+    } catch {
+      write('link', 'In the address bar');
+    }
+    setTimeout(() => write('link', 'Copy link'), 2000);
+  });
+  window.addEventListener('hashchange', () => {
+    takeLink(location.hash, state);
+    remeasure();
+    touch();
+  });
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('input:not([type="range"], [type="radio"], [type="checkbox"]), select')) return;
     const posture = POSTURES[Number(event.key) - 1];
+    const kinds = Object.keys(KINDS);
+    const keys = {
+      n: pin, c: () => colourBy(kinds[(kinds.indexOf(state.kind) + 1) % kinds.length]), g: () => flip('ghost'), w: () => flip('wires'),
+      b: () => flip('beside'), s: () => holdStill(!state.room), 0: reset,
+    };
     if (posture) buttons[Number(event.key) - 1].button.click();
     else if (event.key === ' ' && !event.target.closest('button, input, summary')) { event.preventDefault(); play(); }
-    else if (event.key === 'p') pin();
-    else if (event.key === 'd') colourBy(state.kind === 'displacement' ? 'difference' : 'displacement');
-    else if (event.key === 'r') holdStill(!state.room);
-    else if (event.key === '0') reset();
+    else if (keys[event.key]) keys[event.key]();
+    else if (VIEWS[event.key.toUpperCase()] && event.key.length === 1) lookFrom(event.key.toUpperCase());
   });
 
-  for (const id of ['depth', 'tidal']) $(id).max = state.depthMax;
-  $('tidal').min = $('tidal').step = state.tidal / 20;
-  $('depth').step = state.tidal / 100;
-  if (!basis.hasVolume) $('tidal-name').textContent = 'Depth';
-  const { metadata } = basis;
-  $('about').textContent = [
-    `${basis.lungs === 1 ? 'one lung' : `${basis.lungs} lungs`}, ${basis.vertices.toLocaleString('en')} vertices`,
-    `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`,
-    metadata.error_rms_percent ? `error ${Number(metadata.error_rms_percent).toPrecision(2)} % RMS` : '',
-    metadata.attribution ?? '',
-  ].filter(Boolean).join(' · ');
+  for (const id of ['depth', 'tidal']) for (const end of [id, `${id}-number`]) $(end).max = state.depthMax;
+  for (const end of ['tidal', 'tidal-number']) $(end).min = $(end).step = state.tidal / 50;
+  for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
+  for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
+  if (!basis.hasVolume) {
+    document.querySelector('[for="tidal"]').textContent = 'Depth';
+    document.querySelector('[for="depth"]').textContent = 'Largest displacement';
+    write('depth-unit', 'mm');
+    write('tidal-unit', 'mm');
+  }
+  showFacts(basis);
 
   const resize = () => {
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
-    canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
-    canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    const pixels = Math.min(2, window.devicePixelRatio || 1);
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * pixels));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * pixels));
     look();
   };
   new ResizeObserver(resize).observe(canvas);
-  canvas.addEventListener('webglcontextlost', () => tell('The graphics card was taken away: load the page again.'));
+  canvas.addEventListener('webglcontextlost', (event) => {
+    event.preventDefault(); // so that it may come back
+    picture = null;
+    tell('The graphics card was taken away; waiting for it.');
+  });
+  canvas.addEventListener('webglcontextrestored', () => {
+    picture = new Picture(canvas, basis);
+    touch();
+  });
   resize();
   showTheme();
   showLegend();
@@ -283,14 +585,32 @@ function start() {
 
   /* For tests, benchmarks and the console: gravity in the patient's axes (x left, y back, z head), mL. */
   return {
-    picture,
-    view: () => view,
+    get picture() { return picture; },
+    panes: () => panes,
     /** Positions as the graphics card computes them: xyz of each vertex, mm LPS. */
     positions: (gravity, volume) => picture.readPositions(momentFor(basis, unit(gravity), volume)),
     /** Weights with the breath scale in them, and the scale. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
-    state,
+    rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
+}
+
+/** What the basis is, in the program's own words. */
+function showFacts(basis) {
+  const { metadata } = basis;
+  const facts = [
+    ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices`],
+    ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
+    ['error', metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS of the full solve, on directions not used`],
+    ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
+    ['made by', metadata.made_by], ['credit', metadata.attribution],
+  ];
+  $('facts').replaceChildren(...facts.filter(([, value]) => value).flatMap(([name, value]) => {
+    const [term, text] = [document.createElement('dt'), document.createElement('dd')];
+    term.textContent = name;
+    text.textContent = value;
+    return [term, text];
+  }));
 }
 
 function tell(text) {

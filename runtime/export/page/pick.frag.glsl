@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
-// The value and the place under the pointer, bit by bit.
+// The value and the place under the pointer, bit by bit; the value's last four say which lung.
 precision highp float;
+precision highp int;
 in vec3 eye;
 in vec3 facing;
 in vec3 body;
 in float value;
+uniform vec4 cut;
+uniform uint lung;
 out uvec4 picked;
 
 void main() {
+  if (dot(body, cut.xyz) > cut.w) discard;
   picked = floatBitsToUint(vec4(value, body));
+  picked.x = (picked.x & ~15u) | lung;
 }

@@ -4,6 +4,9 @@
 
 const source = (id) => document.getElementById(id).textContent;
 
+const NO_CUT = [0, 0, 0, 1e10];
+const ARROWS_SHOWN = 500;
+
 class Picture {
   constructor(canvas, basis) {
     const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, premultipliedAlpha: true, powerPreference: 'high-performance' });
@@ -12,7 +15,7 @@ class Picture {
     this.canvas = canvas;
     this.basis = basis;
     this.moving = this.program('position.vert.glsl', null, 'moved');
-    this.turning = this.program('normal.vert.glsl', null, 'normal');
+    this.turning = this.program('normal.vert.glsl', null, 'turned');
     this.surface = this.program('surface.vert.glsl', 'surface.frag.glsl');
     this.picker = this.program('surface.vert.glsl', 'pick.frag.glsl');
     this.solid = this.program('solid.vert.glsl', 'solid.frag.glsl');
@@ -21,7 +24,7 @@ class Picture {
     this.makeRings();
     this.makeOutputs();
     this.makePick();
-    this.maps = { displacement: this.makeMap('displacement'), difference: this.makeMap('difference') };
+    this.maps = Object.fromEntries(Object.keys(basis.colours).map((name) => [name, this.makeMap(name)]));
     this.arrow = this.makeArrow();
     this.timer = gl.getExtension('EXT_disjoint_timer_query_webgl2');
     this.timing = null;
@@ -59,30 +62,39 @@ class Picture {
     return made;
   }
 
-  /** A vertex array; each attribute is [buffer, size, stride, offset], whole numbers where `whole`. */
+  /** A vertex array; each attribute is [buffer, size, stride, offset, instances each], whole numbers
+   * where `whole`. */
   array(attributes, whole = false) {
     const { gl } = this;
     const made = gl.createVertexArray();
     gl.bindVertexArray(made);
-    attributes.forEach(([buffer, size, stride, offset], i) => {
+    attributes.forEach(([buffer, size, stride, offset, divisor = 0], i) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.enableVertexAttribArray(i);
       if (whole) gl.vertexAttribIPointer(i, size, gl.UNSIGNED_INT, stride, offset);
       else gl.vertexAttribPointer(i, size, gl.FLOAT, false, stride, offset);
+      gl.vertexAttribDivisor(i, divisor);
     });
     gl.bindVertexArray(null);
     return made;
   }
 
-  /** Rest, direction and up to 16 coefficients; missing ones read (0, 0, 0, 1) and get weight 0. */
+  /** Rest, direction and up to 16 coefficients, of every vertex and of a few for arrows; missing ones
+   * read (0, 0, 0, 1) and get weight 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
-    this.rest = this.buffer(basis.rest);
-    const coefficients = this.buffer(basis.coefficients);
-    const attributes = [[this.rest, 3, 12, 0], [this.buffer(basis.direction), 3, 12, 0]];
-    for (let first = 0; first < k; first += 4) attributes.push([coefficients, Math.min(4, k - first), 4 * k, 4 * first]);
-    this.inputs = this.array(attributes);
+    const inputs = (rest, direction, coefficients) => {
+      const buffer = this.buffer(coefficients);
+      const attributes = [[this.buffer(rest), 3, 12, 0], [this.buffer(direction), 3, 12, 0]];
+      for (let first = 0; first < k; first += 4) attributes.push([buffer, Math.min(4, k - first), 4 * k, 4 * first]);
+      return this.array(attributes);
+    };
+    const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
+    this.fewCount = Math.ceil(basis.vertices / every);
+    const few = (values, size) => Float32Array.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
+    this.inputs = inputs(basis.rest, basis.direction, basis.coefficients);
+    this.fewInputs = inputs(few(basis.rest, 3), few(basis.direction, 3), few(basis.coefficients, k));
   }
 
   texture(internal, format, type, width, height, data) {
@@ -118,24 +130,54 @@ class Picture {
     this.spans = this.array([[this.buffer(spans), 2, 8, 0]], true);
   }
 
-  /** Positions (four floats each, also as a texture), normals, pinned positions. */
+  /** Where the surface is in a state: positions, and normals with areas, four floats each. */
   makeOutputs() {
     const { gl, basis } = this;
     this.width = Math.min(2048, basis.vertices);
     this.height = Math.ceil(basis.vertices / this.width);
-    const room = 16 * this.width * this.height;
-    this.moved = this.buffer(room, gl.DYNAMIC_COPY);
-    this.pinned = this.buffer(room, gl.DYNAMIC_COPY);
-    this.normals = this.buffer(12 * basis.vertices, gl.DYNAMIC_COPY);
     this.places = this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, this.width, this.height, null);
-    const shown = [[this.moved, 3, 16, 0], [this.normals, 3, 12, 0]];
-    const indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.shown = { displacement: this.array([...shown, [this.rest, 3, 12, 0]]), difference: this.array([...shown, [this.pinned, 3, 16, 0]]) };
-    for (const array of Object.values(this.shown)) {
-      gl.bindVertexArray(array);
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+    this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+    this.edges = null;
+    this.states = {};
+    this.arrays = {};
+  }
+
+  state(name) {
+    const { gl } = this;
+    const room = 16 * this.width * this.height;
+    this.states[name] ??= { moved: this.buffer(room, gl.DYNAMIC_COPY), turned: this.buffer(room, gl.DYNAMIC_COPY), few: this.buffer(16 * this.fewCount, gl.DYNAMIC_COPY) };
+    return this.states[name];
+  }
+
+  /** The vertex array of one state measured from another. */
+  shown(name, origin) {
+    const { gl } = this;
+    const key = `${name} ${origin}`;
+    if (!this.arrays[key]) {
+      const [at, from] = [this.state(name), this.state(origin)];
+      this.arrays[key] = this.array([[at.moved, 3, 16, 0], [at.turned, 4, 16, 0], [from.moved, 3, 16, 0], [from.turned, 4, 16, 0]]);
     }
-    gl.bindVertexArray(null);
+    return this.arrays[key];
+  }
+
+  /** Each edge of the triangles once, as pairs of vertices; where each lung's begin. */
+  makeEdges() {
+    const { gl, basis } = this;
+    const { corners } = basis;
+    const pairs = new Uint32Array(2 * corners.length);
+    const begin = [];
+    let count = 0;
+    for (let t = 0; t < corners.length; t += 3) {
+      while (begin.length < basis.lungs && t >= basis.cornerBegin[begin.length]) begin.push(count);
+      for (let i = 0; i < 3; ++i) {
+        const [a, b] = [corners[t + i], corners[t + ((i + 1) % 3)]];
+        if (a < b || !basis.hasVolume) {
+          pairs[count++] = a;
+          pairs[count++] = b;
+        }
+      }
+    }
+    this.edges = { buffer: this.buffer(pairs.subarray(0, count), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), begin: [...begin, count] };
   }
 
   /** One pixel that holds floats' bits. */
@@ -155,7 +197,7 @@ class Picture {
 
   makeMap(name) {
     const { gl } = this;
-    const made = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 256, 1, new Uint8Array(colourMap(name).buffer));
+    const made = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 256, 1, this.basis.colours[name]);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
     return made;
   }
@@ -179,11 +221,12 @@ class Picture {
       quad(i, 0.045, -0.6, 0.14, -0.6);
       quad(i, 0.14, -0.6, 0.001, -1);
     }
-    return { array: this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]), count: places.length / 3 };
+    const made = { places: this.buffer(new Float32Array(places)), normals: this.buffer(new Float32Array(normals)), count: places.length / 3 };
+    return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
   }
 
   /** Runs a program over every vertex into a buffer. */
-  capture(program, array, target) {
+  capture(program, array, target, count = this.basis.vertices) {
     const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);
@@ -191,7 +234,7 @@ class Picture {
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, target);
     gl.enable(gl.RASTERIZER_DISCARD);
     gl.beginTransformFeedback(gl.POINTS);
-    gl.drawArrays(gl.POINTS, 0, this.basis.vertices);
+    gl.drawArrays(gl.POINTS, 0, count);
     gl.endTransformFeedback();
     gl.disable(gl.RASTERIZER_DISCARD);
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
@@ -199,23 +242,24 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  capturePositions(moment, target) {
+  capturePositions(moment, target, few = null) {
     const { gl, moving } = this;
     const weights = new Float32Array(16);
     weights.set(moment.weights);
     gl.useProgram(moving.program);
     gl.uniform4fv(moving.at.supine_weights, weights);
     this.capture(moving, this.inputs, target);
+    if (few) this.capture(moving, this.fewInputs, few, this.fewCount);
   }
 
-  /** Deforms the lungs; with `pinned`, also what differences are measured from. */
-  deform(moment, pinned) {
+  /** Moves a state's surface. */
+  deform(name, moment) {
     const { gl } = this;
-    this.capturePositions(moment, this.moved);
-    if (pinned) this.capturePositions(pinned, this.pinned);
+    const state = this.state(name);
+    this.capturePositions(moment, state.moved, state.few);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.places);
-    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, this.moved);
+    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, state.moved);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.width, this.height, gl.RGBA, gl.FLOAT, 0);
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
     gl.activeTexture(gl.TEXTURE1);
@@ -223,7 +267,7 @@ class Picture {
     gl.useProgram(this.turning.program);
     gl.uniform1i(this.turning.at.positions, 0);
     gl.uniform1i(this.turning.at.ring, 1);
-    this.capture(this.turning, this.spans, this.normals);
+    this.capture(this.turning, this.spans, state.turned);
     gl.activeTexture(gl.TEXTURE0);
   }
 
@@ -239,52 +283,136 @@ class Picture {
     return new Float32Array(3 * basis.vertices).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
-  drawSurface(program, view, lens) {
+  /** Sets a program up for a pane of the picture. */
+  usePane(program, pane, lens) {
     const { gl } = this;
     gl.useProgram(program.program);
-    gl.uniformMatrix4fv(program.at.toEye, false, view.toEye);
-    gl.uniformMatrix4fv(program.at.projection, false, view.projection);
-    gl.uniform4fv(program.at.lens, lens);
-    gl.bindVertexArray(this.shown[view.kind]);
-    gl.drawElements(gl.TRIANGLES, this.basis.corners.length, gl.UNSIGNED_INT, 0);
-    gl.bindVertexArray(null);
+    gl.uniformMatrix4fv(program.at.toEye, false, pane.toEye);
+    gl.uniformMatrix4fv(program.at.projection, false, pane.projection);
+    gl.uniform4fv(program.at.cut, pane.cut);
+    if (lens) gl.uniform4fv(program.at.lens, lens);
+    if (lens) gl.uniform1i(program.at.kind, pane.measure);
+    if (lens) gl.uniform4fv(program.at.gravity, [...pane.gravity, pane.lowest]);
   }
 
-  draw(view) {
-    const { gl, surface, solid, canvas } = this;
+  drawLung(lung, mode) {
+    const { gl, basis } = this;
+    const begin = mode === gl.LINES ? this.edges.begin : basis.cornerBegin;
+    gl.drawElements(mode, begin[lung + 1] - begin[lung], gl.UNSIGNED_INT, 4 * begin[lung]);
+  }
+
+  /** The surface: lungs that are whole, then those that are seen through, nearest side only. */
+  drawLungs(pane) {
+    const { gl, surface } = this;
+    const lungs = pane.opacity.map((opacity, lung) => ({ opacity, lung })).filter((l) => l.opacity > 0).sort((a, b) => b.opacity - a.opacity);
+    const set = (name, value) => gl.uniform1f(surface.at[name], value);
+    this.usePane(surface, pane, [0, 0, 1, 1]);
+    gl.uniform2f(surface.at.range, pane.range.begin, pane.range.end);
+    set('spacing', pane.contours ? pane.range.step : 0);
+    set('dark', pane.dark ? 1 : 0);
+    set('ghost', 0);
+    set('flatly', 0);
+    gl.bindVertexArray(this.shown(pane.state, pane.origin));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+    for (const { opacity, lung } of lungs) {
+      const through = opacity < 1 || pane.wires;
+      set('opacity', opacity);
+      gl.colorMask(!through, !through, !through, !through);
+      gl.enable(gl.POLYGON_OFFSET_FILL);
+      gl.polygonOffset(through ? 1 : 0, through ? 1 : 0);
+      this.drawLung(lung, gl.TRIANGLES);
+      gl.disable(gl.POLYGON_OFFSET_FILL);
+      gl.colorMask(true, true, true, true);
+      if (opacity < 1 && !pane.wires) this.drawLung(lung, gl.TRIANGLES);
+    }
+    if (pane.wires) {
+      if (!this.edges) this.makeEdges();
+      gl.bindVertexArray(this.shown(pane.state, pane.origin));
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.edges.buffer);
+      set('flatly', 1);
+      for (const { lung } of lungs) this.drawLung(lung, gl.LINES);
+    }
+    if (pane.ghost) {
+      gl.bindVertexArray(this.shown('ghost', 'ghost'));
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+      set('ghost', 1);
+      set('flatly', 0);
+      gl.depthMask(false);
+      for (const { lung } of lungs) this.drawLung(lung, gl.TRIANGLES);
+      gl.depthMask(true);
+    }
+  }
+
+  /** A few arrows from where the surface was to where it is. */
+  drawArrows(pane) {
+    const { gl, solid } = this;
+    const key = `arrows ${pane.state} ${pane.origin}`;
+    this.arrays[key] ??= this.array([[this.arrow.places, 3, 12, 0], [this.arrow.normals, 3, 12, 0],
+      [this.state(pane.origin).few, 3, 16, 0, 1], [this.state(pane.state).few, 3, 16, 0, 1]]);
+    this.usePane(solid, pane);
+    gl.uniform1f(solid.at.thick, pane.radius * 0.09);
+    gl.uniform4fv(solid.at.tint, pane.ink);
+    gl.bindVertexArray(this.arrays[key]);
+    gl.drawArraysInstanced(gl.TRIANGLES, 0, this.arrow.count, this.fewCount);
+  }
+
+  /** Gravity, seen through the lungs where they hide it. */
+  drawGravity(pane) {
+    const { gl, solid } = this;
+    this.usePane(solid, pane);
+    gl.uniformMatrix4fv(solid.at.toEye, false, pane.arrowToEye);
+    gl.uniform4fv(solid.at.cut, NO_CUT);
+    gl.uniform1f(solid.at.thick, 0);
+    gl.bindVertexArray(this.arrow.array);
+    for (const [order, alpha] of [[gl.GREATER, 0.8], [gl.LEQUAL, 1]]) {
+      gl.depthFunc(order);
+      gl.depthMask(order === gl.LEQUAL);
+      gl.uniform4fv(solid.at.tint, [...pane.tint, alpha]);
+      gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
+    }
+  }
+
+  draw(panes) {
+    const { gl, canvas } = this;
     this.beginTiming();
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    gl.bindTexture(gl.TEXTURE_2D, this.maps[view.kind]);
-    gl.useProgram(surface.program);
-    gl.uniform1i(surface.at.colours, 0);
-    gl.uniform1f(surface.at.range, view.range.end);
-    gl.uniform1f(surface.at.step_mm, view.contours ? view.range.step / 2 : 0);
-    gl.uniform1f(surface.at.dark, view.dark ? 1 : 0);
-    this.drawSurface(surface, view, [0, 0, 1, 1]);
-    gl.useProgram(solid.program);
-    gl.uniformMatrix4fv(solid.at.toEye, false, view.arrowToEye);
-    gl.uniformMatrix4fv(solid.at.projection, false, view.projection);
-    gl.uniform3fv(solid.at.tint, view.tint);
-    gl.bindVertexArray(this.arrow.array);
-    gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    for (const pane of panes) {
+      gl.viewport(...pane.box);
+      gl.depthFunc(gl.LEQUAL);
+      gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
+      this.drawLungs(pane);
+      if (pane.arrows) this.drawArrows(pane);
+      this.drawGravity(pane);
+    }
+    gl.depthFunc(gl.LEQUAL);
+    gl.disable(gl.BLEND);
     gl.bindVertexArray(null);
     this.endTiming();
   }
 
-  /** Asks what is at a place of the canvas, from -1 to 1 each way. The answer is `picked` a frame or
-   * two later, so that no frame waits for it. */
-  pick(view, x, y) {
-    const { gl, canvas } = this;
+  /** Asks what is at a place of a pane, from -1 to 1 each way. The answer is `picked` a frame or two
+   * later, so that no frame waits for it. */
+  pick(pane, x, y) {
+    const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     gl.viewport(0, 0, 1, 1);
     gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // not a number
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
-    this.drawSurface(this.picker, view, [x, y, canvas.width, canvas.height]);
+    this.usePane(this.picker, pane, [x, y, pane.box[2], pane.box[3]]);
+    gl.bindVertexArray(this.shown(pane.state, pane.origin));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+    pane.opacity.forEach((opacity, lung) => {
+      gl.uniform1ui(this.picker.at.lung, lung);
+      if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
+    });
+    gl.bindVertexArray(null);
     this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a used one would be waited for
     gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
@@ -293,7 +421,7 @@ class Picture {
     gl.flush();
   }
 
-  /** {value, at}, null where nothing was, undefined where no answer has come. */
+  /** {value, at, lung}, null where nothing was, undefined where no answer has come. */
   picked() {
     const { gl } = this;
     if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;
@@ -304,7 +432,7 @@ class Picture {
     gl.deleteSync(this.picking);
     this.picking = null;
     const [value, ...at] = new Float32Array(bits.buffer);
-    return Number.isNaN(value) ? null : { value, at };
+    return Number.isNaN(value) ? null : { value, at, lung: bits[0] & 15 };
   }
 
   beginTiming() {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 precision highp float;
 in vec3 facing;
-uniform vec3 tint;
+in vec3 body;
+uniform vec4 tint;
+uniform vec4 cut;
 out vec4 colour;
 
 void main() {
+  if (dot(body, cut.xyz) > cut.w) discard;
   float light = 0.7 + 0.3 * max(dot(normalize(facing), normalize(vec3(-0.45, 0.65, 0.75))), 0.0);
-  colour = vec4(tint * light, 1.0);
+  colour = vec4(tint.rgb * light, 1.0) * tint.a;
 }

@@ -1,11 +1,28 @@
 // SPDX-License-Identifier: MIT
-layout(location = 0) in vec3 position;
+// An arrow: gravity's, or one of many from where the surface was to where it is.
+layout(location = 0) in vec3 position; // from the origin along -z, of length 1
 layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 tail;     // of each arrow
+layout(location = 3) in vec3 head;
 uniform mat4 toEye;
 uniform mat4 projection;
+uniform float thick; // 0: position is placed by toEye alone; else the most a shaft is scaled by, mm
 out vec3 facing;
+out vec3 body;
 
 void main() {
-  facing = mat3(toEye) * normal;
-  gl_Position = projection * (toEye * vec4(position, 1.0));
+  vec3 at = position;
+  vec3 n = normal;
+  if (thick > 0.0) {
+    vec3 along = head - tail;
+    float size = max(length(along), 1e-6);
+    vec3 z = -along / size;
+    vec3 x = normalize(cross(abs(z.x) < 0.8 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0), z));
+    mat3 turn = mat3(x, cross(z, x), z);
+    at = tail + turn * (position * vec3(vec2(min(thick, size * 1.2)), size));
+    n = turn * normal;
+  }
+  facing = mat3(toEye) * n;
+  body = at;
+  gl_Position = projection * (toEye * vec4(at, 1.0));
 }

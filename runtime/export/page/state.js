@@ -13,22 +13,55 @@ const POSTURES = [
   { name: 'left', label: 'Left side', q: rolled(90), tilt: 0 },
   { name: 'right', label: 'Right side', q: rolled(-90), tilt: 0 },
   { name: 'upright', label: 'Upright', q: IDENTITY, tilt: 0 },
-  { name: 'Trendelenburg', label: 'Head down', q: rolled(0), tilt: 15 },
+  { name: 'supine+15', label: 'Head down', q: rolled(0), tilt: 15 },
 ];
+const INVERTED = { name: 'inverted', q: compose(turn([1, 0, 0], Math.PI), IDENTITY), tilt: 0 };
+const DICOM = { HFS: 0, FFS: 0, HFP: 1, FFP: 1, HFDL: 2, FFDL: 2, HFDR: 3, FFDR: 3 };
 
 const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
+const near = (a, b) => dot(a, b) > Math.cos(0.004);
 
-/** The name of a direction of gravity. */
-function postureName(gravity) {
-  const near = POSTURES.find((p) => dot(gravityOf(tilted(p.q, p.tilt)), gravity) > Math.cos(0.008));
-  if (near) return near.name;
-  const close = POSTURES.slice(0, 5)
-    .map((p) => ({ p, angle: (Math.acos(Math.min(1, dot(gravityOf(p.q), gravity))) * 180) / Math.PI }))
-    .sort((a, b) => a.angle - b.angle)[0];
-  return `${close.p.name} + ${Math.round(close.angle)}°`;
+/** A direction of gravity in the notation that the program reads: a name, a name and the degrees of
+ * its tilt, or three numbers. */
+function postureText(gravity) {
+  const named = [...POSTURES.slice(0, 5), INVERTED].find((p) => near(gravityOf(p.q), gravity));
+  if (named) return named.name;
+  if (Math.abs(gravity[0]) < 0.004) {
+    const degrees = Math.round((Math.atan2(gravity[2], gravity[1]) * 180) / Math.PI);
+    const [name, tilt] = Math.abs(degrees) <= 90 ? ['supine', degrees] : ['prone', degrees > 0 ? degrees - 180 : degrees + 180];
+    const tiltedGravity = rotate(turn([1, 0, 0], (tilt * Math.PI) / 180), [0, name === 'supine' ? 1 : -1, 0]);
+    if (near(tiltedGravity, gravity)) return `${name}${tilt < 0 ? '' : '+'}${tilt}`;
+  }
+  return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1 };
+/** {q, tilt} of what postureText writes and the program reads; null where it is neither. */
+function postureFrom(text) {
+  const word = text.trim().replaceAll('\u2212', '-');
+  const numbers = word.split(/[:,]/).map((part) => (part.trim() === '' ? NaN : Number(part)));
+  if (numbers.length === 3 && numbers.every(Number.isFinite) && Math.hypot(...numbers) > 0) {
+    const now = rotate(LYING, unit(numbers)); // turned so that it points down
+    const axis = cross(now, [0, 0, -1]);
+    const size = Math.hypot(...axis);
+    const swing = size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
+    return { q: compose(swing, LYING), tilt: 0 };
+  }
+  const [, name, tilt] = /^([a-z]+)([+-][\d.]+)?$/i.exec(word) ?? [];
+  const found = [...POSTURES, INVERTED].find((p) => p.name === name?.toLowerCase()) ?? POSTURES[DICOM[name?.toUpperCase()]];
+  return found && Number.isFinite(Number(tilt ?? 0)) ? { q: found.q, tilt: Number(tilt ?? 0) } : null;
+}
+
+const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1, pan: [0, 0], pivot: null };
+
+/** Where the viewer stands, by the letter of what faces him. */
+const VIEWS = {
+  A: { name: 'From the front', azimuth: 0, elevation: 0 },
+  P: { name: 'From the back', azimuth: Math.PI, elevation: 0 },
+  L: { name: 'From the left', azimuth: -RIGHT_ANGLE, elevation: 0 },
+  R: { name: 'From the right', azimuth: RIGHT_ANGLE, elevation: 0 },
+  H: { name: 'From the head', azimuth: 0, elevation: RIGHT_ANGLE },
+  F: { name: 'From the feet', azimuth: 0, elevation: -RIGHT_ANGLE },
+};
 
 class State {
   constructor(basis) {
@@ -39,17 +72,27 @@ class State {
     this.unit = basis.hasVolume ? 'mL' : 'mm';
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
     this.depth = this.tidal;
-    this.depthMax = 2 * this.tidal;
+    this.firstGravity = gravityOf(POSTURES[0].q);  // whose rest is the ghost
+    this.depthMax = Math.max(2 * this.tidal, -restFor(basis, this.firstGravity));
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
     this.kind = 'displacement';
-    this.pinnedGravity = gravityOf(POSTURES[0].q);
+    this.pinnedQ = POSTURES[0].q;
     this.contours = false;
+    this.ghost = false;
+    this.arrows = false;
+    this.wires = false;
+    this.beside = false;                           // the reference posture beside this one
+    this.opacity = Array(basis.lungs).fill(1);
+    this.cut = { axis: -1, at: 0.5 };              // across x, y or z, at a share of the body
+    this.ownRanges = {};                           // {begin, end} by kind, where typed
+    this.probes = [];                              // vertices
     this.room = false;
     this.roomBlend = 0; // 0: the patient stands still; 1: the room does
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
+    this.ghostMoment = momentFor(basis, this.firstGravity, 0);
     this.measure();
   }
 
@@ -57,13 +100,16 @@ class State {
     return gravityOf(this.q);
   }
 
+  get goal() {
+    return tilted(this.standing.q, this.standing.tilt);
+  }
+
   /** Takes up a posture, over a moment unless motion is unwanted. */
   settle(q, tilt, seconds) {
     this.standing = { q, tilt };
-    const goal = tilted(q, tilt);
     const still = seconds === 0 || matchMedia('(prefers-reduced-motion: reduce)').matches;
-    this.turning = still ? null : { from: this.q, to: goal, time: 0, seconds };
-    if (still) this.q = goal;
+    this.turning = still ? null : { from: this.q, to: this.goal, time: 0, seconds };
+    if (still) this.q = this.goal;
   }
 
   /** Turns the patient about an axis of the room. */
@@ -96,32 +142,51 @@ class State {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (!Number.isFinite(moment.scale)) return false;
     this.moment = moment;
-    const pinned = momentFor(this.basis, this.pinnedGravity, this.depth);
+    const pinned = momentFor(this.basis, gravityOf(this.pinnedQ), this.depth);
     this.pinned = Number.isFinite(pinned.scale) ? pinned : moment;
     return true;
   }
 
-  /** Ranges of the colours: the most that six postures show at the deepest breath in use. */
+  /** What the colours go through, at a kind: typed, or what 95 % of the surface stay within in six
+   * postures at the deepest breath in use. */
+  get range() {
+    const own = this.ownRanges[this.kind];
+    if (!own) return this.ranges[this.kind];
+    return { ...own, step: tickStep(own.end - own.begin), beyond: this.ranges[this.kind].most > own.end };
+  }
+
   measure() {
     const deepest = Math.max(this.tidal, this.playing ? 0 : this.depth);
     if (deepest === this.measured) return;
     this.measured = deepest;
-    const fields = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
-      .filter((m) => Number.isFinite(m.scale)).map((m) => sampleField(this.basis, m));
-    const most = (a, b) => {
-      let largest = 0;
-      for (let i = 0; i < a.length; i += 3) {
-        const square = b ? (a[i] - b[i]) ** 2 + (a[i + 1] - b[i + 1]) ** 2 + (a[i + 2] - b[i + 2]) ** 2 : a[i] ** 2 + a[i + 1] ** 2 + a[i + 2] ** 2;
-        if (square > largest) largest = square;
-      }
-      return Math.sqrt(largest);
-    };
-    let displacement = 1e-3;
-    let difference = 1e-3;
-    fields.forEach((a, i) => {
-      displacement = Math.max(displacement, most(a));
-      for (const b of fields.slice(i + 1)) difference = Math.max(difference, most(a, b));
+    const at95 = (values) => values.sort((a, b) => a - b)[Math.floor(0.95 * values.length)];
+    const rest = samplePlaces(this.basis, this.ghostMoment);
+    const areas = (places) => Float64Array.from({ length: places.length / 3 }, (_, i) => {
+      const [a, b, c] = places.slice(3 * i, 3 * i + 3);
+      return Math.hypot(...cross(b.map((x, j) => x - a[j]), c.map((x, j) => x - a[j])));
     });
-    this.ranges = { displacement: roundRange(displacement), difference: roundRange(difference) };
+    const far = (a, b) => a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1], p[2] - b[i][2]));
+    const found = { displacement: [], difference: [], expansion: [], height: [] };
+    const most = { displacement: 0, difference: 0, expansion: 0, height: 0 };
+    const take = (kind, values) => {
+      for (const value of values) most[kind] = Math.max(most[kind], value);
+      found[kind].push(at95(values) || 0);
+    };
+    const restAreas = areas(rest);
+    const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
+      .filter((m) => Number.isFinite(m.scale)).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
+    states.forEach(({ gravity, places }, i) => {
+      take('displacement', far(places, rest));
+      take('expansion', Array.from(areas(places), (area, j) => 100 * (area / restAreas[j] - 1)));
+      const along = places.map((p) => dot(p, gravity));
+      const lowest = along.reduce((a, b) => Math.max(a, b), -Infinity);
+      take('height', along.map((x) => lowest - x));
+      for (const other of states.slice(i + 1)) take('difference', far(places, other.places));
+    });
+    this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
+      const value = Math.max(...found[kind], 0);
+      const end = rangeEnd(value > 1e-3 ? value : 0);
+      return [kind, { begin: 0, end, step: tickStep(end), beyond: most[kind] > end, most: most[kind] }];
+    }));
   }
 }

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// What can be taken away: a link that holds the view, and the picture as a PNG.
+
+const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
+
+/** The view as the text of a link: only what differs from the first view. */
+function linkOf(state) {
+  const { camera } = state;
+  const all = {
+    posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
+    colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '1' : '',
+    show: ['contours', 'ghost', 'arrows', 'wires', 'beside'].filter((name) => state[name]).join('.'),
+    lungs: state.opacity.every((x) => x === 1) ? '' : state.opacity.join(':'),
+    cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
+    range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
+    camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
+    probes: state.probes.join('.'),
+  };
+  return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
+}
+
+/** Takes up what linkOf wrote; what makes no sense is passed over. */
+function takeLink(text, state) {
+  const link = new URLSearchParams(text.replace(/^#/, ''));
+  const numbers = (name, separator = ':') => (link.get(name) ?? '').split(separator).filter((x) => x !== '').map(Number);
+  const within = (value, low, high, otherwise) => (Number.isFinite(value) && value >= low && value <= high ? value : otherwise);
+  const posture = postureFrom(link.get('posture') ?? '');
+  if (posture) state.settle(posture.q, posture.tilt, 0);
+  const reference = postureFrom(link.get('reference') ?? '');
+  if (reference) state.pinnedQ = tilted(reference.q, reference.tilt);
+  state.tidal = within(numbers('tidal')[0], 1e-3, state.depthMax, state.tidal);
+  state.depth = within(numbers('depth')[0], 0, state.depthMax, state.depth);
+  if (KINDS[link.get('colour')]) state.kind = link.get('colour');
+  state.room = link.get('room') === '1';
+  state.roomBlend = state.room ? 1 : 0;
+  const shown = (link.get('show') ?? '').split('.');
+  for (const name of ['contours', 'ghost', 'arrows', 'wires', 'beside']) state[name] = shown.includes(name);
+  const opacity = numbers('lungs');
+  if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
+  const [axis, at] = (link.get('cut') ?? '').split(':');
+  state.cut = { axis: axis ? 'xyz'.indexOf(axis) : -1, at: within(Number(at), 0, 1, 0.5) };
+  const [begin, end] = numbers('range');
+  if (end > begin) state.ownRanges[state.kind] = { begin, end };
+  const camera = numbers('camera');
+  if (camera.length >= 5 && camera.every(Number.isFinite)) {
+    state.camera = { azimuth: camera[0], elevation: within(camera[1], -1.58, 1.58, 0), zoom: within(camera[2], 0.3, 30, 1), pan: camera.slice(3, 5), pivot: camera.length === 8 ? camera.slice(5) : null };
+  }
+  state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
+}
+
+/** The picture with its words, as a PNG to keep. `draw` draws it first, so that it can be read. */
+function savePicture(canvas, draw, title, lines, range, colours, labels) {
+  draw();
+  const ratio = canvas.width / canvas.clientWidth;
+  const paper = document.createElement('canvas');
+  [paper.width, paper.height] = [canvas.width, canvas.height];
+  const context = paper.getContext('2d');
+  context.fillStyle = theme['paper-solid'];
+  context.fillRect(0, 0, paper.width, paper.height);
+  context.drawImage(canvas, 0, 0);
+  context.scale(ratio, ratio);
+  const text = (words, x, y, font, align = 'left', colour = theme.ink) => {
+    context.font = `${font} system-ui, sans-serif`;
+    context.textAlign = align;
+    context.fillStyle = colour;
+    context.fillText(words, x, y);
+  };
+  text(title, 20, 34, '650 19px');
+  lines.forEach((line, i) => text(line, 20, 56 + 18 * i, '13px'));
+  for (const { x, y, words } of labels) text(words, x, y + 5, '650 14px', 'center');
+  const [left, top, width] = [20, canvas.clientHeight - 44, Math.min(320, canvas.clientWidth - 40)];
+  for (let i = 0; i < width; ++i) {
+    const at = 4 * Math.round((255 * i) / (width - 1));
+    context.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
+    context.fillRect(left + i, top, 1.5, 12);
+  }
+  text(range.title, left, top - 8, '600 13px');
+  for (let i = Math.ceil(range.begin / range.step - 1e-9); i * range.step <= range.end * (1 + 1e-9); ++i) {
+    text(plain(i * range.step), left + (width * (i * range.step - range.begin)) / (range.end - range.begin), top + 28, '12px', 'center');
+  }
+  return new Promise((done) => { paper.toBlob(done, 'image/png'); });
+}
