@@ -48,8 +48,9 @@ typedef struct supine_mesh_report {
   supine_axes axes;             /**< axes that were assumed for the file: LPS or RAS */
   bool axes_from_tag;           /**< the file said so itself, with a SPACE tag */
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
-  const char *likely_unit; /**< "m", "cm", "um", ... where the box cannot be a lung's in mm; else
-                                NULL. A string literal. */
+  double odd_side;              /**< longest side, mm, where no lungs are of that size; else 0 */
+  const char *likely_unit; /**< then "mm", "cm", "m", "um" or "in", a literal, if that unit in place
+                                of the one assumed would make it lungs; else NULL */
 } supine_mesh_report;
 
 /** Reads one surface: PLY, STL and OFF directly, all else that assimp reads through it. Polygons
@@ -84,6 +85,11 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_load_property(const char *path, const char *property, double **rows,
                                         size_t *count, supine_error *error);
+
+/** `side` where no lungs have a box with that longest side, mm, else 0. `likely`: the unit, among
+ * those that loading is told by name, in which the file would hold lungs, or NULL.
+ * @param millimetres  per unit, that `side` was scaled by */
+double supine_mesh_unit_check(double side, double millimetres, const char **likely);
 
 /** Frees the arrays and zeroes the struct; a zeroed struct is legal. */
 void supine_mesh_free(supine_mesh *mesh);

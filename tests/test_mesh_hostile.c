@@ -289,6 +289,39 @@ static void test_ply_binary_first_byte_line_feed_read(void **state) {
   }
 }
 
+/* Loads bytes that must be refused with these words. */
+static void refuse_bytes(void **state, const void *bytes, size_t size, const char *words) {
+  char path[256];
+  supine_mesh mesh = {0};
+  supine_error error = {0};
+  (void)sample_write(state, "a.ply", bytes, size, path);
+  assert_int_equal(supine_mesh_load(path, NULL, &mesh, NULL, &error), SUPINE_ERROR_FORMAT);
+  if (strstr(error.message, words) == NULL) {
+    fail_msg("\"%s\" lacks \"%s\"", error.message, words);
+  }
+  assert_int_equal(unlink(path), 0);
+}
+
+static void test_ply_list_of_negative_length_refused(void **state) {
+  static const char ascii[] = PLY_ASCII
+      "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list int int vertex_indices\nend_header\n1 2 3\n-3 0 0 0\n";
+  refuse_bytes(state, ascii, sizeof ascii - 1, "a list of -3 numbers");
+  unsigned char bytes[512] = {0};
+  static const char *const types[] = {"char", "short", "int"};
+  for (int k = 0; k < 3; ++k) {
+    const size_t head = (size_t)snprintf(
+        (char *)bytes, sizeof bytes,
+        "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty float "
+        "y\nproperty float z\nelement face 1\nproperty list %s uchar vertex_indices\nend_header\n",
+        types[k]);
+    memset(bytes + head, 0, sizeof bytes - head);
+    memset(bytes + head + 12, 0xFF, (size_t)1 << k);
+    bytes[head + 12 + ((size_t)1 << k) - 1] = 0xFD;
+    refuse_bytes(state, bytes, sizeof bytes, "a list of -3 numbers");
+  }
+}
+
 static void test_ply_no_surface_mesh(void **state) {
   static const char *const texts[] = {
       PLY_ASCII "element vertex 1\nproperty float x\nproperty float y\nproperty float "
@@ -438,6 +471,7 @@ int main(void) {
       cmocka_unit_test(test_ply_body_illegal_format),
       cmocka_unit_test(test_ply_odd_but_legal_read),
       cmocka_unit_test(test_ply_binary_first_byte_line_feed_read),
+      cmocka_unit_test(test_ply_list_of_negative_length_refused),
       cmocka_unit_test(test_ply_no_surface_mesh),
       cmocka_unit_test(test_off_illegal_format),
       cmocka_unit_test(test_stl_and_obj_garbage_format),

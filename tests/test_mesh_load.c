@@ -2,6 +2,7 @@
 /* Loading small files of every kind: what is welded, dropped, turned and scaled. */
 #include <math.h>
 #include <pthread.h>
+#include <sys/inotify.h>
 #include <sys/stat.h>
 
 #include "mesh_samples.h"
@@ -79,6 +80,25 @@ static void test_load_stl_soup_equals_indexed(void **state) {
   assert_memory_equal(soup.vertices, vertices, sizeof vertices);
   assert_memory_equal(soup.triangles, triangles, sizeof triangles);
   supine_mesh_free(&soup);
+}
+
+/* No coordinate is -0, whichever way it came, so that positions are the same where their bits are.
+ */
+static void test_load_negative_zero_becomes_zero(void **state) {
+  static const char text[] = "OFF\n5 2 0\n-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
+                             "3 0 2 1\n3 3 1 4\n";
+  for (int ras = 0; ras < 2; ++ras) {
+    char path[256];
+    const supine_mesh_load_options options = {.axes = ras ? SUPINE_AXES_RAS : SUPINE_AXES_LPS};
+    supine_mesh_report report = {0};
+    supine_mesh mesh = load(sample_text(state, "a.off", text, path), &options, &report);
+    assert_int_equal(mesh.vertex_count, 4);
+    assert_int_equal(report.welded_vertices, 1);
+    for (size_t i = 0; i < 12; ++i) {
+      assert_true(mesh.vertices[i] != 0.0 || !signbit(mesh.vertices[i]));
+    }
+    supine_mesh_free(&mesh);
+  }
 }
 
 static void test_load_polygons_cut_points_and_lines_dropped(void **state) {
@@ -284,6 +304,10 @@ static void test_load_axes_tag_option_and_comment(void **state) {
       {"# left lung, RAS+ mm\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
       {"# grass, rasp\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
       {"# SPACE=LAS\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
+      {"# AIRSPACE=RAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
+      {"# 2SPACE=RAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
+      {"# RAS2, terRAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
+      {"# RAST or RAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     supine_mesh_report report = {0};
@@ -295,33 +319,76 @@ static void test_load_axes_tag_option_and_comment(void **state) {
   }
 }
 
+/* 3D Slicer's binary STL begins with its tag; what follows the header says nothing. */
+static void test_load_axes_tag_in_stl_header(void **state) {
+  static const char *const heads[] = {"SPACE=RAS", "a lung, SPACE=RAS", "a lung"};
+  for (size_t i = 0; i < 3; ++i) {
+    unsigned char stl[134] = {0};
+    const float facet[12] = {0, 0, 1, 0, 0, 0, 100, 0, 0, 0, 100, 0};
+    memcpy(stl, heads[i], strlen(heads[i]));
+    stl[80] = 1;
+    memcpy(stl + 84, i == 2 ? (const void *)"SPACE=RAS " : facet, 10);
+    memcpy(stl + 94, (const unsigned char *)facet + 10, sizeof facet - 10);
+    char path[256];
+    supine_mesh_report report = {0};
+    supine_mesh mesh = load(sample_write(state, "a.stl", stl, sizeof stl, path), NULL, &report);
+    assert_int_equal(report.axes, i == 2 ? SUPINE_AXES_LPS : SUPINE_AXES_RAS);
+    assert_int_equal(report.axes_from_tag, i != 2);
+    assert_true(mesh.vertices[3] == (i == 2 ? 100.0 : -100.0));
+    supine_mesh_free(&mesh);
+  }
+}
+
 static void test_load_axes_foreign_tag_refused(void **state) {
   refuse_text(state, "a.obj", "# SPACE=LAS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
+  refuse_text(state, "a.obj", "# SPACE=RASP\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+              SUPINE_ERROR_FORMAT, "SPACE tag");
 }
 
+/* The tetrahedron `size` long in the file, read as `scale` mm per unit. */
 static void test_load_units_scaled_and_guessed(void **state) {
   static const struct {
-    double scale; /* of 120 mm */
+    double size, scale;
+    double odd_side;
     const char *likely;
-  } cases[] = {{0.0, NULL},      {1.0, NULL},    {0.1, "inch"},  {0.2, "cm"},
-               {0.002, "m"},     {0.05, "inch"}, {2000.0, "um"}, {1.0e-7, "unknown"},
-               {0.6, "unknown"}, {5.0, NULL},    {0.667, NULL},  {1.0e6, "unknown"}};
+  } cases[] = {{120, 0.0, 0, NULL},
+               {120, 1.0, 0, NULL},
+               {600, 1.0, 0, NULL},
+               {80, 1.0, 0, NULL},
+               {12, 1.0, 12, "in"},
+               {24, 1.0, 24, "cm"},
+               {0.25, 0.0, 0.25, "m"},
+               {6, 0.0, 6, "in"},
+               {240000, 0.0, 240000, "um"},
+               {0.0625, 0.0, 0.0625, NULL},
+               {72, 0.0, 72, NULL},
+               {1048576, 0.0, 1048576, NULL},
+               /* units that were given and are wrong, or right */
+               {120, 10.0, 1200, "mm"},
+               {120, 0.125, 15, "mm"},
+               {0.25, 10.0, 2.5, "m"},
+               {12, 1000.0, 12000, "in"},
+               {24, 10.0, 0, NULL},
+               {72, 0.5, 36, NULL}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    char text[256];
     char path[256];
+    const double size = cases[i].size;
+    (void)snprintf(text, sizeof text,
+                   "OFF\n4 4 0\n0 0 0\n%.9g 0 0\n0 %.9g 0\n0 0 %.9g\n3 0 2 1\n3 0 1 3\n3 0 3 2\n"
+                   "3 1 2 3\n",
+                   size, size, size);
     supine_mesh_report report = {0};
     const supine_mesh_load_options options = {.millimetres_per_unit = cases[i].scale};
-    supine_mesh mesh = load(sample_text(state, "a.obj", tetrahedron_obj, path), &options, &report);
+    supine_mesh mesh = load(sample_text(state, "a.off", text, path), &options, &report);
     double minimum[3];
     double maximum[3];
     supine_mesh_box(&mesh, minimum, maximum);
-    assert_true(maximum[0] == 120.0 * (cases[i].scale == 0.0 ? 1.0 : cases[i].scale));
-    if (cases[i].likely == NULL) {
-      assert_null(report.likely_unit);
-    } else {
-      assert_non_null(report.likely_unit);
-      assert_string_equal(report.likely_unit, cases[i].likely);
-    }
+    assert_true(maximum[0] == size * (cases[i].scale == 0.0 ? 1.0 : cases[i].scale));
+    assert_true(report.odd_side == cases[i].odd_side);
+    assert_string_equal(report.likely_unit == NULL ? "" : report.likely_unit,
+                        cases[i].likely == NULL ? "" : cases[i].likely);
     supine_mesh_free(&mesh);
   }
 }
@@ -430,6 +497,25 @@ static void *read_often(void *argument) {
   return NULL;
 }
 
+/* A surface needs no materials: the file that an OBJ names is not even opened. */
+static void test_load_obj_materials_not_opened(void **state) {
+  char materials[256];
+  char text[1024];
+  char path[256];
+  (void)sample_text(state, "a.mtl", "newmtl a\n", materials);
+  (void)snprintf(text, sizeof text, "mtllib %s\n MtlLib %s\n%s", materials, materials,
+                 tetrahedron_obj);
+  const int watch = inotify_init1(IN_NONBLOCK);
+  assert_true(watch >= 0);
+  assert_true(inotify_add_watch(watch, materials, IN_OPEN) >= 0);
+  supine_mesh mesh = load(sample_text(state, "a.obj", text, path), NULL, NULL);
+  char events[4096];
+  assert_true(read(watch, events, sizeof events) < 0);
+  assert_int_equal(close(watch), 0);
+  supine_mesh_free(&mesh);
+  assert_int_equal(unlink(materials), 0);
+}
+
 static void test_load_from_threads_good_and_bad(void **state) {
   enum { THREADS = 4 };
   static const char *const names[] = {"0", "1", "2", "3"};
@@ -472,6 +558,7 @@ static void test_mesh_free_zeroed_and_twice_legal(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_load_stl_soup_equals_indexed),
+      cmocka_unit_test(test_load_negative_zero_becomes_zero),
       cmocka_unit_test(test_load_polygons_cut_points_and_lines_dropped),
       cmocka_unit_test(test_load_degenerate_and_unreferenced_dropped_counted),
       cmocka_unit_test(test_load_ply_strips_become_all_their_triangles),
@@ -482,6 +569,7 @@ int main(void) {
       cmocka_unit_test(test_load_off_comments_and_colours),
       cmocka_unit_test(test_load_nodes_transformed_mirror_keeps_sense),
       cmocka_unit_test(test_load_axes_tag_option_and_comment),
+      cmocka_unit_test(test_load_axes_tag_in_stl_header),
       cmocka_unit_test(test_load_axes_foreign_tag_refused),
       cmocka_unit_test(test_load_units_scaled_and_guessed),
       cmocka_unit_test(test_load_units_not_positive_argument),
@@ -490,6 +578,7 @@ int main(void) {
       cmocka_unit_test(test_load_no_triangles_mesh),
       cmocka_unit_test(test_load_not_finite_mesh_vertex_named),
       cmocka_unit_test(test_load_stl_binary_that_says_solid),
+      cmocka_unit_test(test_load_obj_materials_not_opened),
       cmocka_unit_test(test_load_from_threads_good_and_bad),
       cmocka_unit_test(test_mesh_free_zeroed_and_twice_legal),
   };

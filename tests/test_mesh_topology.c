@@ -127,6 +127,22 @@ static void test_topology_components_joined_late_one(void **state) {
   supine_mesh_free(&mesh);
 }
 
+/* A closed surface whose two ends are one vertex: V - E + F is 1, and half a hole is none. */
+static void test_topology_pinched_in_a_vertex_no_genus(void **state) {
+  (void)state;
+  static const double vertices[21] = {0};
+  static const uint32_t triangles[] = {0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 5, 1, 5, 4, 2, 3, 6,
+                                       2, 6, 5, 3, 1, 4, 3, 4, 6, 0, 4, 5, 0, 5, 6, 0, 6, 4};
+  supine_mesh mesh = sample_make(7, vertices, 12, triangles);
+  supine_topology topology = topology_of(&mesh);
+  assert_true(topology.closed);
+  assert_int_equal(topology.component_count, 1);
+  assert_int_equal(topology.euler_characteristic, 1);
+  assert_int_equal(topology.genus, -1);
+  supine_mesh_topology_free(&topology);
+  supine_mesh_free(&mesh);
+}
+
 static void test_topology_fan_on_one_edge_non_manifold(void **state) {
   (void)state;
   static const double vertices[15] = {0};
@@ -233,6 +249,7 @@ int main(void) {
       cmocka_unit_test(test_topology_open_sheet_boundary_counted),
       cmocka_unit_test(test_topology_two_tetrahedra_components_in_order),
       cmocka_unit_test(test_topology_components_joined_late_one),
+      cmocka_unit_test(test_topology_pinched_in_a_vertex_no_genus),
       cmocka_unit_test(test_topology_fan_on_one_edge_non_manifold),
       cmocka_unit_test(test_topology_flipped_triangle_inconsistent),
       cmocka_unit_test(test_topology_hub_of_many_edges_sorted),

@@ -256,6 +256,17 @@ static void test_mesh_wrong_units_warned(void **state) {
   assert_null(strstr(printed, "warning"));
 }
 
+static void test_mesh_inward_lung_turned_round_and_told(void **state) {
+  (void)state;
+  write_text("in.obj",
+             "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
+  EXPECT(0, "note: the triangles of the left lung faced inwards: turned round",
+         "solve in.obj --posture prone -o h.ply");
+  EXPECT(2, "surfaces 1 and 2 fill the same box: give each lung once",
+         "solve in.obj in.obj --posture prone -o h.ply");
+  EXPECT(2, "runs through the right lung", "solve in.obj --midline 49 --posture prone -o h.ply");
+}
+
 static void test_direction_file_moves_vertices_along_it(void **state) {
   (void)state;
   write_text("tetra.obj",
@@ -336,6 +347,7 @@ int main(void) {
       cmocka_unit_test(test_mesh_bad_input_named_and_nothing_left),
       cmocka_unit_test(test_mesh_open_surface_explains_volume),
       cmocka_unit_test(test_mesh_wrong_units_warned),
+      cmocka_unit_test(test_mesh_inward_lung_turned_round_and_told),
       cmocka_unit_test(test_direction_file_moves_vertices_along_it),
       cmocka_unit_test(test_solve_unit_force_writes_column),
       cmocka_unit_test(test_bench_prints_rows),

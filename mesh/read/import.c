@@ -128,7 +128,7 @@ static void confine(size_t bytes) {
   const struct rlimit none = {0, 0};
   (void)setrlimit(RLIMIT_CPU, &time);
   (void)setrlimit(RLIMIT_CORE, &none);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) /* they map terabytes */
+#ifndef SUPINE_SANITIZED /* sanitizers map terabytes */
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif

@@ -63,7 +63,7 @@ static supine_status convert(const char *path, double scale, bool ras, supine_me
   return SUPINE_OK;
 }
 
-static const char *likely_unit(const supine_mesh *mesh) {
+static double longest_side(const supine_mesh *mesh) {
   double minimum[3];
   double maximum[3];
   supine_mesh_box(mesh, minimum, maximum);
@@ -71,7 +71,7 @@ static const char *likely_unit(const supine_mesh *mesh) {
   for (int axis = 0; axis < 3; ++axis) {
     side = fmax(side, maximum[axis] - minimum[axis]);
   }
-  return supine_mesh_unit_likely(side);
+  return side;
 }
 
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
@@ -109,7 +109,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                               path, found.file_vertices, found.file_faces);
     goto cleanup;
   }
-  found.likely_unit = likely_unit(&loaded);
+  found.odd_side = supine_mesh_unit_check(longest_side(&loaded), scale, &found.likely_unit);
   *mesh = loaded;
   loaded = (supine_mesh){0};
   if (report != NULL) {

@@ -114,8 +114,12 @@ static supine_status take_list(ply_reader *in, const ply_element *element, uint6
   double corners[MESH_CORNERS_MAX];
   strip so_far = {.length = 0};
   double length = 0.0;
-  if (!take(in, property->count, &length) || length < 0.0) {
+  if (!take(in, property->count, &length)) {
     return cut_short(in, element, item);
+  }
+  if (length < 0.0) {
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: a list of %.0f numbers",
+                            in->file->path, length);
   }
   const uint64_t count = (uint64_t)length; /* below 2^63, and the file ends sooner */
   const bool corner = property->role == PLY_CORNERS;

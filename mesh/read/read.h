@@ -116,10 +116,4 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
  * corners at one vertex, then vertices without a triangle. Works in place; counts are added to. */
 supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
 
-/* ---- unit.c ---- */
-
-/** The unit in which a box with this longest side, taken as mm, would hold lungs; NULL where it
- * does already. */
-const char *supine_mesh_unit_likely(double longest_side);
-
 #endif

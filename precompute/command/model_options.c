@@ -207,11 +207,11 @@ static void mention(const char *command, const char *path, const supine_mesh_rep
                        "the right, add --axes RAS",
                        path);
   }
-  if (report->likely_unit != NULL) {
-    supine_options_say(command,
-                       "%s: warning: its size cannot be a lung's in mm; the likely unit is '%s': "
-                       "add --units %s",
-                       path, report->likely_unit, report->likely_unit);
+  if (report->odd_side > 0.0) {
+    const char *unit = report->likely_unit;
+    supine_options_say(
+        command, "%s: warning: %.3g mm long, which no lung is: %s%s", path, report->odd_side,
+        unit == NULL ? "check its units" : "its unit is likely --units ", unit == NULL ? "" : unit);
   }
 }
 

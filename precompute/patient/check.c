@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Whether pairs of points can be two states of one chest. */
 #include <math.h>
-#include <string.h>
 
 #include <gsl/gsl_linalg.h>
 
 #include "precompute/patient/pairs.h"
 
-#include "mesh/read/read.h"
+#include "mesh/mesh.h"
 
 enum { PAIRS_LEAST = 12 };          /* an affine map has as many unknowns as 4 pairs; thrice that */
 static const double flattest = 1.0; /* mm RMS across the plane that fits best */
@@ -144,14 +143,13 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   }
   measure(pairs, &s);
   for (int state = 0; state < 2; ++state) {
-    const char *unit = supine_mesh_unit_likely(s.side[state]);
-    if (unit != NULL) {
+    const char *unit = NULL;
+    if (supine_mesh_unit_check(s.side[state], 1.0, &unit) > 0.0) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "the points %s extend over %.3g: no lung in mm%s%s; landmarks are in "
                               "mm, spread over the lungs",
                               state == 0 ? "at rest" : "of the other state", s.side[state],
-                              strcmp(unit, "unknown") == 0 ? "" : ", but one in ",
-                              strcmp(unit, "unknown") == 0 ? "" : unit);
+                              unit == NULL ? "" : ", but one in ", unit == NULL ? "" : unit);
     }
   }
   const double size = s.spread[1] / s.spread[0];

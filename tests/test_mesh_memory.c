@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Each allocation of loading, welding, measuring and saving fails in turn: SUPINE_ERROR_MEMORY, or
+ * a result as if nothing had happened; nothing half done, nothing lost (a sanitizer's leak check).
+ */
+#include <errno.h>
+
+#include "mesh_samples.h"
+
+/* Allocations that are still to succeed, negative: all; the linker sends ours here. */
+static int allocations_left = -1;
+static int allocations_failed = 0;
+
+static int allocation_fails(void) {
+  const int fails = allocations_left >= 0 && allocations_left-- == 0;
+  if (fails) {
+    ++allocations_failed;
+    errno = ENOMEM;
+  }
+  return fails;
+}
+
+/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names that ld --wrap sets
+ */
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *old, size_t size);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *old, size_t size);
+
+void *__wrap_malloc(size_t size) {
+  return allocation_fails() ? NULL : __real_malloc(size);
+}
+
+void *__wrap_calloc(size_t count, size_t size) {
+  return allocation_fails() ? NULL : __real_calloc(count, size);
+}
+
+void *__wrap_realloc(void *old, size_t size) {
+  return allocation_fails() ? NULL : __real_realloc(old, size);
+}
+/* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
+
+/* Runs `work` with its allocation 0, 1, 2, ... failing, until none is left to fail. */
+static void fail_each(supine_status (*work)(const char *path, supine_error *error),
+                      const char *path, int least) {
+  for (int nth = 0;; ++nth) {
+    supine_error error = {0};
+    allocations_left = nth;
+    allocations_failed = 0;
+    const supine_status status = work(path, &error);
+    allocations_left = -1;
+    const bool was_last = allocations_failed == 0;
+    if (was_last) {
+      assert_int_equal(status, SUPINE_OK);
+      if (nth < least) {
+        fail_msg("%s: %d allocations were seen", path, nth);
+      }
+      return;
+    }
+    if (status == SUPINE_OK) {
+      continue; /* it managed without: a buffer, say */
+    }
+    /* An output that cannot be had is one, whatever it lacks. */
+    if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
+        strstr(error.message, "memory") == NULL) {
+      fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);
+    }
+  }
+}
+
+static supine_status load(const char *path, supine_error *error) {
+  supine_mesh mesh = {0};
+  const supine_status status = supine_mesh_load(path, NULL, &mesh, NULL, error);
+  assert_true((status == SUPINE_OK) == (mesh.vertices != NULL));
+  assert_int_equal(mesh.triangle_count, status == SUPINE_OK ? 2 : 0);
+  supine_mesh_free(&mesh);
+  return status;
+}
+
+static supine_status load_property(const char *path, supine_error *error) {
+  double *rows = NULL;
+  size_t count = 0;
+  const supine_status status = supine_mesh_load_property(path, "a", &rows, &count, error);
+  assert_true((status == SUPINE_OK) == (rows != NULL));
+  free(rows);
+  return status;
+}
+
+static void test_load_each_allocation_failing_memory(void **state) {
+  static const struct {
+    const char *name;
+    const char *text;
+  } files[] = {
+      {"a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                "property float z\nproperty float a\nelement face 1\nproperty list uchar int "
+                "vertex_indices\nend_header\n0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 0 4\n4 0 1 2 3\n"},
+      {"a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 0 0\nvertex 1 1 0\n"
+                "vertex 0 1 0\nendsolid\n"},
+      {"a.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"},
+      {"a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"}};
+  for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
+    char path[256];
+    (void)sample_text(state, files[i].name, files[i].text, path);
+    fail_each(load, path, 6); /* head, bytes, vertices, triangles, weld's two */
+    if (i == 0) {
+      fail_each(load_property, path, 3);
+    }
+    assert_int_equal(unlink(path), 0);
+  }
+}
+
+static supine_status find_edges(const char *path, supine_error *error) {
+  supine_mesh mesh = {0};
+  supine_topology topology = {0};
+  const int left = allocations_left;
+  allocations_left = -1;
+  assert_int_equal(supine_mesh_load(path, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  allocations_left = left;
+  const supine_status status = supine_mesh_topology_create(&mesh, &topology);
+  allocations_left = -1;
+  assert_true((status == SUPINE_OK) == (topology.edges != NULL));
+  assert_true((status == SUPINE_OK) == (topology.component != NULL));
+  supine_mesh_topology_free(&topology);
+  supine_mesh_free(&mesh);
+  return supine_error_set(error, status, "out of memory"); /* it has no words of its own */
+}
+
+static void test_topology_each_allocation_failing_memory(void **state) {
+  char path[256];
+  (void)sample_text(state, "a.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", path);
+  fail_each(find_edges, path, 4);
+  assert_int_equal(unlink(path), 0);
+}
+
+static supine_status save(const char *path, supine_error *error) {
+  double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  uint32_t triangles[] = {0, 1, 2};
+  const supine_mesh mesh = {3, vertices, 1, triangles};
+  const supine_mesh_save_options options = {.rest = vertices, .comment = "a triangle"};
+  const supine_status status = supine_mesh_save(path, &mesh, &options, error);
+  assert_int_equal(unlink(path), status == SUPINE_OK ? 0 : -1);
+  return status;
+}
+
+/* Writers take no memory but what opening the output takes; the folder's removal finds leftovers.
+ */
+static void test_save_each_allocation_failing_memory(void **state) {
+  static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    char path[256];
+    fail_each(save, sample_path(state, names[i], path), 0);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_load_each_allocation_failing_memory),
+      cmocka_unit_test(test_topology_each_allocation_failing_memory),
+      cmocka_unit_test(test_save_each_allocation_failing_memory),
+  };
+  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
+}
