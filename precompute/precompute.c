@@ -214,6 +214,8 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .route = p->linear ? "linear" : "sampled",
                                         .harmonics = p->options->modes == 0,
+                                        .patient = p->options->patient,
+                                        .patient_summary = p->options->patient_summary,
                                         .made_by = p->options->made_by};
   stage part = {p->options, 0.9, 1.0};
   if (!stage_progress(&part, 0.0)) {

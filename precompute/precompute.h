@@ -24,10 +24,12 @@ typedef enum supine_route {
 typedef struct supine_precompute_options {
   supine_model model;
   supine_route route;
-  size_t band;         /**< L */
-  size_t modes;        /**< most modes; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;     /**< directions that the error is measured on; 0: 100 to 1000 */
-  const char *made_by; /**< how it was made, for the file's metadata; optional */
+  size_t band;                 /**< L */
+  size_t modes;                /**< most modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;             /**< directions that the error is measured on; 0: 100 to 1000 */
+  const char *made_by;         /**< how it was made, for the file's metadata; optional */
+  const char *patient;         /**< a person's own law (JSON), for the same; optional */
+  const char *patient_summary; /**< whose, and how well it held out; with the former */
   supine_progress_function *progress; /**< optional */
   void *progress_context;
 } supine_precompute_options;

@@ -11,7 +11,7 @@
 static const char name[] = "fit";
 
 typedef struct request {
-  const char *path, *landmarks;
+  const char *path, *landmarks, *name;
   bool reverse, translation, rigid, has_law, has_midline, has_gain, json;
   int law;
   double midline, gain;
@@ -67,6 +67,7 @@ static const supine_option table[] = {
      "of "
      "second degree for each lung. Default: what leaves least of points that it has not seen",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
+    {"name", 0, "TEXT", "whose lungs these are; default: the landmarks' file", FILLS(name)},
     {"gain", 0, "G",
      "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
      "stays with the body; default 0.4, the 'deep' law's",
@@ -177,6 +178,11 @@ static supine_status fit(const request *wanted, const char *made_by, supine_pati
   if (status == SUPINE_OK) {
     const supine_patient_scores *held = &report->held_out;
     const bool moved = options.moved != SUPINE_PATIENT_STILL;
+    const char *slash = strrchr(wanted->landmarks, '/');
+    (void)snprintf(record->name, sizeof record->name, "%s",
+                   wanted->name != NULL ? wanted->name
+                   : slash != NULL      ? slash + 1
+                                        : wanted->landmarks);
     record->rest = wanted->rest;
     record->state = wanted->state;
     record->inflation = supine_patient_inflation(&record->patient);

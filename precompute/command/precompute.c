@@ -8,6 +8,7 @@
 #include <supine/sh.h>
 
 #include "precompute/command/model_options.h"
+#include "precompute/patient/patient_file.h"
 
 static const char name[] = "precompute";
 
@@ -15,7 +16,8 @@ typedef struct request {
   supine_model_options model;
   supine_precompute_options basis;
   const char *path;
-  const char *fields;
+  const char *fields, *patient;
+  char summary[256];
   bool has_band;
   unsigned kind; /* 1: scalar */
 } request;
@@ -51,13 +53,16 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, basis.route), .choices = routes},
     {"held-out", 0, "N", "directions that the error is measured on; default 100 to 1000",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}},
+    {"patient", 0, "FILE",
+     "a person's own law, as 'supine fit' found it, in place of the directions and the force below",
+     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
     {.help = "Instead of the built-in physics, fields that another simulator computed:"},
     {"fields", 0, "LIST",
      "CSV with the columns gx,gy,gz,file: directions of gravity and the same surface deformed; or "
      "a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the rest surface. "
      "The highest band that the directions determine and cross-validation favours is taken, "
      "unless --band names one",
-     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN},
+     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions"},
     {"kind", 0, "vector|scalar",
      "keep three components, or magnitude x best direction, a third of the size, with the loss "
      "stated",
@@ -185,6 +190,42 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   return supine_options_finish(name);
 }
 
+/* Directions and force of a person's own law; what is kept of it in the file is owned by the
+ * caller.
+ */
+static supine_status take_patient(const supine_lungs *lungs, request *wanted, char **text,
+                                  supine_error *error) {
+  supine_model_options *model = &wanted->model;
+  supine_patient_record record;
+  supine_status status = supine_patient_read(wanted->patient, &record, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (model->model.direction.model != SUPINE_DIRECTION_BOX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--patient brings its own directions: leave --direction out");
+  }
+  model->vectors = malloc(3 * lungs->mesh.vertex_count * sizeof *model->vectors);
+  *text = supine_patient_text(&record, NULL, NULL);
+  if (model->vectors == NULL || *text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                            lungs->mesh.vertex_count);
+  }
+  status = supine_patient_directions(&record, lungs, &model->model, model->vectors, error);
+  model->model.direction =
+      (supine_direction_law){.model = SUPINE_DIRECTION_VECTORS, .vectors = model->vectors};
+  wanted->basis.patient = *text;
+  if (status == SUPINE_OK) {
+    (void)snprintf(wanted->summary, sizeof wanted->summary,
+                   "%s: %s law from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
+                   record.name, supine_patient_law_names[record.patient.law], record.points,
+                   record.held_out, record.held_out_baseline, 100.0 * record.explained);
+    wanted->basis.patient_summary = wanted->summary;
+    (void)printf("%s\n", wanted->summary);
+  }
+  return status;
+}
+
 static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
@@ -192,6 +233,8 @@ static void begin(void *chosen) {
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   supine_lungs lungs = {0};
+  supine_error error;
+  char *text = NULL;
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_options_usage(
         name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
@@ -200,10 +243,15 @@ static int run(void *chosen, const supine_arguments *given) {
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
   }
+  if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
+      take_patient(&lungs, wanted, &text, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  }
   if (result == SUPINE_EXIT_OK) {
     result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)
                                     : compute(&lungs, wanted, given->made_by);
   }
+  free(text);
   supine_lungs_free(&lungs);
   supine_command_model_options_free(&wanted->model);
   return result;

@@ -82,14 +82,15 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   const supine_patient *patient = &record->patient;
   const supine_patient_frame *frame = &patient->frame;
   json_t *root = json_pack(
-      "{s:s, s:i, s:s, s:i, s:f, s:f, s:f, s:f, s:{s:o, s:o, s:f, s:s, s:s}, s:o, s:o, s:f}",
-      "format", format, "version", VERSION, "law", supine_patient_law_names[patient->law], "points",
-      (int)record->points, "held_out_rms_mm", record->held_out, "held_out_baseline_mm",
-      record->held_out_baseline, "fitted_rms_mm", record->fitted, "explained_percent",
-      100.0 * record->explained, "frame", "minimum_mm", numbers(frame->minimum, 3), "maximum_mm",
-      numbers(frame->maximum, 3), "midline_mm", frame->midline, "lungs",
-      side_name(frame->only_side), "of", record->from_surface ? "surface" : "landmarks", "rest",
-      scan(&record->rest), "state", scan(&record->state), "inflation", record->inflation);
+      "{s:s, s:i, s:s, s:s, s:i, s:f, s:f, s:f, s:f, s:{s:o, s:o, s:f, s:s, s:s}, s:o, s:o, s:f}",
+      "format", format, "version", VERSION, "name", record->name, "law",
+      supine_patient_law_names[patient->law], "points", (int)record->points, "held_out_rms_mm",
+      record->held_out, "held_out_baseline_mm", record->held_out_baseline, "fitted_rms_mm",
+      record->fitted, "explained_percent", 100.0 * record->explained, "frame", "minimum_mm",
+      numbers(frame->minimum, 3), "maximum_mm", numbers(frame->maximum, 3), "midline_mm",
+      frame->midline, "lungs", side_name(frame->only_side), "of",
+      record->from_surface ? "surface" : "landmarks", "rest", scan(&record->rest), "state",
+      scan(&record->state), "inflation", record->inflation);
   if (root == NULL) {
     return NULL;
   }
@@ -246,6 +247,8 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: \"%s\" is missing or not as 'supine fit' writes it", name, wrong);
   }
+  const char *whose = json_string_value(json_object_get(root, "name"));
+  (void)snprintf(record->name, sizeof record->name, "%s", whose != NULL ? whose : "unnamed");
   record->inflation = number(root, "inflation") < 0.0 ? -1.0 : 1.0;
   record->points = (size_t)fmax(0.0, number(root, "points"));
   record->held_out = number(root, "held_out_rms_mm");

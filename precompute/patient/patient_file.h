@@ -19,6 +19,7 @@ typedef struct supine_patient_scan {
 
 /** What patient.json holds. */
 typedef struct supine_patient_record {
+  char name[SUPINE_PATIENT_TEXT]; /**< whose */
   supine_patient patient;
   supine_force_law force; /**< 1 at the box's centre in the state's posture */
   supine_patient_scan rest, state;

@@ -197,6 +197,10 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (content->turned_over != NULL) {
     add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
+  if (content->patient != NULL) {
+    add(&list, "patient_law", "%s", content->patient);
+    add(&list, "patient", "%s", content->patient_summary);
+  }
   add(&list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
   if (list.failed) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);

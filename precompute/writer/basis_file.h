@@ -20,6 +20,8 @@ typedef struct supine_basis_content {
   const supine_error_table *table; /* optional */
   const char *route;               /* how the field was found */
   bool harmonics;                  /* the modes are the harmonics themselves */
+  const char *patient;             /* a person's own law, JSON; optional */
+  const char *patient_summary;     /* whose, and how well it held out */
   const char *made_by;             /* optional */
 } supine_basis_content;
 
