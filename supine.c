@@ -10,24 +10,14 @@
 
 #include "runtime/options/command.h"
 
-static const supine_command *const commands[] = {
-    &supine_command_phantom, &supine_command_precompute, &supine_command_fit,
-    &supine_command_info,    &supine_command_deform,     &supine_command_compare,
-    &supine_command_render,  &supine_command_breathe,    &supine_command_export,
-    &supine_command_bench,   &supine_command_solve,      &supine_command_pv,
-    &supine_command_stream,
-};
-
-enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
-
 static void print_help(void) {
   (void)puts("supine - lungs that deform with gravity, in real time\n"
              "\n"
              "Usage: supine COMMAND [OPTIONS]\n"
              "\n"
              "Commands:");
-  for (size_t i = 0; i < COMMAND_COUNT; ++i) {
-    (void)printf("  %-11s %s\n", commands[i]->name, commands[i]->summary);
+  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
+    (void)printf("  %-11s %s\n", supine_command_list[i]->name, supine_command_list[i]->summary);
   }
   (void)puts("\n"
              "'supine COMMAND --help' teaches each. A first round, without any data:\n"
@@ -41,21 +31,23 @@ static void print_help(void) {
              "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
 }
 
-/* Position of a command in the table, or COMMAND_COUNT. */
-static size_t find_command(const char *name) {
+/* A command by its name, or NULL. */
+static const supine_command *find_command(const char *name) {
   size_t i = 0;
-  while (i < COMMAND_COUNT && strcmp(name, commands[i]->name) != 0) {
+  while (supine_command_list[i] != NULL && strcmp(name, supine_command_list[i]->name) != 0) {
     ++i;
   }
-  return i;
+  return supine_command_list[i];
 }
 
 static int unknown_command(const char *name) {
-  const char *names[COMMAND_COUNT];
-  for (size_t i = 0; i < COMMAND_COUNT; ++i) {
-    names[i] = commands[i]->name;
+  enum { NAMES_MAX = 64 };
+  const char *names[NAMES_MAX];
+  size_t count = 0;
+  for (; supine_command_list[count] != NULL && count < NAMES_MAX; ++count) {
+    names[count] = supine_command_list[count]->name;
   }
-  const char *nearest = supine_options_suggest(name, names, COMMAND_COUNT);
+  const char *nearest = supine_options_suggest(name, names, count);
   if (nearest != NULL) {
     (void)fprintf(stderr, "supine: no command '%s'; did you mean '%s'?\n", name, nearest);
   } else {
@@ -83,14 +75,14 @@ int main(int argc, char **argv) {
     return supine_options_finish("version");
   }
   const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
-  const size_t index = find_command(wanted);
-  if (index == COMMAND_COUNT) {
+  const supine_command *command = find_command(wanted);
+  if (command == NULL) {
     return unknown_command(wanted);
   }
   if (help) {
     char option[] = "--help";
     char *arguments[] = {argv[2], option, NULL};
-    return supine_options_run(commands[index], 2, arguments);
+    return supine_options_run(command, 2, arguments);
   }
-  return supine_options_run(commands[index], argc - 1, argv + 1);
+  return supine_options_run(command, argc - 1, argv + 1);
 }

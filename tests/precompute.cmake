@@ -9,6 +9,9 @@ target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 300)
+# Manual pages and completions, which are made from the same tables.
+add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
+  ${PROJECT_BINARY_DIR}/packaging/manual)
 add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_no_data_lost.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(no_data_lost PROPERTIES TIMEOUT 600)

@@ -27,6 +27,9 @@ extern const supine_command supine_command_phantom, supine_command_precompute, s
     supine_command_export, supine_command_bench, supine_command_solve, supine_command_pv,
     supine_command_stream, supine_command_fit;
 
+/* The same, ended by NULL. */
+extern const supine_command *const supine_command_list[];
+
 /* The exit code that a status ends the program with. */
 int supine_options_exit_code(supine_status status);
 

@@ -71,7 +71,7 @@ typedef struct supine_option {
   double range[2];      /* of numbers and counts; both 0: any */
   bool open;            /* the range's ends are outside it */
   const char *wants;    /* "millilitres": for messages; NULL: from the kind and the range */
-  const char *const *choices; /* ends with NULL */
+  const char *const *choices; /* ends with NULL; for completion where there is a reader */
   const char *alias;          /* another long name, not shown */
   const char *rivals;         /* of options with the same word here one at most is given, once */
   bool required;
@@ -136,6 +136,9 @@ int supine_options_check_output(const char *command, const char *output, const c
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
+
+/* An option's help with its default. */
+void supine_options_help_text(const supine_option *option, char *text, size_t size);
 
 void supine_options_print_help(const supine_command *command, FILE *file);
 

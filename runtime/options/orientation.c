@@ -99,12 +99,15 @@ static int read_quaternion(const char *command, const char *value, void *field) 
   SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
       .rivals = "gravity"
 
+static const char *const postures[] = {"supine",  "prone",    "left", "right",
+                                       "upright", "inverted", NULL};
+
 const supine_option supine_options_orientation[] = {
     {.help = "Where gravity points (one of the first three):"},
     {"posture", 0, "NAME",
      "supine, prone, left, right (lying on that side), upright, inverted, or a DICOM patient "
      "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR; supine+15: tilted, as by --tilt 15",
-     GRAVITY, .read = read_posture},
+     GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "a direction in body axes: x to the left, y to the back, z to the head; supine is 0,1,0",
      GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},

@@ -1,0 +1,25 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Tries a package in a clean Debian 12, as root: try_package.sh supine_*.deb EXAMPLE.c
+# Installs it by apt, runs the program, compiles the example against the library, and purges it.
+set -eu
+package=$1
+example=$2
+root=$(mktemp -d)
+trap 'umount "$root/proc" 2>/dev/null || true; rm -rf "$root"' EXIT
+debootstrap --variant=minbase bookworm "$root" >/dev/null
+mount -t proc proc "$root/proc"
+cp "$package" "$root/root/supine.deb"
+cp "$example" "$root/root/example.c"
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive sh -ec "$1"; }
+inside 'apt-get update -qq; apt-get install -y -qq --no-install-recommends gcc libc6-dev pkg-config >/dev/null 2>&1'
+inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*"' >"$root/before"
+inside 'apt-get install -y -qq --no-install-recommends /root/supine.deb >/dev/null 2>&1'
+inside 'cd /root; supine phantom --vertices 2000 -o lungs.ply; supine precompute lungs.ply --band 3 -o lungs.safetensors
+  supine deform lungs.safetensors --posture prone -o prone.vtp
+  gcc -o example example.c $(pkg-config --cflags --libs supine-runtime) && ./example lungs.safetensors prone 500
+  gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone 500'
+inside 'apt-get purge -y -qq supine >/dev/null 2>&1'
+inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*" ! -path "/var/log/*"' >"$root/after"
+cmp "$root/before" "$root/after"
+echo "installed, run, compiled against and purged: nothing is left"

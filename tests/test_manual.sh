@@ -1,0 +1,57 @@
+#!/bin/bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What is made from the tables of options: test_manual.sh PROGRAM FOLDER
+set -u
+supine=$1
+cd "$2" || exit 1
+failures=0
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
+[ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
+
+# Every option of --help is in the command's page and both completions.
+for command in $commands; do
+  for option in $("$supine" "$command" --help | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
+    sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
+    grep -A60 "^  $command)$" _supine | sed '/;;/q' | grep -q -- "$option" || fail "_supine: $command $option"
+  done
+  if command -v groff >/dev/null; then
+    said=$(groff -man -Tutf8 -ww -z "supine-$command.1" 2>&1)
+    [ -z "$said" ] || fail "supine-$command.1: $said"
+  fi
+done
+
+# complete WORDS...: what bash offers for the last of them.
+. ./supine.bash
+complete_words() {
+  COMP_WORDS=(supine "$@")
+  COMP_CWORD=$#
+  COMPREPLY=()
+  _supine
+  echo "${COMPREPLY[*]}"
+}
+expect() {
+  wanted=$1
+  shift
+  got=$(complete_words "$@")
+  [ "$got" = "$wanted" ] || fail "$*: '$got', not '$wanted'"
+}
+expect "deform" def
+expect "--posture" deform lungs.safetensors --pos
+expect "prone" deform lungs.safetensors --posture pr
+expect "linear" precompute --route l
+expect "" precompute --band 3
+cd "$(mktemp -d)" && : >lungs.ply
+expect "lungs.ply" precompute lu
+expect "lungs.ply" precompute -o lu
+expect "lungs.ply" precompute --fields lu
+rm -r "$PWD"
+cd "$2" || exit 1
+if command -v zsh >/dev/null; then
+  zsh -n _supine || fail "_supine is no zsh"
+fi
+[ $failures -eq 0 ] || exit 1
