@@ -1,2 +1,3 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(patient supine_patient supine_base supine_gsl)
+supine_test(patient_surface supine_patient supine_phantom supine_mesh_read supine_base supine_gsl)

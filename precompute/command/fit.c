@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "precompute/patient/patient_file.h"
+#include "precompute/patient/surfaces.h"
 #include "runtime/options/command.h"
 #include "runtime/options/posture_list.h"
 
@@ -14,7 +15,9 @@ typedef struct request {
   const char *path, *landmarks, *name;
   bool reverse, translation, rigid, has_law, has_midline, has_gain, json;
   int law;
-  double midline, gain;
+  double midline, gain, reach;
+  supine_mesh_load_options load;
+
   supine_patient_scan rest, state;
 } request;
 
@@ -41,6 +44,8 @@ static int read_scan(const char *command, const char *text, void *field) {
   return SUPINE_EXIT_OK;
 }
 
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
 #define FILLS(member) SUPINE_FILLS(request, member)
 
 static const supine_option table[] = {
@@ -50,7 +55,7 @@ static const supine_option table[] = {
      "matched points, mm, LPS: CSV with the columns x,y,z,to_x,to_y,to_z (from rest to the other "
      "state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from 2 to "
      "1)",
-     FILLS(landmarks), .required = true, .file = SUPINE_FILE_IN},
+     FILLS(landmarks), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "rest is the other one of the two", FILLS(reverse)},
     {"rest", 0, "POSTURE[:VOLUME]",
      "how the person lay at rest, and how full the lungs were: full, rest or mL", FILLS(rest),
@@ -74,6 +79,11 @@ static const supine_option table[] = {
      FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
+    {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
+     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {"reach", 0, "MM",
+     "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
+     .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
@@ -115,11 +125,24 @@ static void print_paper_law(const supine_patient *patient,
                report->starts_agreeing, SUPINE_PATIENT_STARTS, report->start_apart);
 }
 
+static void print_surface(const supine_patient_surface_report *surface, bool landmarks) {
+  (void)printf("surface: %zu vertices, %.0f %% of them matched; to the other surface, along its "
+               "normals,\n  %.2f mm RMS at rest, %.2f mm in the end; six starts end within %.2g mm "
+               "of each other\n",
+               surface->vertices, 100.0 * surface->matched, surface->before, surface->after,
+               surface->point_apart);
+  if (!landmarks) {
+    (void)puts("a small distance between surfaces does not prove the motion of what is in them:\n"
+               "  surfaces 5 mm apart have had points 14 mm off. Landmarks tell: --landmarks");
+  }
+}
+
 static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
                        const request *wanted) {
   const supine_patient *patient = &record->patient;
   const bool moved = wanted->translation || wanted->rigid;
-  (void)printf("%zu landmarks in %zu blocks of 40 mm\n", report->count, report->blocks);
+  (void)printf("%zu %s in %zu blocks of 40 mm\n", report->count,
+               report->components == 3 ? "landmarks" : "measurements", report->blocks);
   print_scores(report, patient->law);
   if (moved) {
     const double *t = patient->motion;
@@ -147,8 +170,100 @@ static void print_text(const supine_patient_record *record, const supine_patient
   }
 }
 
-static supine_status fit(const request *wanted, const char *made_by, supine_patient_record *record,
-                         supine_patient_fit_report *report, supine_error *error) {
+/* "left.ply,right.ply" as one model. */
+static supine_status load_lungs(const request *wanted, const char *operand, supine_lungs *lungs,
+                                supine_error *error) {
+  enum { FILES_MAX = 2 };
+  supine_mesh meshes[FILES_MAX] = {0};
+  size_t count = 0;
+  char *names = strdup(operand);
+  char *rest = names;
+  supine_status status = names == NULL
+                             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name")
+                             : SUPINE_OK;
+  for (char *path; status == SUPINE_OK && (path = strsep(&rest, ",")) != NULL;) {
+    status =
+        count == FILES_MAX
+            ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s': two lungs at most", operand)
+            : supine_mesh_load(path, &wanted->load, &meshes[count++], NULL, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_lungs_create(meshes, count, wanted->has_midline ? &wanted->midline : NULL,
+                                 lungs, error);
+  }
+  for (size_t i = 0; i < FILES_MAX; ++i) {
+    supine_mesh_free(&meshes[i]);
+  }
+  free(names);
+  return status;
+}
+
+static supine_status fit_surfaces(const request *wanted, const supine_arguments *given,
+                                  const supine_patient_pairs *pairs,
+                                  const supine_patient_fit_options *options,
+                                  supine_patient *patient, supine_patient_fit_report *report,
+                                  supine_patient_surface_report *surface, supine_error *error) {
+  supine_lungs rest = {0};
+  supine_lungs state = {0};
+  supine_model model = supine_physics_model_default();
+  model.reach = wanted->reach;
+  supine_status status = load_lungs(wanted, given->operand[0], &rest, error);
+  if (status == SUPINE_OK) {
+    status = load_lungs(wanted, given->operand[1], &state, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_patient_fit_surface(&rest, &state.mesh, &model, pairs, options, patient, report,
+                                        surface, error);
+  }
+  supine_lungs_free(&rest);
+  supine_lungs_free(&state);
+  return status;
+}
+
+static supine_status fit_landmarks(const request *wanted, const supine_patient_pairs *pairs,
+                                   const supine_patient_fit_options *options,
+                                   supine_patient *patient, supine_patient_fit_report *report,
+                                   supine_error *error) {
+  const supine_patient_frame frame = supine_patient_frame_of_points(
+      pairs->count, pairs->from, wanted->has_midline ? &wanted->midline : NULL);
+  supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
+  if (rows == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
+                            pairs->count);
+  }
+  supine_patient_rows_of_pairs(&frame, pairs, rows);
+  const supine_status status =
+      supine_patient_fit(&frame, rows, pairs->count, 3, options, patient, report, error);
+  free(rows);
+  return status;
+}
+
+static void keep(const request *wanted, const supine_arguments *given,
+                 const supine_patient_fit_report *report, supine_patient_record *record) {
+  const supine_patient_law law = record->patient.law;
+  const supine_patient_scores *held = &report->held_out;
+  const char *source = wanted->landmarks != NULL ? wanted->landmarks : given->operand[1];
+  const char *slash = strrchr(source, '/');
+  (void)snprintf(record->name, sizeof record->name, "%s",
+                 wanted->name != NULL ? wanted->name
+                 : slash != NULL      ? slash + 1
+                                      : source);
+  record->rest = wanted->rest;
+  record->state = wanted->state;
+  record->from_surface = given->count > 0;
+  record->inflation = supine_patient_inflation(&record->patient);
+  record->force = supine_patient_force(
+      &record->patient, wanted->has_gain ? wanted->gain : usual_gain, wanted->state.gravity);
+  record->points = report->count;
+  record->held_out = held->law[law];
+  record->held_out_baseline = wanted->translation || wanted->rigid ? held->translation : held->none;
+  record->fitted = report->fitted.law[law];
+  record->explained = report->explained;
+}
+
+static supine_status fit(const request *wanted, const supine_arguments *given,
+                         supine_patient_record *record, supine_patient_fit_report *report,
+                         supine_patient_surface_report *surface, supine_error *error) {
   const supine_patient_fit_options options = {.law_given = wanted->has_law,
                                               .law = (supine_patient_law)wanted->law,
                                               .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
@@ -156,48 +271,25 @@ static supine_status fit(const request *wanted, const char *made_by, supine_pati
                                                            ? SUPINE_PATIENT_TRANSLATION
                                                            : SUPINE_PATIENT_STILL};
   supine_patient_pairs pairs = {0};
-  supine_patient_row *rows = NULL;
-  supine_status status =
-      supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &pairs, error);
-  if (status == SUPINE_OK) {
-    status = supine_patient_pairs_check(&pairs, options.moved != SUPINE_PATIENT_STILL, error);
-  }
-  if (status == SUPINE_OK) {
-    const supine_patient_frame frame = supine_patient_frame_of_points(
-        pairs.count, pairs.from, wanted->has_midline ? &wanted->midline : NULL);
-    rows = malloc(3 * pairs.count * sizeof *rows);
-    if (rows == NULL) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks", pairs.count);
-    } else {
-      supine_patient_rows_of_pairs(&frame, &pairs, rows);
-      status = supine_patient_fit(&frame, rows, pairs.count, 3, &options, &record->patient, report,
-                                  error);
+  supine_status status = SUPINE_OK;
+  if (wanted->landmarks != NULL) {
+    status = supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &pairs, error);
+    if (status == SUPINE_OK) {
+      status = supine_patient_pairs_check(&pairs, options.moved != SUPINE_PATIENT_STILL, error);
     }
   }
   if (status == SUPINE_OK) {
-    const supine_patient_scores *held = &report->held_out;
-    const bool moved = options.moved != SUPINE_PATIENT_STILL;
-    const char *slash = strrchr(wanted->landmarks, '/');
-    (void)snprintf(record->name, sizeof record->name, "%s",
-                   wanted->name != NULL ? wanted->name
-                   : slash != NULL      ? slash + 1
-                                        : wanted->landmarks);
-    record->rest = wanted->rest;
-    record->state = wanted->state;
-    record->inflation = supine_patient_inflation(&record->patient);
-    record->force = supine_patient_force(
-        &record->patient, wanted->has_gain ? wanted->gain : usual_gain, wanted->state.gravity);
-    record->points = pairs.count;
-    record->held_out = held->law[record->patient.law];
-    record->held_out_baseline = moved ? held->translation : held->none;
-    record->fitted = report->fitted.law[record->patient.law];
-    record->explained = report->explained;
+    status = given->count > 0
+                 ? fit_surfaces(wanted, given, pairs.count > 0 ? &pairs : NULL, &options,
+                                &record->patient, report, surface, error)
+                 : fit_landmarks(wanted, &pairs, &options, &record->patient, report, error);
+  }
+  if (status == SUPINE_OK) {
+    keep(wanted, given, report, record);
     if (wanted->path != NULL) {
-      status = supine_patient_write(wanted->path, record, report, made_by, error);
+      status = supine_patient_write(wanted->path, record, report, given->made_by, error);
     }
   }
-  free(rows);
   supine_patient_pairs_free(&pairs);
   return status;
 }
@@ -206,8 +298,13 @@ static int run(void *chosen, const supine_arguments *given) {
   const request *wanted = chosen;
   supine_patient_record record = {0};
   supine_patient_fit_report report;
+  supine_patient_surface_report surface = {0};
   supine_error error;
-  if (fit(wanted, given->made_by, &record, &report, &error) != SUPINE_OK) {
+  if (given->count == 1 || (given->count == 0 && wanted->landmarks == NULL)) {
+    return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
+                                      "and the one in the other state, or both");
+  }
+  if (fit(wanted, given, &record, &report, &surface, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   if (wanted->json) {
@@ -215,6 +312,9 @@ static int run(void *chosen, const supine_arguments *given) {
     (void)puts(text != NULL ? text : "{}");
     free(text);
   } else {
+    if (given->count > 0) {
+      print_surface(&surface, wanted->landmarks != NULL);
+    }
     print_text(&record, &report, wanted);
   }
   return supine_options_finish(name);
@@ -223,7 +323,8 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_fit = {
     name,
     "a person's own law, from scans and landmarks",
-    .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]",
+    .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
+             "REST STATE -o patient.json [OPTIONS]",
     .about =
         "Fits how one person's lungs move to matched points of two scans, and says how much of "
         "the motion of points that it has not seen each law explains. 'supine precompute "
@@ -234,7 +335,7 @@ const supine_command supine_command_fit = {
              "--other supine:full -o patient.json\n"
              "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
-    .operands_most = 0,
-    .operands_missing = "landmarks are named by --landmarks",
+    .operands_most = 2,
+    .operands_missing = "one surface at rest and one in the other state",
     .request_size = sizeof(request),
     .run = run};

@@ -212,8 +212,8 @@ static supine_status take_patient(const supine_lungs *lungs, request *wanted, ch
                             lungs->mesh.vertex_count);
   }
   status = supine_patient_directions(&record, lungs, &model->model, model->vectors, error);
-  model->model.direction =
-      (supine_direction_law){.model = SUPINE_DIRECTION_VECTORS, .vectors = model->vectors};
+  model->model.direction.model = SUPINE_DIRECTION_VECTORS;
+  model->model.direction.vectors = model->vectors;
   wanted->basis.patient = *text;
   if (status == SUPINE_OK) {
     (void)snprintf(wanted->summary, sizeof wanted->summary,

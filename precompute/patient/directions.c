@@ -103,7 +103,7 @@ supine_status supine_patient_directions(const supine_patient_record *record,
     model->force.box[k] = record->force.box[k];
   }
   supine_model one_way = *model;
-  one_way.direction = (supine_direction_law){.model = SUPINE_DIRECTION_NORMAL};
+  one_way.direction = supine_physics_direction_law_default();
   status = supine_physics_solve(lungs, &one_way, record->state.gravity, &solution, error);
   for (size_t i = 0; i < lungs->mesh.vertex_count && status == SUPINE_OK; ++i) {
     double u[3];
@@ -114,9 +114,15 @@ supine_status supine_patient_directions(const supine_patient_record *record,
                                 i, solution.catch_[i]);
       break;
     }
-    supine_patient_displacement(&record->patient, lungs->mesh.vertices + 3 * i, u);
+    const double *p = lungs->mesh.vertices + 3 * i;
+    const bool as_it_is = record->patient.law == SUPINE_PATIENT_PAPER && record->from_surface;
+    if (as_it_is) { /* fitted with this very force */
+      supine_patient_paper_direction(&record->patient, p, u);
+    } else {
+      supine_patient_displacement(&record->patient, p, u);
+    }
     for (size_t k = 0; k < 3; ++k) {
-      directions[3 * i + k] = record->inflation * u[k] / solution.catch_[i];
+      directions[3 * i + k] = record->inflation * u[k] / (as_it_is ? 1.0 : solution.catch_[i]);
     }
   }
   supine_physics_solution_free(&solution);

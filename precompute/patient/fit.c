@@ -17,6 +17,8 @@ enum {
   SEEDS = SUPINE_PATIENT_SEEDS,
   RIDGES = 5,
   REPLICATES = 100, /* of the bootstrap: a standard error is known to 7 % */
+  FIT_STEPS = 200,
+  REFIT_STEPS = 30,
   POLYNOMIAL = SUPINE_PATIENT_POLYNOMIAL
 };
 
@@ -165,10 +167,10 @@ static double quadratic_held_out(const study *s) {
 static supine_status refit(const study *s, const supine_patient_row *rows, size_t count,
                            bool afresh, supine_patient_power *fit) {
   supine_patient_power other;
-  supine_status status =
-      supine_patient_power_fit(rows, count, s->moved, s->power.powers, refit_tolerance, fit, NULL);
+  supine_status status = supine_patient_power_fit(rows, count, s->moved, s->power.powers,
+                                                  REFIT_STEPS, refit_tolerance, fit, NULL);
   if (afresh && status == SUPINE_OK) {
-    status = supine_patient_power_fit(rows, count, s->moved, supine_patient_starts[0],
+    status = supine_patient_power_fit(rows, count, s->moved, supine_patient_starts[0], REFIT_STEPS,
                                       refit_tolerance, &other, NULL);
     if (other.squares < fit->squares) {
       *fit = other;
@@ -287,8 +289,9 @@ static supine_status fit_power(study *s, double weight, supine_patient_fit_repor
   supine_patient_power fits[SUPINE_PATIENT_STARTS];
   size_t best = 0;
   for (size_t k = 0; k < SUPINE_PATIENT_STARTS; ++k) {
-    const supine_status status = supine_patient_power_fit(
-        s->rows, s->row_count, s->moved, supine_patient_starts[k], fit_tolerance, &fits[k], error);
+    const supine_status status =
+        supine_patient_power_fit(s->rows, s->row_count, s->moved, supine_patient_starts[k],
+                                 FIT_STEPS, fit_tolerance, &fits[k], error);
     if (status != SUPINE_OK) {
       return status;
     }

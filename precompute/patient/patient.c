@@ -70,16 +70,24 @@ static void clamp(const double box[3], double inside[3], double beyond[3]) {
   }
 }
 
-static void paper(const supine_patient *patient, const supine_patient_place *place, double u[3]) {
+void supine_patient_paper_direction(const supine_patient *patient, const double point[3],
+                                    double d[3]) {
+  const supine_patient_place place = supine_patient_find(&patient->frame, point);
+  const double *c = patient->powers;
+  double box[3];
+  double beyond[3];
+  clamp(place.box, box, beyond);
+  d[0] = place.side * patient->lengths[0] * pow(box[0], c[0]); /* (15) */
+  d[1] = -patient->lengths[1] * pow(box[1], c[1]);             /* (16) */
+  d[2] = -patient->lengths[2] * pow(box[2], c[2]);             /* (17) */
+}
+
+static double paper_force(const supine_patient *patient, const supine_patient_place *place) {
+  const double *c = patient->powers + 3;
   double box[3];
   double beyond[3];
   clamp(place->box, box, beyond);
-  const double *c = patient->powers;
-  const double force =
-      1.0 + c[3] * (box[0] - 0.5) + c[4] * (box[1] - 0.5) + c[5] * (box[2] - 0.5); /* (18) */
-  u[0] = place->side * patient->lengths[0] * force * pow(box[0], c[0]);            /* (15) */
-  u[1] = -patient->lengths[1] * force * pow(box[1], c[1]);                         /* (16) */
-  u[2] = -patient->lengths[2] * force * pow(box[2], c[2]);                         /* (17) */
+  return 1.0 + c[0] * (box[0] - 0.5) + c[1] * (box[1] - 0.5) + c[2] * (box[2] - 0.5); /* (18) */
 }
 
 static void polynomial(const supine_patient *patient, const supine_patient_place *place,
@@ -118,7 +126,11 @@ void supine_patient_displacement(const supine_patient *patient, const double poi
                                  double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point);
   if (patient->law == SUPINE_PATIENT_PAPER) {
-    paper(patient, &place, u);
+    const double force = paper_force(patient, &place);
+    supine_patient_paper_direction(patient, point, u);
+    for (int a = 0; a < 3; ++a) {
+      u[a] *= force;
+    }
     return;
   }
   double motion[3];

@@ -82,6 +82,10 @@ supine_patient_frame supine_patient_frame_of_points(size_t count, const double *
  * its nearest face, polynomials in a straight line from there. */
 void supine_patient_displacement(const supine_patient *patient, const double point[3], double u[3]);
 
+/** (15)-(17) of the paper's law at a point, without the force, mm. */
+void supine_patient_paper_direction(const supine_patient *patient, const double point[3],
+                                    double d[3]);
+
 /** The motion between the scans at a point, mm. */
 void supine_patient_motion(const supine_patient *patient, const double point[3], double u[3]);
 

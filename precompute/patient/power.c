@@ -10,11 +10,11 @@
 
 #include "precompute/patient/rows.h"
 
-enum { P = SUPINE_PATIENT_POWERS, LINEAR_MAX = 9, STEPS_MAX = 100 };
+enum { P = SUPINE_PATIENT_POWERS, LINEAR_MAX = 9 };
 
 /* Exponents beyond these bend all motion into a face; slopes beyond let the force change sign. */
 const double supine_patient_exponent_least = 0.5, supine_patient_exponent_most = 4.0,
-             supine_patient_slope_most = 1.2;
+             supine_patient_slope_most = 2.5;
 
 /* Pulls what the data leave open (mm^2 for a factor of e) towards a common exponent and an even
  * force; what they do say outweighs it by orders of magnitude. */
@@ -85,13 +85,16 @@ typedef struct problem {
   double *design;      /* [count, LINEAR_MAX] */
   double *logs;        /* [count, 3] */
   double linear[LINEAR_MAX];
+  double factor[LINEAR_MAX * LINEAR_MAX]; /* of their normal equations, scaled (Cholesky) */
+  double scale[LINEAR_MAX];
 } problem;
 
 /* The best linear unknowns at some powers. */
 static bool solve_linear(problem *p, const double powers[P]) {
   const size_t m = p->linear_count;
-  double matrix[LINEAR_MAX * LINEAR_MAX] = {0};
-  double scale[LINEAR_MAX];
+  double *matrix = p->factor;
+  double *scale = p->scale;
+  memset(matrix, 0, sizeof p->factor);
   memset(p->linear, 0, sizeof p->linear);
   for (size_t i = 0; i < p->count; ++i) {
     double *design = p->design + LINEAR_MAX * i;
@@ -153,6 +156,67 @@ static int residuals(const gsl_vector *q, void *context, gsl_vector *left) {
   return GSL_SUCCESS;
 }
 
+/* Derivatives of the residuals by the unbounded variables, as if the linear unknowns' part in them
+ * were the projection of what the design changes by (Kaufman):
+ *
+ *     J = (1 - D (D^T W D)^-1 D^T W) dD/dq c */
+static int derivatives(const gsl_vector *q, void *context, gsl_matrix *jacobian) {
+  problem *p = context;
+  const size_t m = p->linear_count;
+  double powers[P];
+  double by_q[P];
+  double projected[LINEAR_MAX * P] = {0};
+  bound(q, powers);
+  if (!solve_linear(p, powers)) {
+    return GSL_EDOM;
+  }
+  for (size_t k = 0; k < P; ++k) {
+    double range[2];
+    range_of(k, range);
+    by_q[k] = 0.5 * (range[1] - range[0]) * cos(gsl_vector_get(q, k));
+  }
+  for (size_t i = 0; i < p->count; ++i) {
+    const supine_patient_row *row = &p->rows[i];
+    const double *design = p->design + LINEAR_MAX * i;
+    const double *logs = p->logs + 3 * i;
+    const double root = sqrt(row->weight);
+    const double force = row->force[0] + powers[3] * row->force[1] + powers[4] * row->force[2] +
+                         powers[5] * row->force[3];
+    const double moved =
+        design[0] * p->linear[0] + design[1] * p->linear[1] + design[2] * p->linear[2];
+    for (size_t k = 0; k < P; ++k) {
+      const double change = k < 3          ? design[k] * logs[k] * p->linear[k]
+                            : force != 0.0 ? moved / force * row->force[k - 2]
+                                           : 0.0;
+      gsl_matrix_set(jacobian, i, k, root * change * by_q[k]);
+      for (size_t a = 0; a < m; ++a) {
+        projected[a * P + k] += row->weight * design[a] * p->scale[a] * change * by_q[k];
+      }
+    }
+  }
+  if (LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', (lapack_int)m, P, p->factor, (lapack_int)m, projected,
+                     P) != 0) {
+    return GSL_EDOM;
+  }
+  for (size_t i = 0; i < p->count; ++i) {
+    const double *design = p->design + LINEAR_MAX * i;
+    const double root = sqrt(p->rows[i].weight);
+    double *row = gsl_matrix_ptr(jacobian, i, 0);
+    for (size_t a = 0; a < m; ++a) {
+      for (size_t k = 0; k < P && design[a] != 0.0; ++k) {
+        row[k] -= root * design[a] * p->scale[a] * projected[a * P + k];
+      }
+    }
+  }
+  for (size_t j = 0; j < P; ++j) {
+    for (size_t k = 0; k < P; ++k) {
+      gsl_matrix_set(jacobian, p->count + j, k,
+                     j != k ? 0.0 : sqrt(pull) * by_q[k] / (k < 3 ? powers[k] : 1.0));
+    }
+  }
+  return GSL_SUCCESS;
+}
+
 static void take(problem *p, const gsl_vector *q, supine_patient_power *fit) {
   memset(fit, 0, sizeof *fit);
   bound(q, fit->powers);
@@ -171,7 +235,7 @@ static void take(problem *p, const gsl_vector *q, supine_patient_power *fit) {
 
 supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t count,
                                        supine_patient_moved moved, const double powers[P],
-                                       double tolerance, supine_patient_power *fit,
+                                       size_t steps, double tolerance, supine_patient_power *fit,
                                        supine_error *error) {
   gsl_multifit_nlinear_parameters settings = gsl_multifit_nlinear_default_parameters();
   settings.trs = gsl_multifit_nlinear_trs_lm;
@@ -184,7 +248,7 @@ supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t co
                .design = malloc(LINEAR_MAX * count * sizeof(double)),
                .logs = malloc(3 * count * sizeof(double))};
   gsl_multifit_nlinear_fdf system = {
-      .f = residuals, .n = count + P, .p = P, .params = &p}; /* derivatives by differences */
+      .f = residuals, .df = derivatives, .n = count + P, .p = P, .params = &p};
   gsl_multifit_nlinear_workspace *work =
       gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &settings, count + P, P);
   gsl_vector *q = gsl_vector_alloc(P);
@@ -204,7 +268,7 @@ supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t co
     goto cleanup;
   }
   /* Steps that no longer help are how it ends at a bound: what counts is where it stands. */
-  (void)gsl_multifit_nlinear_driver(STEPS_MAX, tolerance, tolerance, 0.0, NULL, NULL, &info, work);
+  (void)gsl_multifit_nlinear_driver(steps, tolerance, tolerance, 0.0, NULL, NULL, &info, work);
   take(&p, gsl_multifit_nlinear_position(work), fit);
 cleanup:
   if (q != NULL) {

@@ -50,12 +50,14 @@ extern const double supine_patient_starts[SUPINE_PATIENT_STARTS][SUPINE_PATIENT_
 /* Variable projection: what is linear is solved for at each step of the rest (GSL's
  * multifit_nlinear, Levenberg-Marquardt).
  * @param powers     where to start
+ * @param steps      at most
  * @param tolerance  of the unknowns' relative change in a step
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t count,
                                        supine_patient_moved moved,
-                                       const double powers[SUPINE_PATIENT_POWERS], double tolerance,
-                                       supine_patient_power *fit, supine_error *error);
+                                       const double powers[SUPINE_PATIENT_POWERS], size_t steps,
+                                       double tolerance, supine_patient_power *fit,
+                                       supine_error *error);
 
 /* What a fit leaves of a row, mm. */
 double supine_patient_power_residual(const supine_patient_power *fit,

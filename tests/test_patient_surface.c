@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A patient's law from surfaces: a known one is found again; what is refused. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_randist.h>
+#include <gsl/gsl_rng.h>
+
+#include "precompute/patient/patient_file.h"
+#include "precompute/patient/surfaces.h"
+#include "precompute/physics/solve.h"
+
+#include "lungs_helpers.h"
+
+static const double supine_gravity[3] = {0.0, 1.0, 0.0};
+
+/* The truth: c1 to c6, and (18) as it is supine. */
+static supine_model truth(void) {
+  supine_model model = supine_physics_model_default();
+  model.reach = 10.0;
+  model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
+  model.direction =
+      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
+  return model;
+}
+
+/* Where the truth puts the vertices, [N, 3]. */
+static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
+  const supine_model model = truth();
+  supine_solution solution = {0};
+  supine_error error;
+  double *positions = malloc(3 * lungs->mesh.vertex_count * sizeof *positions);
+  assert_int_equal(supine_physics_solve(lungs, &model, supine_gravity, &solution, &error),
+                   SUPINE_OK);
+  supine_physics_solution_apply(&solution, &lungs->mesh, 1.0, positions);
+  *largest = supine_physics_solution_largest(&solution);
+  supine_physics_solution_free(&solution);
+  return positions;
+}
+
+static void test_known_law_is_found_from_another_meshing(void **state_) {
+  (void)state_;
+  static const char *const coarse[] = {"lungs/chaste_left_5k.obj"};
+  static const char *const fine[] = {"lungs/chaste_left.ply"};
+  supine_lungs rest = {0};
+  supine_lungs other = {0};
+  if (!helper_real_lungs(coarse, 1, SUPINE_AXES_LPS, &rest) ||
+      !helper_real_lungs(fine, 1, SUPINE_AXES_LPS, &other)) {
+    supine_lungs_free(&rest);
+    skip();
+  }
+  double largest = 0.0;
+  double *expected = moved_by_truth(&rest, &largest);
+  double *target = moved_by_truth(&other, &largest);
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  gsl_rng_set(random, 271);
+  supine_mesh state = other.mesh;
+  for (size_t i = 0; i < 3 * state.vertex_count; ++i) {
+    target[i] += gsl_ran_gaussian(random, 0.5);
+  }
+  gsl_rng_free(random);
+  state.vertices = target;
+
+  const supine_model model = truth(); /* its stiffness and reach are known; the rest is found */
+  const supine_patient_fit_options options = {0};
+  supine_patient patient;
+  supine_patient_fit_report report;
+  supine_patient_surface_report surface;
+  supine_error error = {0};
+  if (supine_patient_fit_surface(&rest, &state, &model, NULL, &options, &patient, &report, &surface,
+                                 &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  /* As a basis would move it. */
+  supine_patient_record record = {
+      .patient = patient, .state = {"supine", "", {0.0, 1.0, 0.0}}, .from_surface = true};
+  record.inflation = supine_patient_inflation(&patient);
+  record.force = supine_patient_force(&patient, 0.4, supine_gravity);
+  double *directions = malloc(3 * rest.mesh.vertex_count * sizeof *directions);
+  supine_model found = truth();
+  assert_int_equal(supine_patient_directions(&record, &rest, &found, directions, &error),
+                   SUPINE_OK);
+  found.direction.model = SUPINE_DIRECTION_VECTORS;
+  found.direction.vectors = directions;
+  supine_solution solution = {0};
+  assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),
+                   SUPINE_OK);
+  double *positions = malloc(3 * rest.mesh.vertex_count * sizeof *positions);
+  supine_physics_solution_apply(&solution, &rest.mesh, record.inflation, positions);
+  double square = 0.0;
+  for (size_t i = 0; i < 3 * rest.mesh.vertex_count; ++i) {
+    square += pow(positions[i] - expected[i], 2.0) / (double)rest.mesh.vertex_count;
+  }
+  double c[SUPINE_PATIENT_CONSTANTS];
+  supine_patient_constants(&patient, c);
+  printf("largest move %.1f mm; points %.3f mm RMS off, starts %.3f mm apart; surface %.2f -> %.2f "
+         "mm\n",
+         largest, sqrt(square), surface.point_apart, surface.before, surface.after);
+  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
+    printf(" c%zu %.3f +- %.3f", k + 1, c[k], report.error[k]);
+  }
+  printf("\n");
+  assert_true(sqrt(square) <= 0.15);
+  assert_true(surface.point_apart <= 0.15);
+  supine_physics_solution_free(&solution);
+  free(directions);
+  free(positions);
+  free(expected);
+  free(target);
+  supine_lungs_free(&rest);
+  supine_lungs_free(&other);
+}
+
+static void refused(const supine_lungs *rest, const supine_mesh *state, const char *words) {
+  const supine_model model = truth();
+  const supine_patient_fit_options options = {0};
+  supine_patient patient;
+  supine_patient_fit_report report;
+  supine_patient_surface_report surface;
+  supine_error error = {0};
+  assert_int_equal(supine_patient_fit_surface(rest, state, &model, NULL, &options, &patient,
+                                              &report, &surface, &error),
+                   SUPINE_ERROR_MESH);
+  if (strstr(error.message, words) == NULL) {
+    fail_msg("'%s' does not say '%s'", error.message, words);
+  }
+}
+
+static void test_other_frames_units_and_sides_are_refused(void **state_) {
+  (void)state_;
+  supine_mesh lump = helper_lump(7, 70.3, 5);
+  supine_lungs rest = {0};
+  supine_error error;
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &rest, &error), SUPINE_OK);
+  supine_mesh state = rest.mesh;
+  state.vertices = malloc(3 * state.vertex_count * sizeof(double));
+  const size_t n = 3 * state.vertex_count;
+  memcpy(state.vertices, rest.mesh.vertices, n * sizeof(double));
+  refused(&rest, &state, "the same as the one at rest");
+  for (size_t i = 0; i < n; ++i) {
+    state.vertices[i] = 0.1 * rest.mesh.vertices[i];
+  }
+  refused(&rest, &state, "different units");
+  for (size_t i = 0; i < n; ++i) {
+    state.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
+  }
+  refused(&rest, &state, "do not overlap along z");
+  for (size_t i = 0; i < n; ++i) { /* the other side of the chest */
+    state.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
+  }
+  refused(&rest, &state, "do not overlap along x");
+  uint32_t *inwards = malloc(3 * state.triangle_count * sizeof *inwards);
+  for (size_t t = 0; t < state.triangle_count; ++t) {
+    inwards[3 * t] = state.triangles[3 * t];
+    inwards[3 * t + 1] = state.triangles[3 * t + 2];
+    inwards[3 * t + 2] = state.triangles[3 * t + 1];
+  }
+  for (size_t i = 0; i < n; ++i) {
+    state.vertices[i] = 1.05 * rest.mesh.vertices[i];
+  }
+  state.triangles = inwards;
+  refused(&rest, &state, "facing the same way");
+  free(inwards);
+  free(state.vertices);
+  supine_mesh_free(&lump);
+  supine_lungs_free(&rest);
+}
+
+int main(void) {
+  static const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_known_law_is_found_from_another_meshing),
+      cmocka_unit_test(test_other_frames_units_and_sides_are_refused)};
+  (void)gsl_set_error_handler_off();
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
