@@ -11,6 +11,7 @@ endfunction()
 
 supine_stream_test(gravity)
 supine_stream_test(poses)
+supine_stream_test(server supine_base Threads::Threads)
 
 # The protocol's public library is what bytes and behaviour are held against.
 find_library(IGTL_LIBRARY OpenIGTLink)

@@ -233,6 +233,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
       (void)printf("listening on port %d\n", supine_stream_server_port(server));
     }
     (void)fflush(stdout);
+    supine_options_signals_catch(true);
     status = supine_stream_server_run(server, error);
     (void)fputs(options->shown != NULL ? "\n" : "", stderr);
     report(server, wanted);

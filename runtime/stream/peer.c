@@ -26,7 +26,7 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
   memset(peer, 0, sizeof *peer);
   peer->socket = socket;
   peer->connecting = connecting;
-  peer->stirred = peer->heard = now;
+  peer->took = peer->said = peer->heard = now;
   peer->body = body;
   peer->what = what;
   peer->version = 1;
@@ -104,7 +104,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
         return SUPINE_STREAM_DONE;
       }
       share -= (size_t)got;
-      peer->stirred = now;
+      peer->said = now;
     }
     if (peer->skip > 0) {
       peer->skip -= (uint64_t)got;
@@ -145,7 +145,7 @@ bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *fra
   peer->begun = frame->number;
   peer->frame = frame;
   peer->sent = 0;
-  peer->stirred = now;
+  peer->took = now;
   ++frame->users;
   return true;
 }
@@ -178,7 +178,7 @@ supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double n
     }
     peer->sent += (size_t)sent;
     share -= (size_t)sent;
-    peer->stirred = now;
+    peer->took = now;
   }
   return peer->sent == peer->parcel.size ? SUPINE_STREAM_DONE : SUPINE_STREAM_MORE;
 }

@@ -11,9 +11,9 @@
 #include "runtime/stream/message.h"
 
 typedef struct supine_stream_peer {
-  int socket;      /**< -1: no peer */
-  bool connecting; /**< not yet there */
-  double stirred;  /**< s, when it last took or completed something */
+  int socket;        /**< -1: no peer */
+  bool connecting;   /**< not yet there */
+  double took, said; /**< s, when it last took, and said, something */
   /* what it says */
   unsigned char raw[SUPINE_STREAM_HEADER];
   size_t got; /**< of the header, then of the body */

@@ -107,7 +107,7 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
     return;
   }
   peer->connecting = false;
-  peer->stirred = s->woke;
+  peer->took = peer->said = s->woke;
   ++s->counts.peers;
 }
 
@@ -250,15 +250,16 @@ static void lose_stuck(supine_stream_server *s) {
   const double patience = s->options->patience > 0.0 ? s->options->patience : 20.0;
   for (size_t i = 0; i < s->options->peers; ++i) {
     supine_stream_peer *peer = &s->peer[i];
-    const bool unfinished =
-        peer->socket >= 0 &&
-        (peer->connecting || peer->frame != NULL || peer->got > 0 || peer->in_body ||
-         peer->skip > 0 || (lagging(s, peer) && !supine_stream_peer_ready(peer)));
-    if (unfinished && s->woke - peer->stirred > patience) {
+    if (peer->socket < 0) {
+      continue;
+    }
+    const bool takes = peer->frame != NULL || (lagging(s, peer) && !supine_stream_peer_ready(peer));
+    const bool says = peer->connecting || peer->got > 0 || peer->in_body || peer->skip > 0;
+    if ((takes && s->woke - peer->took > patience) || (says && s->woke - peer->said > patience)) {
       if (!peer->connecting) {
         ++s->counts.lost;
         supine_stream_patient_warn(&s->patient, s->woke,
-                                   "a peer is lost: it has taken nothing for %.0f s", patience);
+                                   "a peer is lost: it has finished nothing for %.3g s", patience);
       }
       end_peer(s, peer);
     }

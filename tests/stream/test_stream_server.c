@@ -1,0 +1,732 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The server against peers of every kind, on this machine's loopback alone: honest, slow, stuck,
+ * vanished, hostile, and many. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "runtime/stream/address.h"
+#include "runtime/stream/crc64.h"
+#include "runtime/stream/server.h"
+#include "sh/base/clock.h"
+#include "tests/runtime_fixture.h"
+
+enum { VERTICES = 6000, MODES = 6, LUNGS = 2 };
+
+/* A server in a thread of its own. */
+typedef struct stage {
+  fixture *made;
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_stream_volume volume;
+  supine_stream_options options;
+  supine_stream_server *server;
+  pthread_t thread;
+  bool running;
+  supine_status status;
+  atomic_bool ending;
+  atomic_uint warnings;
+} stage;
+
+static void count_warning(void *context, const char *text) {
+  (void)text;
+  (void)atomic_fetch_add(&((stage *)context)->warnings, 1);
+}
+
+static bool is_ending(void *context) {
+  return atomic_load(&((stage *)context)->ending);
+}
+
+static void *run(void *context) {
+  stage *s = context;
+  supine_error error;
+  s->status = supine_stream_server_run(s->server, &error);
+  return NULL;
+}
+
+/* The options may be changed between. */
+static stage *stage_create(void) {
+  stage *s = fixture_allocate(1, sizeof *s);
+  size_t size = 0;
+  supine_error error;
+  s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
+  /* Fields that fill the lungs whichever way gravity points: random ones fold some. */
+  for (size_t k = 0; k < MODES; ++k) {
+    double *mode = s->made->mode + 9 * k;
+    for (int i = 1; i < 9; ++i) {
+      mode[i] *= 0.1;
+    }
+    mode[0] = s->made->linear[k] + s->made->linear[MODES + k] > 0.0 ? 3.0 : -3.0;
+  }
+  s->bytes = fixture_bytes(s->made, &size);
+  assert_int_equal(supine_basis_open_memory(s->bytes, size, &s->basis, &error), SUPINE_OK);
+  s->volume = (supine_stream_volume){.fixed = 30.0};
+  s->options = (supine_stream_options){.listen = "0",
+                                       .name = "SUPINE",
+                                       .setup = supine_stream_setup_default(),
+                                       .volume = &s->volume,
+                                       .rate = 1000.0,
+                                       .peers = 64,
+                                       .seconds = 60.0, /* no test may last longer */
+                                       .warn = count_warning,
+                                       .stop = is_ending,
+                                       .context = s};
+  return s;
+}
+
+static int stage_run(stage *s) {
+  supine_error error = {.status = SUPINE_OK};
+  assert_int_equal(supine_stream_server_create(s->basis, &s->options, &s->server, &error),
+                   SUPINE_OK);
+  assert_int_equal(pthread_create(&s->thread, NULL, run, s), 0);
+  s->running = true;
+  return supine_stream_server_port(s->server);
+}
+
+/* Ends the thread; the counts may be read then. */
+static supine_stream_counts stage_end(stage *s) {
+  atomic_store(&s->ending, true);
+  assert_int_equal(pthread_join(s->thread, NULL), 0);
+  s->running = false;
+  assert_int_equal(s->status, SUPINE_OK);
+  return *supine_stream_server_counts(s->server);
+}
+
+static void stage_destroy(stage *s) {
+  if (s->running) {
+    (void)stage_end(s);
+  }
+  supine_stream_server_destroy(s->server);
+  supine_basis_close(s->basis);
+  free(s->bytes);
+  fixture_destroy(s->made);
+  free(s);
+}
+
+static void rest(double seconds) {
+  const struct timespec time = {(time_t)seconds, (long)(1e9 * (seconds - floor(seconds)))};
+  (void)nanosleep(&time, NULL);
+}
+
+static int dial(int port) {
+  const int s = socket(AF_INET, SOCK_STREAM, 0);
+  const struct sockaddr_in here = {.sin_family = AF_INET,
+                                   .sin_port = htons((uint16_t)port),
+                                   .sin_addr = {htonl(INADDR_LOOPBACK)}};
+  const struct timeval limit = {10, 0}; /* nothing waits for ever */
+  assert_true(s >= 0);
+  assert_int_equal(setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
+  assert_int_equal(setsockopt(s, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit), 0);
+  assert_int_equal(connect(s, (const struct sockaddr *)&here, sizeof here), 0);
+  return s;
+}
+
+/* Sends all of it; false where the server has hung up. */
+static bool put(int s, const void *bytes, size_t size) {
+  for (size_t sent = 0; sent < size;) {
+    const ssize_t n = send(s, (const unsigned char *)bytes + sent, size - sent, MSG_NOSIGNAL);
+    if (n <= 0) {
+      return false;
+    }
+    sent += (size_t)n;
+  }
+  return true;
+}
+
+static bool get(int s, void *bytes, size_t size) {
+  for (size_t got = 0; got < size;) {
+    const ssize_t n = recv(s, (unsigned char *)bytes + got, size - got, 0);
+    if (n <= 0) {
+      return false;
+    }
+    got += (size_t)n;
+  }
+  return true;
+}
+
+/* Whether the server hangs up, whatever it had sent before. */
+static bool hung_up(int s) {
+  unsigned char waste[4096];
+  ssize_t got = 0;
+  do {
+    got = recv(s, waste, sizeof waste, 0);
+  } while (got > 0);
+  return got == 0 || errno == ECONNRESET;
+}
+
+/* A message into `bytes` (header and body); returns its size. */
+static size_t make_message(const char *type, const char *device, uint64_t stamp, const void *body,
+                           size_t size, unsigned char *bytes) {
+  supine_stream_header header = {
+      .version = 1, .stamp = stamp, .size = size, .crc = supine_stream_crc64(0, body, size)};
+  strcpy(header.type, type);
+  strcpy(header.device, device);
+  supine_stream_header_write(&header, bytes);
+  memcpy(bytes + SUPINE_STREAM_HEADER, body, size);
+  return SUPINE_STREAM_HEADER + size;
+}
+
+/* A direction of gravity as an NDARRAY [3] of 64-bit floats, big-endian. */
+static size_t make_pose(const double down[3], uint64_t stamp, unsigned char bytes[128]) {
+  unsigned char body[28] = {11, 1, 0, 3};
+  for (int i = 0; i < 3; ++i) {
+    uint64_t word;
+    memcpy(&word, &down[i], sizeof word);
+    supine_stream_put32(body + 4 + 8 * i, (uint32_t)(word >> 32));
+    supine_stream_put32(body + 8 + 8 * i, (uint32_t)word);
+  }
+  return make_message("NDARRAY", "Patient", stamp, body, sizeof body, bytes);
+}
+
+static bool send_pose(int s, const double down[3], uint64_t stamp) {
+  unsigned char bytes[128];
+  return put(s, bytes, make_pose(down, stamp, bytes));
+}
+
+static bool say(int s, const char *device, const char *text) {
+  unsigned char body[64] = {0, 3, 0, (unsigned char)strlen(text)};
+  unsigned char bytes[128];
+  memcpy(body + 4, text, strlen(text));
+  return put(s, bytes, make_message("STRING", device, 0, body, 4 + strlen(text), bytes));
+}
+
+/* The next message: its body is dropped but for the first 4096 bytes; false where none comes. */
+static bool hear(int s, supine_stream_header *header, unsigned char body[4096]) {
+  unsigned char raw[SUPINE_STREAM_HEADER];
+  unsigned char waste[4096];
+  supine_error error;
+  if (!get(s, raw, sizeof raw) || supine_stream_header_read(raw, header, &error) != SUPINE_OK) {
+    return false;
+  }
+  size_t left = (size_t)header->size;
+  size_t first = left < 4096 ? left : 4096;
+  uint64_t crc = 0;
+  if (!get(s, body, first)) {
+    return false;
+  }
+  crc = supine_stream_crc64(0, body, first);
+  for (left -= first; left > 0;) {
+    const size_t size = left < sizeof waste ? left : sizeof waste;
+    if (!get(s, waste, size)) {
+      return false;
+    }
+    crc = supine_stream_crc64(crc, waste, size);
+    left -= size;
+  }
+  assert_true(crc == header->crc);
+  return true;
+}
+
+/* Messages until the one of that stamp; how many were passed. Fails where it does not come. */
+static int hear_stamp(int s, uint64_t stamp, supine_stream_header *header,
+                      unsigned char body[4096]) {
+  for (int passed = 0; passed < 100000; ++passed) {
+    assert_true(hear(s, header, body));
+    if (header->stamp == stamp) {
+      return passed;
+    }
+  }
+  fail();
+  return 0;
+}
+
+static float float_at(const unsigned char *bytes) {
+  const uint32_t word =
+      (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
+  float value;
+  memcpy(&value, &word, sizeof value);
+  return value;
+}
+
+/* Weights and scales of a direction and a volume, as they must come. */
+static void expect_weights(const stage *s, const double gravity[3], double volume,
+                           const unsigned char *content) {
+  double weights[MODES];
+  double scale = 0.0;
+  assert_int_equal(supine_basis_weights(s->basis, gravity, weights), SUPINE_OK);
+  assert_int_equal(supine_basis_scale(s->basis, weights, volume, &scale, NULL), SUPINE_OK);
+  const unsigned char head[4] = {10, 1, 0, MODES + LUNGS};
+  assert_memory_equal(content, head, 4);
+  for (int i = 0; i < MODES + LUNGS; ++i) {
+    const double wanted = i < MODES ? weights[i] : scale;
+    assert_true(fabs((double)float_at(content + 4 + 4 * i) - wanted) <= 1e-6 * fabs(wanted) + 1e-9);
+  }
+}
+
+static const double poses[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.6, 0, -0.8}};
+
+static void test_weights_answer_each_pose(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  const int peer = dial(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  for (uint64_t i = 0; i < 40; ++i) {
+    assert_true(send_pose(peer, poses[i % 4], 100 + i));
+    (void)hear_stamp(peer, 100 + i, &header, body);
+    assert_string_equal(header.type, "NDARRAY");
+    assert_string_equal(header.device, "SUPINE");
+    assert_int_equal(header.version, 1);
+    expect_weights(s, poses[i % 4], 30.0, body);
+  }
+  assert_true(say(peer, "VOLUME", "rest-12"));
+  assert_true(send_pose(peer, poses[1], 200));
+  (void)hear_stamp(peer, 200, &header, body);
+  expect_weights(s, poses[1], -12.0, body);
+  (void)close(peer);
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.poses, 41);
+  assert_int_equal(counts.refused + counts.malformed + counts.lost, 0);
+  const supine_stream_latency *latency =
+      supine_stream_server_latency(s->server, SUPINE_STREAM_WEIGHTS);
+  assert_true(latency->count >= 41);
+  assert_true(latency->worst > 0.0);
+  stage_destroy(s);
+}
+
+/* Points of a surface frame, as they must come: triangles with the first, or with all. */
+static void test_surfaces_and_wishes(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  const int peer = dial(stage_run(s));
+  const supine_basis_info *info = supine_basis_get_info(s->basis);
+  supine_stream_header header;
+  unsigned char body[4096];
+  const size_t points = 40 + 12 * info->vertex_count;
+  const size_t whole = points + 16 * info->triangle_count;
+  assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose before the wish */
+  (void)hear_stamp(peer, 1, &header, body);
+  const char *const wishes[] = {"points", "surface"};
+  for (uint64_t w = 0; w < 2; ++w) {
+    assert_true(say(peer, "SEND", wishes[w]));
+    bool first = true;
+    for (uint64_t i = 0; i < 4; ++i) {
+      const uint64_t stamp = 10 * (w + 1) + i;
+      assert_true(send_pose(peer, poses[i], stamp));
+      do { /* a wish is answered with what there is, too */
+        assert_true(hear(peer, &header, body));
+        assert_int_equal(header.size, w == 1 || first ? whole : points);
+        assert_string_equal(header.type, "POLYDATA");
+        first = false;
+      } while (header.stamp != stamp);
+      double weights[MODES];
+      double scales[LUNGS];
+      float xyz[300];
+      assert_int_equal(supine_basis_weights(s->basis, poses[i], weights), SUPINE_OK);
+      assert_int_equal(supine_basis_scale(s->basis, weights, 30.0, &scales[0], NULL), SUPINE_OK);
+      scales[1] = scales[0];
+      supine_deform_range(s->basis, weights, scales, 0, 100, xyz);
+      for (int k = 0; k < 300; ++k) { /* the same numbers, on the same code */
+        assert_true(fabsf(float_at(body + 40 + 4 * k) - xyz[k]) < 1e-4f);
+      }
+    }
+  }
+  assert_true(say(peer, "SEND", "nothing"));
+  assert_true(say(peer, "SEND", "everything")); /* no such thing: as before */
+  assert_true(send_pose(peer, poses[0], 77));
+  rest(0.1);
+  struct pollfd quiet = {peer, POLLIN, 0};
+  assert_int_equal(poll(&quiet, 1, 200), 0);
+  (void)close(peer);
+  stage_destroy(s);
+}
+
+/* Of a thousand poses at once only the newest counts: few frames, and the last is of the last. */
+static void test_newest_pose_wins(void **state) {
+  (void)state;
+  enum { BURST = 1000 };
+  stage *s = stage_create();
+  s->options.rate = 100.0;
+  const int peer = dial(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  unsigned char *burst = fixture_allocate(BURST, 128);
+  size_t size = 0;
+  for (uint64_t i = 0; i < BURST; ++i) {
+    const double angle = 0.001 * (double)i;
+    const double down[3] = {sin(angle), cos(angle), 0};
+    size += make_pose(down, i + 1, burst + size);
+  }
+  assert_true(put(peer, burst, size));
+  const int passed = hear_stamp(peer, BURST, &header, body);
+  assert_true(passed < BURST / 10);
+  const double last[3] = {sin(0.999), cos(0.999), 0};
+  expect_weights(s, last, 30.0, body);
+  free(burst);
+  (void)close(peer);
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.poses, BURST);
+  assert_true(counts.frames < BURST / 10);
+  stage_destroy(s);
+}
+
+/* How many of `count` poses, sent every 2 ms, an honest peer is answered; each by its own frame. */
+static int keep_rate(int peer, int count, uint64_t stamp) {
+  supine_stream_header header;
+  unsigned char body[4096];
+  for (int i = 0; i < count; ++i) {
+    assert_true(send_pose(peer, poses[i % 4], stamp + (uint64_t)i));
+    if (hear_stamp(peer, stamp + (uint64_t)i, &header, body) > 60) {
+      return i;
+    }
+    rest(2e-3);
+  }
+  return count;
+}
+
+/* One that asks for surfaces and never reads, one that vanishes in the middle of a frame, one that
+ * stops in the middle of a message: the honest one is answered every time, and the stuck are lost
+ * after the patience that they are given. */
+static void test_stuck_and_vanished_peers_hold_up_nobody(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  s->options.patience = 0.5;
+  const int port = stage_run(s);
+  const int honest = dial(port);
+  const int stuck = dial(port);
+  const int small = 4096;
+  assert_int_equal(setsockopt(stuck, SOL_SOCKET, SO_RCVBUF, &small, sizeof small), 0);
+  assert_true(say(stuck, "SEND", "surface"));
+  const int vanished = dial(port);
+  assert_true(say(vanished, "SEND", "surface"));
+  const int half = dial(port);
+  assert_true(put(half, "\0\1TRANS", 7));
+  assert_int_equal(keep_rate(honest, 20, 1000), 20);
+  const struct linger reset = {1, 0};
+  assert_int_equal(setsockopt(vanished, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
+  (void)close(vanished);
+  assert_int_equal(keep_rate(honest, 300, 2000), 300); /* past the patience */
+  rest(0.3);
+  (void)close(honest);
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.peers, 4);
+  assert_int_equal(counts.lost, 2); /* stuck, half; who vanishes is no fault */
+  (void)close(stuck);
+  (void)close(half);
+  stage_destroy(s);
+}
+
+static void test_fifty_peers_and_no_more_than_allowed(void **state) {
+  (void)state;
+  enum { MANY = 50 };
+  stage *s = stage_create();
+  s->options.peers = MANY;
+  const int port = stage_run(s);
+  int peer[MANY];
+  supine_stream_header header;
+  unsigned char body[4096];
+  for (int i = 0; i < MANY; ++i) {
+    peer[i] = dial(port);
+    if (i % 5 == 4) {
+      assert_true(say(peer[i], "SEND", "surface"));
+    }
+  }
+  for (uint64_t round = 0; round < 20; ++round) {
+    assert_true(send_pose(peer[round], poses[round % 4], 500 + round));
+    for (int i = 0; i < MANY; ++i) {
+      (void)hear_stamp(peer[i], 500 + round, &header, body);
+    }
+  }
+  const int extra = dial(port); /* one too many: hung up on, without a word */
+  assert_true(hung_up(extra));
+  (void)close(extra);
+  (void)close(peer[0]);
+  rest(0.2);
+  peer[0] = dial(port); /* there is a place again */
+  assert_true(send_pose(peer[0], poses[0], 900));
+  (void)hear_stamp(peer[0], 900, &header, body);
+  for (int i = 0; i < MANY; ++i) {
+    (void)close(peer[i]);
+  }
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.turned_away, 1);
+  assert_int_equal(counts.peers, MANY + 1);
+  stage_destroy(s);
+}
+
+/* Whole messages of every type, each with a few bytes changed: ten thousand. The checksum is put
+ * right for half of them, so that what lies behind it is reached. */
+static void test_ten_thousand_mutated_messages(void **state) {
+  (void)state;
+  enum { COUNT = 10000 };
+  static const struct {
+    const char *type, *device;
+    size_t size;
+    unsigned char begin[12];
+    size_t one[4]; /* where 1.0 begins, as a 32-bit float; 0: nowhere */
+  } seed[] = {{"TRANSFORM", "Patient", 48, {0x3F, 0x80}, {16, 32}},
+              {"QTDATA", "Tracker", 150, {'P', 'a', 't', 'i', 'e', 'n', 't'}, {46, 96, 146}},
+              {"POSITION", "Patient", 28, {0}, {24}},
+              {"NDARRAY", "Patient", 28, {11, 1, 0, 3, 0x3F, 0xF0}, {0}},
+              {"NDARRAY", "VOLUME", 12, {11, 1, 0, 1, 0x40, 0x59}, {0}},
+              {"SENSOR", "Patient", 34, {3}, {0}},
+              {"STRING", "VOLUME", 12, {0, 3, 0, 8, 'r', 'e', 's', 't', '+', '3', '5', '0'}, {0}},
+              {"STRING", "SEND", 11, {0, 3, 0, 7, 's', 'u', 'r', 'f', 'a', 'c', 'e'}, {0}},
+              {"IMAGE", "Camera", 200, {0}, {0}}};
+  stage *s = stage_create();
+  const int port = stage_run(s);
+  const int honest = dial(port);
+  supine_stream_header heard;
+  unsigned char content[4096];
+  uint64_t dice = 20081226;
+  for (int i = 0; i < COUNT; ++i) {
+    const size_t which = (size_t)i % (sizeof seed / sizeof *seed);
+    unsigned char body[256] = {0};
+    unsigned char bytes[SUPINE_STREAM_HEADER + 256];
+    memcpy(body, seed[which].begin, sizeof seed[which].begin);
+    for (size_t k = 0; k < 4 && seed[which].one[k] > 0; ++k) {
+      body[seed[which].one[k]] = 0x3F;
+      body[seed[which].one[k] + 1] = 0x80;
+    }
+    size_t size =
+        make_message(seed[which].type, seed[which].device, 1, body, seed[which].size, bytes);
+    for (int change = 0; change < 1 + i % 4; ++change) {
+      const double where = 0.5 * (1.0 + fixture_random(&dice)) * (double)size;
+      bytes[(size_t)where] = (unsigned char)(127.5 * (1.0 + fixture_random(&dice)));
+    }
+    if (i % 2 == 0) {
+      supine_stream_header header;
+      supine_error error;
+      if (supine_stream_header_read(bytes, &header, &error) == SUPINE_OK &&
+          header.size <= size - SUPINE_STREAM_HEADER) {
+        header.crc = supine_stream_crc64(0, bytes + SUPINE_STREAM_HEADER, (size_t)header.size);
+        supine_stream_header_write(&header, bytes);
+      }
+    }
+    /* One connection each: what one message leaves behind must not hide the next. */
+    const int peer = dial(port);
+    (void)put(peer, bytes, size); /* fails where the header alone was enough */
+    (void)shutdown(peer, SHUT_WR);
+    assert_true(hung_up(peer)); /* when all of it has been read */
+    (void)close(peer);
+    if (i % 1000 == 0) {
+      assert_true(say(honest, "VOLUME", "rest+30"));
+      assert_true(send_pose(honest, poses[0], 5000 + (uint64_t)i));
+      (void)hear_stamp(honest, 5000 + (uint64_t)i, &heard, content);
+    }
+  }
+  assert_true(send_pose(honest, poses[0], 100000));
+  (void)hear_stamp(honest, 100000, &heard, content);
+  (void)close(honest);
+  const supine_stream_counts counts = stage_end(s);
+  assert_true(counts.malformed > 1000);
+  assert_true(counts.lost > 10);
+  assert_true(counts.skipped > 100);
+  assert_true(counts.poses > 500);
+  assert_true(counts.refused > 20);
+  stage_destroy(s);
+}
+
+static void test_absurd_sizes(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  const int port = stage_run(s);
+  unsigned char bytes[SUPINE_STREAM_HEADER];
+  unsigned char piece[4096] = {0};
+  supine_stream_header header = {.version = 1, .size = UINT64_MAX};
+  strcpy(header.type, "TRANSFORM");
+  strcpy(header.device, "Patient");
+  supine_stream_header_write(&header, bytes);
+  int peer = dial(port);
+  assert_true(put(peer, bytes, sizeof bytes));
+  assert_true(hung_up(peer));
+  (void)close(peer);
+  /* A transform of 8 MiB is passed over like an image, without being kept. */
+  header.size = 8u << 20;
+  supine_stream_header_write(&header, bytes);
+  peer = dial(port);
+  assert_true(put(peer, bytes, sizeof bytes));
+  for (int i = 0; i < 2048; ++i) {
+    assert_true(put(peer, piece, sizeof piece));
+  }
+  assert_int_equal(keep_rate(peer, 2, 1), 2);
+  header.size = 0; /* one without a body */
+  supine_stream_header_write(&header, bytes);
+  assert_true(put(peer, bytes, sizeof bytes));
+  assert_int_equal(keep_rate(peer, 2, 11), 2);
+  (void)close(peer);
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.lost, 1);
+  assert_int_equal(counts.skipped, 1);
+  assert_int_equal(counts.malformed, 1);
+  stage_destroy(s);
+}
+
+/* A tracker that waits to be connected to, and goes away, and comes back. */
+static void test_connects_and_connects_again(void **state) {
+  (void)state;
+  supine_stream_address here;
+  supine_error error;
+  int port = 0;
+  char target[32];
+  assert_int_equal(supine_stream_address_read("0", true, &here, &error), SUPINE_OK);
+  const int listener = supine_stream_address_listen(&here, &port, &error);
+  assert_true(listener >= 0);
+  (void)snprintf(target, sizeof target, "localhost:%d", port);
+  stage *s = stage_create();
+  s->options.listen = NULL;
+  s->options.connect = target;
+  assert_int_equal(stage_run(s), 0);
+  for (uint64_t round = 0; round < 2; ++round) {
+    struct pollfd waiting = {listener, POLLIN, 0};
+    assert_int_equal(poll(&waiting, 1, 10000), 1);
+    const int peer = accept(listener, NULL, NULL);
+    const struct timeval limit = {10, 0};
+    assert_true(peer >= 0);
+    assert_int_equal(setsockopt(peer, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
+    assert_int_equal(keep_rate(peer, 3, 10 * (round + 1)), 3);
+    (void)close(peer);
+  }
+  (void)close(listener);
+  assert_int_equal(stage_end(s).peers, 2);
+  stage_destroy(s);
+}
+
+static void test_replay_and_record(void **state) {
+  (void)state;
+  enum { COUNT = 30 };
+  supine_stream_pose pose[COUNT];
+  for (int i = 0; i < COUNT; ++i) {
+    pose[i] = (supine_stream_pose){0.01 * i, {sin(0.1 * i), cos(0.1 * i), 0}};
+  }
+  const supine_stream_poses kept = {COUNT, pose};
+  char path[] = "/tmp/supine-record-XXXXXX";
+  const int descriptor = mkstemp(path);
+  FILE *record = fdopen(descriptor, "w");
+  assert_non_null(record);
+  stage *s = stage_create();
+  s->options.replay = &kept;
+  s->options.record = record;
+  supine_stream_poses_begin(record);
+  const int peer = dial(stage_run(s)); /* it begins when a peer is there */
+  supine_stream_header header;
+  unsigned char body[4096];
+  unsigned char last[4096];
+  int frames = 0;
+  struct pollfd waiting = {peer, POLLIN, 0};
+  while (poll(&waiting, 1, 500) == 1 && hear(peer, &header, body)) {
+    memcpy(last, body, sizeof last);
+    ++frames;
+  }
+  const supine_stream_counts counts = stage_end(s); /* by itself */
+  assert_int_equal(counts.poses, COUNT);
+  assert_in_range(frames, 2, COUNT + 1); /* and the one before the first pose */
+  expect_weights(s, pose[COUNT - 1].gravity, 30.0, last);
+  (void)close(peer);
+  assert_int_equal(fclose(record), 0);
+  supine_stream_poses back;
+  supine_error error;
+  assert_int_equal(supine_stream_poses_load(path, &back, &error), SUPINE_OK);
+  assert_int_equal(back.count, COUNT);
+  for (int i = 0; i < COUNT; ++i) {
+    assert_true(fabs(back.pose[i].seconds - pose[i].seconds) < 1e-6);
+    assert_true(fabs(back.pose[i].gravity[0] - pose[i].gravity[0]) < 1e-12);
+  }
+  supine_stream_poses_free(&back);
+  (void)unlink(path);
+  stage_destroy(s);
+}
+
+/* Smoothed, the lungs go on turning after the last pose until they are there; breathing, they never
+ * stop. */
+static void test_frames_come_while_the_lungs_move(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  s->options.smooth = 0.1;
+  const int peer = dial(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  assert_true(send_pose(peer, poses[0], 1));
+  (void)hear_stamp(peer, 1, &header, body);
+  rest(0.05);
+  assert_true(send_pose(peer, poses[2], 2));
+  int frames = 0;
+  struct pollfd waiting = {peer, POLLIN, 0};
+  while (poll(&waiting, 1, 1000) == 1 && frames < 1000) {
+    assert_true(hear(peer, &header, body));
+    ++frames;
+  }
+  /* ln(1e6 pi / 2) lags of 0.1 s at 15 ms each are 95; a busy machine makes fewer. */
+  assert_in_range(frames, 10, 120);
+  expect_weights(s, poses[2], 30.0, body);
+  const supine_pv_breath breath = {60.0, 60.0, 0.5, 5.0, SUPINE_PV_COSINE};
+  supine_error error;
+  (void)stage_end(s);
+  supine_stream_server_destroy(s->server);
+  (void)close(peer);
+  assert_int_equal(
+      supine_stream_volume_breathe(&s->volume, supine_breath_normal(), &breath, &error), SUPINE_OK);
+  atomic_store(&s->ending, false);
+  const int other = dial(stage_run(s));
+  float low = INFINITY;
+  float high = -INFINITY;
+  for (int i = 0; i < 100; ++i) { /* 1.5 breaths */
+    assert_true(hear(other, &header, body));
+    const float scale = float_at(body + 4 + 4 * MODES);
+    low = fminf(low, scale);
+    high = fmaxf(high, scale);
+  }
+  double weights[MODES];
+  double deepest = 0.0;
+  const double supine[3] = {0, 1, 0};
+  assert_int_equal(supine_basis_weights(s->basis, supine, weights), SUPINE_OK);
+  assert_int_equal(supine_basis_scale(s->basis, weights, 60.0, &deepest, NULL), SUPINE_OK);
+  /* From rest to the peak, as far as frames of 15 ms meet them. */
+  assert_true(fabs((double)(high - low) - fabs(deepest)) < 0.05 * fabs(deepest));
+  (void)close(other);
+  stage_destroy(s);
+}
+
+static void test_places_that_cannot_be_listened_on(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  supine_error error;
+  supine_stream_server *server = NULL;
+  static const char *const bad[] = {
+      "", "x", "-1", "65536", "1:", ":1", "256.1.1.1:1", "host:1", "[]:1"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    s->options.listen = bad[i];
+    assert_int_equal(supine_stream_server_create(s->basis, &s->options, &server, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_null(server);
+  }
+  char taken[16];
+  s->options.listen = "0";
+  (void)snprintf(taken, sizeof taken, "%d", stage_run(s));
+  supine_stream_options options = s->options;
+  options.listen = taken;
+  assert_int_equal(supine_stream_server_create(s->basis, &options, &server, &error),
+                   SUPINE_ERROR_WRITE);
+  stage_destroy(s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_weights_answer_each_pose),
+      cmocka_unit_test(test_surfaces_and_wishes),
+      cmocka_unit_test(test_newest_pose_wins),
+      cmocka_unit_test(test_stuck_and_vanished_peers_hold_up_nobody),
+      cmocka_unit_test(test_fifty_peers_and_no_more_than_allowed),
+      cmocka_unit_test(test_ten_thousand_mutated_messages),
+      cmocka_unit_test(test_absurd_sizes),
+      cmocka_unit_test(test_connects_and_connects_again),
+      cmocka_unit_test(test_replay_and_record),
+      cmocka_unit_test(test_frames_come_while_the_lungs_move),
+      cmocka_unit_test(test_places_that_cannot_be_listened_on),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
