@@ -13,6 +13,16 @@ supine_stream_test(gravity)
 supine_stream_test(poses)
 supine_stream_test(server supine_base Threads::Threads)
 
+# Programs that are run against a real server.
+find_package(Python3 COMPONENTS Interpreter)
+set(samples ${PROJECT_SOURCE_DIR}/runtime/stream/samples)
+set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_server.py
+  $<TARGET_FILE:supine>)
+if(Python3_EXECUTABLE)
+  add_test(NAME stream_link COMMAND ${with_server} 1000 "--volume rest+400 --device Patient"
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples} {port} {basis})
+endif()
+
 # The protocol's public library is what bytes and behaviour are held against.
 find_library(IGTL_LIBRARY OpenIGTLink)
 find_path(IGTL_INCLUDE igtlMessageBase.h PATH_SUFFIXES openigtlink)
@@ -21,6 +31,15 @@ if(IGTL_LIBRARY AND IGTL_INCLUDE)
   target_include_directories(igtl SYSTEM INTERFACE ${IGTL_INCLUDE})
   target_link_libraries(igtl INTERFACE ${IGTL_LIBRARY})
   supine_stream_test(wire igtl)
+  include(CheckLanguage)
+  check_language(CXX)
+  if(CMAKE_CXX_COMPILER AND Python3_EXECUTABLE)
+    enable_language(CXX)
+    add_executable(stream_peer stream/stream_peer.cpp)
+    target_link_libraries(stream_peer PRIVATE supine_runtime igtl Threads::Threads)
+    add_test(NAME stream_igtl COMMAND ${with_server} 2000 "--volume rest+400 --device Patient"
+      $<TARGET_FILE:stream_peer> {port} {basis})
+  endif()
 else()
   message(STATUS "No libopenigtlink: 'supine stream' is not tested against it")
 endif()

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The samples' Python peer against a real server: stream_link.py SAMPLES PORT BASIS
+
+It shares no line with the server: bytes by the protocol's text, positions by the file's."""
+import sys
+import time
+
+sys.path.insert(0, sys.argv[1])
+from supine_link import Basis, Link, array, crc64, instruments, quaternion, string, unpack  # noqa: E402
+
+port, basis = int(sys.argv[2]), Basis(sys.argv[3])
+MM = 5e-3  # packed storage of the run-time library: at most this far from the file's numbers
+
+assert crc64(b"123456789") == 0x6C40DF5F0B497347  # the published check value of CRC-64/ECMA-182
+
+SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rows; columns: left, back, head in a room, z up
+LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
+
+
+def answer(link, stamp, send):
+    """The frame that answers a message of that stamp."""
+    send()
+    end = time.monotonic() + 10
+    while time.monotonic() < end:
+        message = link.message()
+        if message is None:
+            link.receive(1.0)
+        elif message[2] == stamp:
+            return message
+    raise AssertionError("no answer")
+
+
+def far(a, b):
+    return max(abs(x - y) for x, y in zip(a, b, strict=True))
+
+
+for version in (1, 2):
+    link = Link("127.0.0.1", port, version=version, check=True)
+    frames = {}
+    sends = {
+        101: lambda: link.send_pose(SUPINE, stamp=101),
+        102: lambda: link.send_pose(LEFT, stamp=102),
+        103: lambda: link.send("POSITION", "Patient", quaternion((0.5**0.5, -0.5**0.5, 0, 0)), 103),
+        104: lambda: link.send("QTDATA", "Tracker", instruments(
+            {"Probe": (1, 0, 0, 0), "Patient": (0.5**0.5, 0, 0.5**0.5, 0)}), 104),
+        105: lambda: link.send("NDARRAY", "Patient", array((0, 3.0, 0)), 105),
+        106: lambda: (link.send("IMAGE", "Camera", bytes(300000), 9), link.send_pose(LEFT, stamp=106)),
+    }
+    for stamp, send in sends.items():
+        kind, device, _, content = answer(link, stamp, send)
+        assert (kind, device) == ("NDARRAY", "SUPINE")
+        frames[stamp] = unpack(kind, content)
+        assert len(frames[stamp]) == basis.modes + 2
+    # The same posture by every route, and another one is another.
+    assert far(frames[101], frames[103]) < 1e-5 and far(frames[101], frames[105]) < 1e-5
+    assert far(frames[102], frames[104]) < 1e-5 and far(frames[102], frames[106]) < 1e-5
+    assert far(frames[101], frames[102]) > 0.05
+    # Surfaces are what the file's own numbers make of the weights.
+    link.check = False  # 650 kB a frame are too many for plain Python
+    link.ask_for("points")
+    triangles = None
+    for stamp, pose in ((201, SUPINE), (202, LEFT)):
+        kind, _, _, content = answer(link, stamp, lambda: link.send_pose(pose, stamp=stamp))
+        points, corners = unpack(kind, content)
+        triangles = triangles or corners
+        assert far(points, basis.deform(frames[stamp - 100])) < MM
+        assert far(points, basis.vertices) > 1.0
+    link.set_volume("rest")
+    kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
+    assert far(unpack(kind, content)[0], basis.vertices) < MM
+    link.send("STRING", "VOLUME", string("rest+400"))
+    link.close()
+print("as the protocol's text says, headers of both versions")

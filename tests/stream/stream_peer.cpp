@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A peer by the protocol's public library, its own classes: stream_peer PORT BASIS
+// Sends each posture as the library packs it, and holds the frames that come back, as the library
+// unpacks and checks them, against the run-time library.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include <igtlClientSocket.h>
+#include <igtlMessageHeader.h>
+#include <igtlNDArrayMessage.h>
+#include <igtlPolyDataMessage.h>
+#include <igtlPositionMessage.h>
+#include <igtlQuaternionTrackingDataMessage.h>
+#include <igtlSensorMessage.h>
+#include <igtlStringMessage.h>
+#include <igtlTransformMessage.h>
+
+#include <supine/posture.h>
+#include <supine/runtime.h>
+
+static void expect(bool holds, const char *what) {
+  if (!holds) {
+    std::fprintf(stderr, "stream_peer: not so: %s\n", what);
+    std::exit(1);
+  }
+}
+
+static igtl::ClientSocket::Pointer peer;
+static unsigned int stamp_seconds = 1000;
+
+template <class Message> static void send(Message &message, const char *device) {
+  message->SetDeviceName(device);
+  message->SetTimeStamp(++stamp_seconds, 0x80000000u);
+  message->Pack();
+  expect(peer->Send(message->GetPackPointer(), message->GetPackSize()) != 0, "a message is sent");
+}
+
+// The next message of a type that answers the last pose.
+template <class Pointer> static void receive(Pointer message, const char *type) {
+  for (int i = 0; i < 10000; ++i) {
+    igtl::MessageHeader::Pointer header = igtl::MessageHeader::New();
+    header->InitPack();
+    expect(peer->Receive(header->GetPackPointer(), header->GetPackSize()) == header->GetPackSize(),
+           "a header comes");
+    header->Unpack();
+    unsigned int seconds = 0;
+    unsigned int fraction = 0;
+    header->GetTimeStamp(&seconds, &fraction);
+    if (seconds != stamp_seconds || std::strcmp(header->GetDeviceType(), type) != 0) {
+      peer->Skip(header->GetBodySizeToRead(), 0);
+      continue;
+    }
+    expect(fraction == 0x80000000u, "the pose's own time stamp");
+    expect(std::strcmp(header->GetDeviceName(), "SUPINE") == 0, "the device's name");
+    message->SetMessageHeader(header);
+    message->AllocatePack();
+    expect(peer->Receive(message->GetPackBodyPointer(), message->GetPackBodySize()) ==
+               message->GetPackBodySize(),
+           "a body comes");
+    expect((message->Unpack(1) & igtl::MessageHeader::UNPACK_BODY) != 0, "the checksum is right");
+    return;
+  }
+  expect(false, "the answer comes");
+}
+
+struct State {
+  std::vector<double> weights;
+  std::vector<double> scales;
+};
+
+static State state_of(const supine_basis *basis, const double gravity[3], double volume) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  State state{std::vector<double>(info->mode_count), std::vector<double>(info->lung_count)};
+  double scale = 0.0;
+  expect(supine_basis_weights(basis, gravity, state.weights.data()) == SUPINE_OK, "weights");
+  expect(supine_basis_scale(basis, state.weights.data(), volume, &scale, nullptr) == SUPINE_OK,
+         "a scale");
+  for (double &s : state.scales) {
+    s = scale;
+  }
+  return state;
+}
+
+static void expect_weights(const State &state) {
+  igtl::NDArrayMessage::Pointer message = igtl::NDArrayMessage::New();
+  receive(message, "NDARRAY");
+  expect(message->GetType() == igtl::NDArrayMessage::TYPE_FLOAT32, "32-bit floats");
+  const size_t modes = state.weights.size();
+  expect(message->GetArray()->GetSize().size() == 1 &&
+             message->GetArray()->GetSize()[0] == modes + state.scales.size(),
+         "K + G numbers");
+  const float *value = static_cast<const float *>(message->GetArray()->GetRawArray());
+  for (size_t i = 0; i < modes + state.scales.size(); ++i) {
+    const double wanted = i < modes ? state.weights[i] : state.scales[i - modes];
+    expect(std::fabs(value[i] - wanted) <= 1e-6 * std::fabs(wanted) + 1e-6, "weights and scales");
+  }
+}
+
+static void expect_surface(const supine_basis *basis, const State &state) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  igtl::PolyDataMessage::Pointer message = igtl::PolyDataMessage::New();
+  receive(message, "POLYDATA");
+  expect(message->GetPoints()->GetNumberOfPoints() == static_cast<int>(info->vertex_count),
+         "every vertex");
+  expect(message->GetPolygons()->GetNumberOfCells() == info->triangle_count, "every triangle");
+  std::vector<float> xyz(3 * info->vertex_count);
+  supine_deform(basis, state.weights.data(), state.scales.data(), xyz.data());
+  float moved = 0.0f;
+  for (unsigned i = 0; i < info->vertex_count; ++i) {
+    float point[3];
+    message->GetPoints()->GetPoint(i, point);
+    for (int k = 0; k < 3; ++k) { // the same numbers on the same machine
+      expect(std::fabs(point[k] - xyz[3 * i + k]) < 1e-3f, "positions");
+      moved = std::fmax(moved, std::fabs(point[k] - supine_basis_vertices(basis)[3 * i + k]));
+    }
+  }
+  expect(moved > 1.0f, "something moves");
+  for (unsigned i = 0; i < info->triangle_count; ++i) {
+    igtlUint32 corner[3];
+    expect(message->GetPolygons()->GetCellSize(i) == 3, "three corners");
+    message->GetPolygons()->GetCell(i, corner);
+    expect(std::memcmp(corner, supine_basis_triangles(basis) + 3 * i, sizeof corner) == 0,
+           "the triangles");
+  }
+}
+
+// Where left, back and head point in a room whose z is up.
+struct Lie {
+  const char *posture;
+  float left[3], back[3], head[3];
+};
+static const Lie lies[] = {{"supine", {1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
+                           {"prone", {-1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
+                           {"left", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}},
+                           {"right", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}}};
+
+static void send_transform(const Lie &lie) {
+  igtl::TransformMessage::Pointer message = igtl::TransformMessage::New();
+  igtl::Matrix4x4 matrix;
+  igtl::IdentityMatrix(matrix);
+  for (int row = 0; row < 3; ++row) {
+    matrix[row][0] = lie.left[row];
+    matrix[row][1] = lie.back[row];
+    matrix[row][2] = lie.head[row];
+  }
+  message->SetMatrix(matrix);
+  send(message, "Patient");
+}
+
+static void say(const char *device, const char *text) {
+  igtl::StringMessage::Pointer message = igtl::StringMessage::New();
+  message->SetString(text);
+  send(message, device);
+}
+
+int main(int count, char **word) {
+  expect(count == 3, "PORT BASIS");
+  supine_basis *basis = nullptr;
+  supine_error error;
+  expect(supine_basis_open(word[2], &basis, &error) == SUPINE_OK, error.message);
+  peer = igtl::ClientSocket::New();
+  expect(peer->ConnectToServer("127.0.0.1", std::atoi(word[1])) == 0, "a connection");
+  peer->SetReceiveTimeout(10000);
+  double gravity[3];
+  for (const Lie &lie : lies) {
+    send_transform(lie);
+    expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
+    expect_weights(state_of(basis, gravity, 400.0));
+  }
+  // Quaternions: a body that stands, laid back by 90 degrees about its left-right axis: supine.
+  const double supine[3] = {0, 1, 0};
+  const float half = 0.70710678f;
+  igtl::PositionMessage::Pointer position = igtl::PositionMessage::New();
+  position->SetPackType(igtl::PositionMessage::ALL);
+  position->SetPosition(1, 2, 3);
+  position->SetQuaternion(-half, 0, 0, half);
+  send(position, "Patient");
+  expect_weights(state_of(basis, supine, 400.0));
+  igtl::QuaternionTrackingDataMessage::Pointer tracked = igtl::QuaternionTrackingDataMessage::New();
+  for (int i = 0; i < 2; ++i) { // the probe, then the patient: prone
+    igtl::QuaternionTrackingDataElement::Pointer element =
+        igtl::QuaternionTrackingDataElement::New();
+    element->SetName(i == 0 ? "Probe" : "Patient");
+    element->SetType(igtl::QuaternionTrackingDataElement::TYPE_6D);
+    element->SetPosition(0, 0, 0);
+    element->SetQuaternion(i == 0 ? 0 : half, 0, 0, i == 0 ? 1 : half);
+    tracked->AddQuaternionTrackingDataElement(element);
+  }
+  send(tracked, "Tracker");
+  const double prone[3] = {0, -1, 0};
+  expect_weights(state_of(basis, prone, 400.0));
+  // An accelerometer at rest shows upwards.
+  igtl::SensorMessage::Pointer sensor = igtl::SensorMessage::New();
+  igtlFloat64 up[3] = {-9.81, 0, 0};
+  sensor->SetLength(3);
+  sensor->SetValue(up);
+  send(sensor, "Patient");
+  const double left[3] = {1, 0, 0};
+  expect_weights(state_of(basis, left, 400.0));
+  // Another volume, then surfaces.
+  say("VOLUME", "rest+250");
+  say("SEND", "surface");
+  for (const Lie &lie : lies) {
+    send_transform(lie);
+    expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
+    expect_surface(basis, state_of(basis, gravity, 250.0));
+  }
+  peer->CloseSocket();
+  supine_basis_close(basis);
+  return 0;
+}
