@@ -20,7 +20,36 @@ set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_se
   $<TARGET_FILE:supine>)
 if(Python3_EXECUTABLE)
   add_test(NAME stream_link COMMAND ${with_server} 1000 "--volume rest+400 --device Patient"
-    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples} {port} {basis})
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples}/slicer {port} {basis})
+  add_test(NAME stream_slicer COMMAND ${with_server} 500
+      "--volume rest+400 --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1"
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${samples}/slicer
+    {port} {basis})
+  # The Unity sample, by Mono; its part in the engine against stand-ins for the engine's types.
+  find_program(MCS_PROGRAM mcs)
+  find_program(MONO_PROGRAM mono)
+  if(MCS_PROGRAM AND MONO_PROGRAM AND NOT SUPINE_SANITIZE)
+    set(unity ${CMAKE_CURRENT_BINARY_DIR}/unity)
+    file(MAKE_DIRECTORY ${unity})
+    add_test(NAME stream_unity_compiles COMMAND ${MCS_PROGRAM} -warnaserror -target:library
+      -out:${unity}/behaviour.dll ${samples}/unity/SupineLink.cs ${samples}/unity/LungBehaviour.cs
+      ${CMAKE_CURRENT_SOURCE_DIR}/stream/UnityStub.cs)
+    add_test(NAME stream_unity_link_compiles COMMAND ${MCS_PROGRAM} -warnaserror
+      -out:${unity}/link.exe ${samples}/unity/SupineLink.cs
+      ${CMAKE_CURRENT_SOURCE_DIR}/stream/TestLink.cs)
+    add_test(NAME stream_unity COMMAND ${with_server} 1000 "--volume rest+400"
+      ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=$<TARGET_FILE_DIR:supine_runtime_shared>
+      ${MONO_PROGRAM} ${unity}/link.exe {port} {basis})
+    set_tests_properties(stream_unity_link_compiles PROPERTIES FIXTURES_SETUP unity)
+    set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 300)
+  endif()
+  # The live page, in headless Chromium.
+  if(NODE_PROGRAM)
+    add_test(NAME stream_page COMMAND ${with_server} 1000 "--volume rest+300 --web 0"
+      ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_page.mjs {page} {port})
+    set_tests_properties(stream_page PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 ENVIRONMENT
+      "MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
+  endif()
 endif()
 
 # The protocol's public library is what bytes and behaviour are held against.

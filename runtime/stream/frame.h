@@ -30,6 +30,7 @@ const char *supine_stream_what_name(supine_stream_what what);
 typedef struct supine_stream_moment {
   double gravity[3]; /**< unit */
   double volume;     /**< mL relative to the reference */
+  double above;      /**< mL above the posture's rest */
   uint64_t stamp;    /**< of the pose, as in headers */
   double received;   /**< when the pose came, s of supine_clock_seconds; < 0: no pose did */
   double weights[SUPINE_MODES_MAX];

@@ -2,12 +2,12 @@
 // The page follows: moments come by WebSocket from the server that sent the page; this device's own
 // tilt goes back, where someone asks for it.
 
-const supineLive = (() => {
+window.supineLive = (() => {
   const said = document.createElement('p');
   const tilt = document.createElement('button');
   const bar = document.createElement('div');
   bar.id = 'live';
-  bar.style.cssText = 'position:fixed;right:12px;bottom:12px;display:flex;gap:8px;align-items:center;z-index:9';
+  bar.style.cssText = 'position:fixed;left:12px;bottom:12px;display:flex;gap:8px;align-items:center;z-index:9';
   said.style.cssText = 'margin:0;font-size:12px';
   said.setAttribute('role', 'status');
   tilt.type = 'button';
@@ -20,23 +20,44 @@ const supineLive = (() => {
   let socket = null;
   let moments = 0;
 
-  /** Where things fall, in the patient's axes (x left, y back, z head), of a phone that lies on the
-   * breastbone. Its own axes are x right of the screen, y up it, z out of it: left, head, front.
-   * DeviceOrientation turns it by alpha about z, beta about x, gamma about y; the world's z is up. */
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+  /** Turns the patient, x, y, z, w, by the shortest way to where gravity points along `gravity`. */
+  function turned(q, gravity) {
+    const now = window.supine.gravityOf(q);
+    let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
+    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // over, about the long axis
+    const u = cross(q, axis); // q, then this turn of the body: a product of quaternions
+    const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
+    const all = [...product, q[3] * w - dot(q, axis)];
+    const length = Math.hypot(...all);
+    return all.map((x) => x / length);
+  }
+
+  /** Shows a moment: gravity in the patient's axes (x left, y back, z head), mL above rest. */
+  function show({ gravity, above }) {
+    const page = window.supine;
+    if (!page) return;
+    moments += 1;
+    page.state.playing = false;
+    page.state.depth = above;
+    page.state.settle(turned(page.state.q, gravity), 0, 0);
+    page.touch();
+  }
+
+  /** Where things fall, in the patient's axes, of a phone that lies on the breastbone. Its own axes
+   * are x right of the screen, y up it, z out of it: left, head, front. DeviceOrientation turns it
+   * by alpha about z, beta about x, gamma about y; the world's z is up. */
   function gravityOfTilt(beta, gamma) {
     const [b, c] = [beta, gamma].map((degrees) => (degrees * Math.PI) / 180);
-    const down = [Math.cos(b) * Math.sin(c), -Math.sin(b), -Math.cos(b) * Math.cos(c)];
-    return [down[0], -down[2], down[1]];
+    return [Math.cos(b) * Math.sin(c), Math.cos(b) * Math.cos(c), -Math.sin(b)];
   }
 
   function connect() {
     socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/`, 'supine');
     socket.addEventListener('open', () => { said.textContent = 'live'; });
-    socket.addEventListener('message', (event) => {
-      const { gravity, volume } = JSON.parse(event.data);
-      moments += 1;
-      window.supine?.follow(gravity, volume);
-    });
+    socket.addEventListener('message', (event) => show(JSON.parse(event.data)));
     socket.addEventListener('close', () => {
       said.textContent = 'waiting for the server';
       setTimeout(connect, 1000);
@@ -55,4 +76,3 @@ const supineLive = (() => {
   connect();
   return { gravityOfTilt, moments: () => moments };
 })();
-window.supineLive = supineLive;

@@ -149,6 +149,10 @@ void supine_stream_patient_moment(supine_stream_patient *patient, double now,
   memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
   moment->volume = supine_stream_volume_at(patient->options->volume, basis, moment->gravity,
                                            now - patient->begun);
+  double resting = 0.0;
+  (void)supine_basis_resting_volume(basis, moment->gravity,
+                                    &resting); /* a unit direction has one */
+  moment->above = moment->volume - resting;
   moment->received = patient->fresh ? patient->received : -1.0;
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
   (void)supine_basis_weights(basis, moment->gravity, moment->weights);

@@ -273,8 +273,9 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
 
 void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *moment) {
   (void)pthread_mutex_lock(&web->lock);
-  (void)snprintf(web->text, sizeof web->text, "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g}",
-                 moment->gravity[0], moment->gravity[1], moment->gravity[2], moment->volume);
+  (void)snprintf(
+      web->text, sizeof web->text, "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g}",
+      moment->gravity[0], moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
   ++web->told;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {

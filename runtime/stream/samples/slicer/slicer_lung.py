@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""3D Slicer: the lung follows a transform node.
+
+In Slicer's Python console, with 'supine stream lungs.safetensors --send points --space ras' running:
+
+    exec(open("/path/to/slicer_lung.py").read())
+    follow = Follow("PatientToRoom")   # a linear transform node: how the patient lies
+    follow.stop()
+
+Slicer's axes are right, front, head (RAS), the patient's and, in a room where nobody has turned yet,
+the room's. So a patient who lies on the back has the identity, and things fall along -y: start the
+server with SERVER_OPTIONS. Needs supine_link.py beside this file."""
+import os
+import sys
+
+try:
+    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+except NameError:  # exec() of this file's text
+    pass
+from supine_link import Link, unpack  # noqa: E402
+
+SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",
+                  "--body-from-tracker", "0,0,0,1"]
+DEVICE = "Patient"
+
+
+def rotation_of(matrix):
+    """Rows of the rotation of a 4 x 4 matrix, given as 16 numbers by rows."""
+    return [[matrix[4 * row + column] for column in range(3)] for row in range(3)]
+
+
+class Surface:
+    """The lung as the server sends it: the newest points, and the triangles once."""
+
+    def __init__(self, host="localhost", port=18944):
+        self.link = Link(host, port)
+        self.link.ask_for("points")
+        self.triangles = None
+
+    def send(self, matrix):
+        self.link.send_pose(rotation_of(matrix), DEVICE)
+
+    def newest(self, timeout=0.0):
+        """(stamp, points, flat) of the newest frame since the last call, or None."""
+        last = None
+        self.link.receive(timeout)
+        while True:
+            message = self.link.message()
+            if message is None:
+                if not self.link.receive(0.0):
+                    return last
+                continue
+            kind, _, stamp, content = message
+            if kind == "POLYDATA":
+                points, triangles = unpack(kind, content)
+                self.triangles = triangles or self.triangles
+                last = (stamp, points)
+
+
+class Follow:
+    """Sends the node's rotation whenever it changes, and shows what comes back."""
+
+    def __init__(self, node, host="localhost", port=18944, interval=15):
+        import qt
+        import slicer
+        import vtk
+
+        self.vtk = vtk
+        self.node = slicer.util.getNode(node) if isinstance(node, str) else node
+        self.surface = Surface(host, port)
+        self.model = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLModelNode", "Lung")
+        self.model.CreateDefaultDisplayNodes()
+        self.tag = self.node.AddObserver(slicer.vtkMRMLTransformNode.TransformModifiedEvent, self.turned)
+        self.timer = qt.QTimer()
+        self.timer.connect("timeout()", self.show)
+        self.timer.start(interval)
+        self.turned()
+
+    def turned(self, *_):
+        matrix = self.vtk.vtkMatrix4x4()
+        self.node.GetMatrixTransformToWorld(matrix)
+        self.surface.send([matrix.GetElement(row, column) for row in range(4) for column in range(4)])
+
+    def show(self):
+        frame = self.surface.newest()
+        if frame is not None:
+            show_points(self.vtk, self.model, frame[1], self.surface.triangles)
+
+    def stop(self):
+        self.timer.stop()
+        self.node.RemoveObserver(self.tag)
+        self.surface.link.close()
+
+
+def show_points(vtk, model, points, triangles):
+    """Puts points into a model: its triangles with the first frame."""
+    import numpy
+    from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+
+    mesh = model.GetPolyData()
+    if mesh is None or mesh.GetNumberOfCells() == 0:
+        mesh = vtk.vtkPolyData()
+        cells = numpy.asarray(triangles, numpy.int64).reshape(-1, 3)
+        cells = numpy.hstack([numpy.full((len(cells), 1), 3, numpy.int64), cells])
+        array = vtk.vtkCellArray()
+        array.SetCells(len(cells), numpy_to_vtkIdTypeArray(cells.ravel(), deep=True))
+        mesh.SetPolys(array)
+        model.SetAndObservePolyData(mesh)
+    place = vtk.vtkPoints()
+    place.SetData(numpy_to_vtk(numpy.asarray(points, numpy.float32).reshape(-1, 3), deep=True))
+    mesh.SetPoints(place)
+    mesh.Modified()

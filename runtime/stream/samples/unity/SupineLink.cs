@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: MIT
+// A peer of 'supine stream' for Unity, in one file: OpenIGTLink over a socket in a thread of its
+// own, of which the newest frame counts, and the run-time library by P/Invoke. Needs nothing but
+// .NET; LungBehaviour.cs puts it into a scene.
+using System;
+using System.Net.Sockets;
+using System.Runtime.InteropServices;
+using System.Text;
+using System.Threading;
+
+namespace Supine
+{
+    /// <summary>A connection to the server.</summary>
+    public sealed class Link : IDisposable
+    {
+        const int HeaderSize = 58;
+        const int Float32 = 10;
+        static readonly ulong[] Table = MakeTable();
+        readonly TcpClient client;
+        readonly NetworkStream stream;
+        readonly Thread reader;
+        readonly object turn = new object();
+        float[] newest;
+        ulong stamp;
+        bool closing;
+
+        /// <summary>Connects; frames are read from then on.</summary>
+        public Link(string host, int port)
+        {
+            client = new TcpClient(host, port) { NoDelay = true, ReceiveBufferSize = 8192 };
+            stream = client.GetStream();
+            reader = new Thread(Read) { IsBackground = true };
+            reader.Start();
+        }
+
+        /// <summary>Why reading has ended; null while it goes on.</summary>
+        public Exception Failure { get; private set; }
+
+        /// <summary>The K weights and the scale of each lung of the newest frame, once; null where
+        /// none has come since the last call.</summary>
+        public float[] TakeNewest(out ulong poseStamp)
+        {
+            lock (turn)
+            {
+                float[] taken = newest;
+                newest = null;
+                poseStamp = stamp;
+                return taken;
+            }
+        }
+
+        /// <summary>Sends a pose: rows of the rotation from the tracked body to a world whose z
+        /// points up.</summary>
+        public void SendPose(string device, float[] rotation, ulong poseStamp)
+        {
+            byte[] body = new byte[48];
+            for (int column = 0; column < 3; ++column)
+                for (int row = 0; row < 3; ++row)
+                    PutFloat(body, 4 * (3 * column + row), rotation[3 * row + column]);
+            Send("TRANSFORM", device, body, poseStamp);
+        }
+
+        /// <summary>Sets the volume: rest, full, rest+500 or mL from the reference.</summary>
+        public void SetVolume(string volume)
+        {
+            byte[] text = Encoding.ASCII.GetBytes(volume);
+            byte[] body = new byte[4 + text.Length];
+            body[1] = 3; // US-ASCII
+            Put(body, 2, 2, (ulong)text.Length);
+            text.CopyTo(body, 4);
+            Send("STRING", "VOLUME", body, 0);
+        }
+
+        public void Dispose()
+        {
+            closing = true;
+            client.Close();
+            reader.Join(1000);
+        }
+
+        void Send(string type, string device, byte[] body, ulong poseStamp)
+        {
+            byte[] message = new byte[HeaderSize + body.Length];
+            Put(message, 0, 2, 1);
+            Encoding.ASCII.GetBytes(type).CopyTo(message, 2);
+            Encoding.ASCII.GetBytes(device).CopyTo(message, 14);
+            Put(message, 34, 8, poseStamp);
+            Put(message, 42, 8, (ulong)body.Length);
+            Put(message, 50, 8, Crc(body));
+            body.CopyTo(message, HeaderSize);
+            stream.Write(message, 0, message.Length);
+        }
+
+        void Read()
+        {
+            try
+            {
+                byte[] header = new byte[HeaderSize];
+                for (;;)
+                {
+                    Fill(header);
+                    byte[] body = new byte[checked((int)Get(header, 42, 8))];
+                    Fill(body);
+                    if (Crc(body) == Get(header, 50, 8) && Name(header, 2, 12) == "NDARRAY")
+                        Keep(Get(header, 34, 8), body);
+                }
+            }
+            catch (Exception failure)
+            {
+                if (!closing) Failure = failure;
+            }
+        }
+
+        void Fill(byte[] bytes)
+        {
+            for (int got = 0; got < bytes.Length;)
+            {
+                int count = stream.Read(bytes, got, bytes.Length - got);
+                if (count == 0) throw new System.IO.EndOfStreamException("the server has gone");
+                got += count;
+            }
+        }
+
+        void Keep(ulong poseStamp, byte[] body)
+        {
+            int count = (int)Get(body, 2, 2);
+            if (body[0] != Float32 || body[1] != 1 || body.Length != 4 + 4 * count) return;
+            float[] values = new float[count];
+            for (int i = 0; i < count; ++i) values[i] = GetFloat(body, 4 + 4 * i);
+            lock (turn)
+            {
+                newest = values;
+                stamp = poseStamp;
+            }
+        }
+
+        static string Name(byte[] bytes, int at, int size)
+        {
+            return Encoding.ASCII.GetString(bytes, at, size).TrimEnd('\0');
+        }
+
+        static ulong Get(byte[] bytes, int at, int size)
+        {
+            ulong value = 0;
+            for (int i = 0; i < size; ++i) value = value << 8 | bytes[at + i];
+            return value;
+        }
+
+        static void Put(byte[] bytes, int at, int size, ulong value)
+        {
+            for (int i = size - 1; i >= 0; --i, value >>= 8) bytes[at + i] = (byte)value;
+        }
+
+        static float GetFloat(byte[] bytes, int at)
+        {
+            return BitConverter.ToSingle(BitConverter.GetBytes((uint)Get(bytes, at, 4)), 0);
+        }
+
+        static void PutFloat(byte[] bytes, int at, float value)
+        {
+            Put(bytes, at, 4, BitConverter.ToUInt32(BitConverter.GetBytes(value), 0));
+        }
+
+        static ulong[] MakeTable()
+        {
+            ulong[] table = new ulong[256];
+            for (ulong b = 0; b < 256; ++b)
+            {
+                ulong value = b << 56;
+                for (int bit = 0; bit < 8; ++bit)
+                    value = value << 1 ^ (value >> 63 != 0 ? 0x42F0E1EBA9EA3693UL : 0UL);
+                table[b] = value;
+            }
+            return table;
+        }
+
+        static ulong Crc(byte[] bytes)
+        {
+            ulong crc = 0;
+            foreach (byte b in bytes) crc = crc << 8 ^ Table[crc >> 56 ^ b];
+            return crc;
+        }
+    }
+
+    /// <summary>A basis file, by the run-time library (libsupine_runtime). Little-endian 64-bit
+    /// machines.</summary>
+    public sealed class Basis : IDisposable
+    {
+        const string Library = "supine_runtime";
+        [DllImport(Library)] static extern int supine_basis_open(string path, out IntPtr basis, IntPtr error);
+        [DllImport(Library)] static extern void supine_basis_close(IntPtr basis);
+        [DllImport(Library)] static extern IntPtr supine_basis_get_info(IntPtr basis);
+        [DllImport(Library)] static extern IntPtr supine_basis_vertices(IntPtr basis);
+        [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
+        [DllImport(Library)] static extern int supine_basis_weights(IntPtr basis, double[] gravity, double[] weights);
+        [DllImport(Library)] static extern int supine_basis_scale(IntPtr basis, double[] weights, double volume, out double scale, IntPtr error);
+        [DllImport(Library)] static extern void supine_deform(IntPtr basis, double[] weights, double[] scales, float[] xyz);
+
+        [StructLayout(LayoutKind.Sequential)]
+        struct Info // the beginning of supine_basis_info
+        {
+            public UIntPtr Vertices, Triangles, Modes, Band, Lungs;
+        }
+
+        IntPtr handle;
+        readonly double[] weights, scales;
+
+        public Basis(string path)
+        {
+            int status = supine_basis_open(path, out handle, IntPtr.Zero);
+            if (status != 0) throw new ArgumentException(path + ": no basis file (status " + status + ")");
+            Info info = (Info)Marshal.PtrToStructure(supine_basis_get_info(handle), typeof(Info));
+            VertexCount = (int)info.Vertices;
+            TriangleCount = (int)info.Triangles;
+            weights = new double[(int)info.Modes];
+            scales = new double[(int)info.Lungs];
+        }
+
+        public int VertexCount { get; private set; }
+        public int TriangleCount { get; private set; }
+
+        /// <summary>Positions [3 N] of a frame, mm, LPS: left, back, head.</summary>
+        public void Deform(float[] frame, float[] xyz)
+        {
+            if (frame.Length != weights.Length + scales.Length || xyz.Length != 3 * VertexCount)
+                throw new ArgumentException("a frame of another basis");
+            for (int i = 0; i < weights.Length; ++i) weights[i] = frame[i];
+            for (int i = 0; i < scales.Length; ++i) scales[i] = frame[weights.Length + i];
+            supine_deform(handle, weights, scales, xyz);
+        }
+
+        /// <summary>The frame of a direction of gravity and a volume, as the server makes it.</summary>
+        public float[] Frame(double[] gravity, double volume)
+        {
+            double scale;
+            if (supine_basis_weights(handle, gravity, weights) != 0 ||
+                supine_basis_scale(handle, weights, volume, out scale, IntPtr.Zero) != 0)
+                throw new ArgumentException("no such state");
+            float[] frame = new float[weights.Length + scales.Length];
+            for (int i = 0; i < frame.Length; ++i)
+                frame[i] = (float)(i < weights.Length ? weights[i] : scale);
+            return frame;
+        }
+
+        public float[] Vertices()
+        {
+            float[] xyz = new float[3 * VertexCount];
+            Marshal.Copy(supine_basis_vertices(handle), xyz, 0, xyz.Length);
+            return xyz;
+        }
+
+        public int[] Triangles()
+        {
+            int[] corners = new int[3 * TriangleCount];
+            Marshal.Copy(supine_basis_triangles(handle), corners, 0, corners.Length);
+            return corners;
+        }
+
+        public void Dispose()
+        {
+            supine_basis_close(handle);
+            handle = IntPtr.Zero;
+        }
+    }
+}

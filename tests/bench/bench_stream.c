@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* From pose sent to frame received, over loopback, through two processes:
+ *
+ *     bench_stream SUPINE BASIS [SECONDS [WHAT...]]
+ *
+ * Poses leave 66.66 times a second, as from a tracker; a peer of the same machine receives weights,
+ * points or surfaces. Prints one row for each: the median, the 99th percentile and the longest of
+ * the time from the pose's first byte sent to the frame's last byte received, how many poses older
+ * than the newest were answered, and the server's memory after a second and at the end. */
+#include <arpa/inet.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "runtime/stream/crc64.h"
+#include "runtime/stream/message.h"
+#include "sh/base/clock.h"
+
+static const double interval = 1.0 / 66.66; /* s */
+
+static int fail(const char *what) {
+  perror(what);
+  return 1;
+}
+
+/* Starts the server; its port, or 0. */
+static int serve(const char *supine, const char *basis, const char *what, pid_t *server) {
+  int ends[2];
+  int port = 0;
+  if (pipe(ends) != 0) {
+    return 0;
+  }
+  *server = fork();
+  if (*server == 0) {
+    (void)dup2(ends[1], STDOUT_FILENO);
+    (void)close(ends[0]);
+    (void)execl(supine, supine, "stream", basis, "--listen", "0", "--send", what, "--volume",
+                "rest+400", (char *)NULL);
+    _exit(127);
+  }
+  (void)close(ends[1]);
+  FILE *lines = fdopen(ends[0], "r");
+  char line[256];
+  while (lines != NULL && port == 0 && fgets(line, sizeof line, lines) != NULL) {
+    (void)sscanf(line, "listening on port %d", &port);
+  }
+  return port; /* `lines` stays open: the server's report is not wanted, but may be written */
+}
+
+/* Resident memory of a process, KiB. */
+static long memory_of(pid_t process) {
+  char path[64];
+  char line[256];
+  long size = -1;
+  (void)snprintf(path, sizeof path, "/proc/%d/status", (int)process);
+  FILE *file = fopen(path, "r");
+  while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    (void)sscanf(line, "VmRSS: %ld", &size);
+  }
+  if (file != NULL) {
+    (void)fclose(file);
+  }
+  return size;
+}
+
+static int dial(int port) {
+  const int s = socket(AF_INET, SOCK_STREAM, 0);
+  const int yes = 1;
+  const struct sockaddr_in here = {.sin_family = AF_INET,
+                                   .sin_port = htons((uint16_t)port),
+                                   .sin_addr = {htonl(INADDR_LOOPBACK)}};
+  if (s < 0 || connect(s, (const struct sockaddr *)&here, sizeof here) != 0 ||
+      setsockopt(s, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes) != 0) {
+    return -1;
+  }
+  return s;
+}
+
+/* A body that turns about its long axis, twice a minute. */
+static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_STREAM_HEADER + 48]) {
+  const double angle = time * (2.0 * M_PI / 30.0);
+  const float columns[12] = {(float)cos(angle),
+                             0,
+                             (float)-sin(angle), /* left */
+                             (float)-sin(angle),
+                             0,
+                             (float)-cos(angle), /* back */
+                             0,
+                             1,
+                             0}; /* head */
+  unsigned char *body = bytes + SUPINE_STREAM_HEADER;
+  supine_stream_put_points(4, columns, 0, body);
+  supine_stream_header header = {
+      .version = 1, .stamp = stamp, .size = 48, .crc = supine_stream_crc64(0, body, 48)};
+  strcpy(header.type, "TRANSFORM");
+  strcpy(header.device, "Patient");
+  supine_stream_header_write(&header, bytes);
+}
+
+static int compare(const void *a, const void *b) {
+  const double x = *(const double *)a;
+  const double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+typedef struct tally {
+  double *sent;    /* [poses] s, when each left; by stamp */
+  double *latency; /* [poses] of the answered */
+  size_t poses, answered, old;
+  size_t got, wanted; /* bytes of the message that is coming */
+  unsigned char head[SUPINE_STREAM_HEADER];
+  supine_stream_header header;
+} tally;
+
+/* Takes in what has come; false where the server has gone. */
+static bool take(int s, tally *t) {
+  static unsigned char bytes[1 << 20];
+  for (;;) {
+    const size_t left = t->wanted - t->got;
+    const bool head = t->wanted == SUPINE_STREAM_HEADER;
+    const ssize_t n = recv(s, head ? t->head + t->got : bytes,
+                           left < sizeof bytes ? left : sizeof bytes, MSG_DONTWAIT);
+    if (n <= 0) {
+      return n < 0;
+    }
+    t->got += (size_t)n;
+    if (t->got < t->wanted) {
+      continue;
+    }
+    t->got = 0;
+    if (head) {
+      supine_error error;
+      if (supine_stream_header_read(t->head, &t->header, &error) != SUPINE_OK) {
+        return false;
+      }
+      t->wanted = SUPINE_STREAM_HEADER + (size_t)t->header.size;
+      t->got = SUPINE_STREAM_HEADER;
+      continue;
+    }
+    t->wanted = SUPINE_STREAM_HEADER;
+    if (t->header.stamp >= 1 && t->header.stamp <= t->poses) {
+      t->latency[t->answered++] = supine_clock_seconds() - t->sent[t->header.stamp - 1];
+      t->old += t->header.stamp < t->poses;
+    }
+  }
+}
+
+static int measure(const char *supine, const char *basis, const char *what, double seconds) {
+  pid_t server = 0;
+  const int port = serve(supine, basis, what, &server);
+  const int s = port == 0 ? -1 : dial(port);
+  const size_t count = (size_t)(seconds / interval);
+  tally t = {.sent = calloc(count, sizeof(double)),
+             .latency = calloc(count + 1, sizeof(double)),
+             .wanted = SUPINE_STREAM_HEADER};
+  if (s < 0 || t.sent == NULL || t.latency == NULL) {
+    return fail("the server");
+  }
+  const double begun = supine_clock_seconds();
+  long before = -1;
+  bool alive = true;
+  while (alive && t.poses < count) {
+    const double now = supine_clock_seconds();
+    const double due = begun + interval * (double)t.poses;
+    if (now >= due) {
+      unsigned char pose[SUPINE_STREAM_HEADER + 48];
+      make_pose(now - begun, t.poses + 1, pose);
+      t.sent[t.poses++] = supine_clock_seconds();
+      alive = send(s, pose, sizeof pose, MSG_NOSIGNAL) == (ssize_t)sizeof pose;
+      before = before < 0 && now - begun > 1.0 ? memory_of(server) : before;
+      continue;
+    }
+    struct pollfd waiting = {s, POLLIN, 0};
+    const struct timespec rest = {0, (long)(1e9 * (due - now))};
+    if (ppoll(&waiting, 1, &rest, NULL) > 0) {
+      alive = take(s, &t);
+    }
+  }
+  struct pollfd waiting = {s, POLLIN, 0};
+  while (alive && poll(&waiting, 1, 200) > 0) {
+    alive = take(s, &t);
+  }
+  const long after = memory_of(server);
+  (void)close(s);
+  (void)kill(server, SIGTERM);
+  (void)waitpid(server, NULL, 0);
+  qsort(t.latency, t.answered, sizeof(double), compare);
+  (void)printf("%-8s %8zu %8zu %6zu %10.3f %10.3f %10.3f %12ld %12ld\n", what, t.poses, t.answered,
+               t.old, 1e3 * t.latency[t.answered / 2],
+               1e3 * t.latency[(size_t)(0.99 * (double)t.answered)],
+               1e3 * t.latency[t.answered == 0 ? 0 : t.answered - 1], before, after);
+  (void)fflush(stdout);
+  free(t.sent);
+  free(t.latency);
+  return alive ? 0 : fail("the server has gone");
+}
+
+int main(int count, char **word) {
+  static char *all[] = {"weights", "points", "surface"};
+  if (count < 3) {
+    (void)fprintf(stderr, "usage: bench_stream SUPINE BASIS [SECONDS [WHAT...]]\n");
+    return 1;
+  }
+  const double seconds = count > 3 ? strtod(word[3], NULL) : 60.0;
+  char **what = count > 4 ? word + 4 : all;
+  const int kinds = count > 4 ? count - 4 : 3;
+  (void)printf("what        poses answered    old  median ms    99 %% ms   worst ms  KiB at 1 s "
+               "  KiB at end\n");
+  for (int i = 0; i < kinds; ++i) {
+    if (measure(word[1], word[2], what[i], seconds) != 0) {
+      return 1;
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The live page in headless Chromium, two viewers of it: they show the posture of the last pose that
+// a tracker sent, then of the tilt that one of them has. stream_page.mjs PAGE PORT
+import assert from 'node:assert/strict';
+import { createConnection } from 'node:net';
+import { load, skip } from '../export/support.mjs';
+
+const [site, port] = process.argv.slice(2);
+if (!site) skip('no page is served: the program was built without libwebsockets');
+const { chromium } = await load('playwright-core/index.mjs');
+if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
+
+/** CRC-64 of ECMA-182, by the bit. */
+function crc64(bytes) {
+  let crc = 0n;
+  for (const byte of bytes) {
+    crc ^= BigInt(byte) << 56n;
+    for (let i = 0; i < 8; ++i) crc = ((crc << 1n) ^ (crc >> 63n ? 0x42F0E1EBA9EA3693n : 0n)) & 0xFFFFFFFFFFFFFFFFn;
+  }
+  return crc;
+}
+
+/** A TRANSFORM: where left, back and head point in a room whose z is up. */
+function transform(left, back, head) {
+  const body = Buffer.alloc(48);
+  [...left, ...back, ...head].forEach((x, i) => body.writeFloatBE(x, 4 * i));
+  const header = Buffer.alloc(58);
+  header.writeUInt16BE(1, 0);
+  header.write('TRANSFORM', 2);
+  header.write('Patient', 14);
+  header.writeBigUInt64BE(48n, 42);
+  header.writeBigUInt64BE(crc64(body), 50);
+  return Buffer.concat([header, body]);
+}
+
+const tracker = createConnection(Number(port), '127.0.0.1');
+tracker.on('data', () => {});
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM,
+  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
+    '--disable-sync', '--no-first-run'],
+});
+const complaints = [];
+const context = await browser.newContext({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce' });
+
+async function view() {
+  const page = await context.newPage();
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(error.stack));
+  await page.goto(site);
+  await page.waitForFunction(() => window.supine?.state.moment && window.supineLive?.moments() > 0, null, { timeout: 60000 });
+  return page;
+}
+
+const viewers = [await view(), await view()];
+
+/** Every viewer comes to show that gravity, and the volume that the server was told. */
+async function expectGravity(wanted, what) {
+  for (const page of viewers) {
+    await page.waitForFunction((g) => {
+      const { state, gravityOf } = window.supine;
+      return Math.hypot(...gravityOf(state.q).map((x, i) => x - g[i])) < 1e-5 && Math.abs(state.depth - 300) < 1e-3;
+    }, wanted, { timeout: 20000 }).catch(async () => {
+      assert.fail(`${what}: ${await page.evaluate(() => [window.supine.gravityOf(window.supine.state.q), window.supine.state.depth])}`);
+    });
+    await page.waitForFunction((g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 1e-5, wanted);
+  }
+}
+
+const lies = [
+  ['prone', [-1, 0, 0], [0, 0, 1], [0, 1, 0], [0, -1, 0]],
+  ['left', [0, 0, -1], [-1, 0, 0], [0, 1, 0], [1, 0, 0]],
+  ['right', [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]],
+  ['upright', [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1]],
+  ['supine', [1, 0, 0], [0, 0, -1], [0, 1, 0], [0, 1, 0]],
+];
+for (const [name, left, back, head, gravity] of lies) {
+  tracker.write(transform(left, back, head));
+  await expectGravity(gravity, name);
+  for (const page of viewers) {
+    await page.waitForFunction((wanted) => document.getElementById('posture-name').value === wanted, name, { timeout: 20000 });
+  }
+}
+// A fast tracker: the last of many poses is what is seen.
+for (let i = 0; i <= 400; ++i) {
+  const a = (i / 400) * 2.1;
+  tracker.write(transform([Math.cos(a), 0, Math.sin(a)], [Math.sin(a), 0, -Math.cos(a)], [0, 1, 0]));
+}
+await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
+
+// A phone on the breastbone, as its sensor says: screen up, on its left edge, upright.
+const phone = await context.newCDPSession(viewers[0]);
+assert.ok(await viewers[0].getByRole('button', { name: /tilt/ }).isVisible());
+await viewers[0].getByRole('button', { name: /tilt/ }).click();
+for (const [name, beta, gamma, gravity] of [
+  ['lying on the back', 0, 0, [0, 1, 0]], ['sitting up', 90, 0, [0, 0, -1]],
+  ['half on the side', 0, 60, [Math.sin(Math.PI / 3), 0.5, 0]]]) {
+  await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
+  await expectGravity(gravity, name);
+}
+// Another page may not open the socket.
+const stranger = await context.newPage();
+await stranger.goto('data:text/html,<title>elsewhere</title>');
+const opened = await stranger.evaluate((place) => new Promise((done) => {
+  const socket = new WebSocket(place, 'supine');
+  socket.onopen = () => done(true);
+  socket.onerror = () => done(false);
+}), site.replace('http', 'ws'));
+assert.equal(opened, false, 'a page from elsewhere is let in');
+assert.deepEqual(complaints, []);
+tracker.destroy();
+await browser.close();

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Slicer sample, all but Slicer itself, against a real server started with its own options:
+
+    stream_slicer.py SAMPLES PORT BASIS"""
+import sys
+import time
+
+sys.path.insert(0, sys.argv[1])
+from slicer_lung import SERVER_OPTIONS, Surface  # noqa: E402
+from supine_link import Basis, Link, array  # noqa: E402
+
+assert "--world-down 0,-1,0 --body-from-tracker 0,0,0,1" in " ".join(SERVER_OPTIONS)
+port, basis = int(sys.argv[2]), Basis(sys.argv[3])
+surface = Surface("127.0.0.1", port)
+weights = Link("127.0.0.1", port)
+weights.ask_for("weights")
+
+# Turns of the patient about the head axis, as Slicer's matrices (RAS) have them, and what is lowest.
+TURNS = {
+    "supine": ([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, 1, 0)),
+    "prone": ([-1, 0, 0, 5, 0, -1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, -1, 0)),
+    # on the left side: right (x) points to the ceiling (+y), front (y) to the room's -x
+    "left": ([0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (1, 0, 0)),
+}
+
+
+def settle(read):
+    """What is read last, when nothing has come for half a second."""
+    last, end = None, time.monotonic() + 10
+    quiet = time.monotonic()
+    while time.monotonic() < end and time.monotonic() - quiet < 0.5:
+        found = read()
+        if found is not None:
+            last, quiet = found, time.monotonic()
+    assert last is not None, "nothing comes"
+    return last
+
+
+seen = {}
+for name, (matrix, gravity) in TURNS.items():
+    surface.send(matrix)
+    _, points = settle(lambda: surface.newest(0.05))
+    _, frame = settle(lambda: weights.newest(0.05))
+    wanted = basis.deform(frame)
+    for i in range(0, len(wanted), 3):  # LPS to RAS: the first two are the other way round
+        assert abs(points[i] + wanted[i]) < 5e-3 and abs(points[i + 1] + wanted[i + 1]) < 5e-3
+        assert abs(points[i + 2] - wanted[i + 2]) < 5e-3
+    seen[name] = frame
+    # The same direction, said as a tilt sensor in the patient's own axes (RAS) says it.
+    weights.send("NDARRAY", "Patient", array((-gravity[0], -gravity[1], gravity[2])))
+    _, same = settle(lambda: weights.newest(0.05))
+    assert max(abs(a - b) for a, b in zip(same, frame)) < 1e-5, name
+assert list(surface.triangles) == list(basis.triangles)
+assert max(abs(a - b) for a, b in zip(seen["supine"], seen["prone"])) > 0.05
+assert max(abs(a - b) for a, b in zip(seen["supine"], seen["left"])) > 0.05
+
+try:
+    import numpy  # noqa: F401
+    import vtk
+except ImportError:
+    print("without VTK: the model is not tested")
+else:
+    from slicer_lung import show_points
+
+    class Model:
+        mesh = None
+
+        def GetPolyData(self):
+            return self.mesh
+
+        def SetAndObservePolyData(self, mesh):
+            self.mesh = mesh
+
+    model = Model()
+    for _ in range(2):
+        show_points(vtk, model, points, surface.triangles)
+    assert model.mesh.GetNumberOfPoints() == len(points) // 3
+    assert model.mesh.GetNumberOfPolys() == len(surface.triangles) // 3
+    assert max(abs(a - b) for a, b in zip(model.mesh.GetPoint(7), points[21:24])) < 1e-6
