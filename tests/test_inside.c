@@ -456,8 +456,8 @@ static void test_grid_cells_of_all_points_inside_are_whole(void **state) {
           p[k] += ((double)at[a] + share[a]) * grid->step[a][k];
         }
       }
-      supine_inside_place place[SUPINE_LUNGS_MAX];
-      if (place[supine_inside_shells_find(&shells, p, NULL, place)].depth <= 0.0) {
+      supine_inside_walk walk = {0};
+      if (walk.place[supine_inside_shells_find(&shells, p, INFINITY, &walk)].depth <= 0.0) {
         continue;
       }
       for (size_t corner = 0; corner < 8; ++corner) {

@@ -33,13 +33,12 @@ typedef struct embedding {
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const embedding *e = context;
-  supine_inside_place places[2][SUPINE_LUNGS_MAX];
+  supine_inside_walk walk = {0};
   for (size_t i = begin; i < end; ++i) {
-    supine_inside_place *place = places[i % 2];
-    const size_t lung = supine_inside_shells_find(e->shells, e->content->points + 3 * i,
-                                                  i > begin ? places[(i + 1) % 2] : NULL, place);
+    const size_t lung =
+        supine_inside_shells_find(e->shells, e->content->points + 3 * i, INFINITY, &walk);
     e->lung[i] = (unsigned char)lung;
-    e->place[i] = place[lung];
+    e->place[i] = walk.place[lung];
   }
 }
 

@@ -122,17 +122,14 @@ static void search_rows(void *context, size_t begin, size_t end, size_t thread) 
   const search *work = context;
   const size_t *size = work->grid->size;
   for (size_t row = begin; row < end; ++row) {
-    supine_inside_place places[2][SUPINE_LUNGS_MAX];
+    supine_inside_walk walk = {0};
     for (size_t i = 0; i < size[0]; ++i) {
       const double node[3] = {(double)i, (double)(row % size[1]), (double)(row / size[1])};
       double point[3];
-      supine_inside_place *place = places[i % 2];
       node_point(work->grid, node, point);
-      const size_t lung =
-          supine_inside_shells_find(work->shells, point, i > 0 ? places[(i + 1) % 2] : NULL, place);
-      work->keep[row * size[0] + i] = place[lung].depth > 0.0            ? 2
-                                      : place[lung].depth > -work->limit ? 1
-                                                                         : 0;
+      const size_t lung = supine_inside_shells_find(work->shells, point, work->limit, &walk);
+      const double depth = walk.place[lung].depth;
+      work->keep[row * size[0] + i] = depth > 0.0 ? 2 : depth > -work->limit ? 1 : 0;
     }
   }
 }

@@ -121,13 +121,32 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
-                                 const supine_inside_place *near, supine_inside_place *place) {
-  size_t best = 0;
-  for (size_t lung = 0; lung < shells->count; ++lung) {
-    place[lung] = supine_inside_surface_find(shells->shell[lung].surface, point,
-                                             near != NULL ? &near[lung] : NULL);
-    best = place[lung].depth > place[best].depth ? lung : best;
+/* Brings the walk's place in one lung up to the point. */
+static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
+                    double far, supine_inside_walk *walk) {
+  supine_inside_place *place = &walk->place[lung];
+  if (walk->known[lung]) {
+    const double *from = place->point;
+    const double moved = hypot(hypot(point[0] - from[0], point[1] - from[1]), point[2] - from[2]);
+    if (fabs(place->depth) - moved > far) {
+      return;
+    }
   }
+  *place = supine_inside_surface_find(shells->shell[lung].surface, point,
+                                      walk->known[lung] ? place : NULL);
+  walk->known[lung] = true;
+}
+
+size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
+                                 double far, supine_inside_walk *walk) {
+  step_to(shells, point, walk->lung, far, walk); /* most likely still there */
+  size_t best = walk->lung;
+  for (size_t lung = 0; lung < shells->count && walk->place[best].depth <= 0.0; ++lung) {
+    if (lung != walk->lung) {
+      step_to(shells, point, lung, far, walk);
+      best = walk->place[lung].depth > walk->place[best].depth ? lung : best;
+    }
+  }
+  walk->lung = best;
   return best;
 }

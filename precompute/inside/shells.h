@@ -4,6 +4,8 @@
 #ifndef SUPINE_INSIDE_SHELLS_H
 #define SUPINE_INSIDE_SHELLS_H
 
+#include <stdbool.h>
+
 #include <supine/runtime.h>
 
 #include "precompute/inside/surface.h"
@@ -38,10 +40,19 @@ void supine_inside_shells_free(supine_inside_shells *shells);
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 
-/** The lung that a point is in, or where it is in none, the nearest.
- * @param near   [G] places of a point near by; NULL where none is known
- * @param place  [G], written */
+/** Places of one point after another, each near the one before: what was found lately, by lung. */
+typedef struct supine_inside_walk {
+  bool known[SUPINE_LUNGS_MAX];
+  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< of some earlier point */
+  size_t lung;                                 /**< the last answer */
+} supine_inside_walk;
+
+/** The lung that a point is in, or where it is in none, the nearest; walk->place[lung] is its
+ * place.
+ * @param walk  zeroed for the first point
+ * @param far   mm: where the surface is known to be farther than this the place is left as it was,
+ *              of an earlier point on the same side; INFINITY: never */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
-                                 const supine_inside_place *near, supine_inside_place *place);
+                                 double far, supine_inside_walk *walk);
 
 #endif

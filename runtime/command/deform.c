@@ -7,6 +7,7 @@
 #include "mesh/mesh.h"
 #include <supine/runtime.h>
 
+#include "runtime/command/deform_content.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
 
@@ -14,16 +15,18 @@ static const char name[] = "deform";
 
 typedef struct request {
   supine_orientation orientation;
-  const char *path;
   const char *volume; /* as given, or NULL */
   bool has_scale;
   double scale;
+  supine_deform_content content;
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
-     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
-     .endings = ".ply, .obj, .stl or .vtp"},
+    {"output", 'o', "FILE",
+     ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement; what is inside also goes into "
+     ".csv, images into .nrrd, .nii or .nii.gz",
+     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
+     .endings = ".ply, .obj, .stl, .vtp, .csv, .nrrd, .nii or .nii.gz"},
     {"volume", 0, "ML",
      "air above the resting volume, both lungs together: the surface grows by exactly that; may "
      "be negative; default 500\nleft=ML,right=ML: lung by lung",
@@ -32,6 +35,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
 /* Positions at the given scales as doubles, for measuring and saving. */
@@ -104,15 +108,19 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
+  if (supine_command_deform_content_wanted(&wanted->content)) {
+    result = supine_command_deform_content(&wanted->content, name, basis, weights, scales);
+    goto cleanup;
+  }
   const supine_mesh_save_options save = {.rest = rest.vertices};
   if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK ||
-      supine_mesh_save(wanted->path, &mesh, &save, &error) != SUPINE_OK) {
+      supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->path, gravity[0],
-               gravity[1], gravity[2], largest_displacement(&rest, &mesh));
-  if (info->has_volume) {
+  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->content.path,
+               gravity[0], gravity[1], gravity[2], largest_displacement(&rest, &mesh));
+  if (info->has_volume && supine_basis_metadata(basis, "content") == NULL) {
     (void)printf(", %+.2f mL", 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest)));
   }
   (void)putchar('\n');
@@ -130,7 +138,10 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_basis *basis = NULL;
   supine_error error;
   double gravity[3];
-  int result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
+  int result = supine_command_deform_content_check(&wanted->content, name);
+  if (result == SUPINE_EXIT_OK) {
+    result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
+  }
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
@@ -152,7 +163,9 @@ const supine_command supine_command_deform = {
     .notes = "Examples:\n"
              "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
              "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 "
-             "-o out.ply",
+             "-o out.ply\n"
+             "  supine deform nodules.safetensors --posture prone -o nodules-prone.csv\n"
+             "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Images: which format, what is checked of both, voxels as numbers. */
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "mesh/image/formats.h"
+
+static bool ends_in(const char *path, const char *ending) {
+  const size_t length = strlen(path);
+  const size_t tail = strlen(ending);
+  return length > tail && strcasecmp(path + length - tail, ending) == 0;
+}
+
+static bool is_nifti(const char *path) {
+  return ends_in(path, ".nii") || ends_in(path, ".nii.gz");
+}
+
+bool supine_image_supports(const char *path) {
+  return ends_in(path, ".nrrd") || is_nifti(path);
+}
+
+static double determinant(const double step[3][3]) {
+  const double *u = step[0];
+  const double *v = step[1];
+  const double *w = step[2];
+  return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+         u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+/* Finite, and three directions? A voxel's edges are no closer than a thousandth of a right angle.
+ */
+static bool is_frame(const supine_image *image) {
+  double lengths = 1.0;
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    lengths *= sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    if (!isfinite(image->origin[a])) {
+      return false;
+    }
+  }
+  return isfinite(lengths) && lengths > 0.0 && fabs(determinant(image->step)) > 1e-3 * lengths;
+}
+
+size_t supine_image_bytes(const supine_image *image, size_t file_size) {
+  const double bytes = (double)image->size[0] * (double)image->size[1] * (double)image->size[2] *
+                       (double)supine_image_voxel_size(image->voxel);
+  return bytes <= (double)SUPINE_IMAGE_GZIP_RATIO * (double)file_size ? (size_t)bytes : 0;
+}
+
+supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
+  struct stat file = {0};
+  supine_image read = {.channels = 1};
+  if (!supine_image_supports(path)) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
+  }
+  if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
+                            strerror(errno == 0 ? EISDIR : errno)); /* NOLINT */
+  }
+  supine_status status = is_nifti(path)
+                             ? supine_image_read_nifti(path, (size_t)file.st_size, &read, error)
+                             : supine_image_read_nrrd(path, (size_t)file.st_size, &read, error);
+  if (status == SUPINE_OK && !is_frame(&read)) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: the header's directions are no three axes", path);
+  }
+  if (status != SUPINE_OK) {
+    supine_image_free(&read);
+    return status;
+  }
+  *image = read;
+  return SUPINE_OK;
+}
+
+void supine_image_free(supine_image *image) {
+  free(image->values);
+  *image = (supine_image){0};
+}
+
+supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
+                                 supine_error *error) {
+  if (!supine_image_supports(path)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
+  }
+  return is_nifti(path) ? supine_image_write_nifti(path, ends_in(path, ".gz"), image, note, error)
+                        : supine_image_write_nrrd(path, image, note, error);
+}
+
+size_t supine_image_voxel_size(supine_image_voxel voxel) {
+  static const size_t sizes[SUPINE_VOXEL_COUNT] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[voxel];
+}
+
+double supine_image_get(const supine_image *image, size_t index) {
+  const void *v = image->values;
+  switch (image->voxel) {
+  case SUPINE_VOXEL_I8:
+    return ((const int8_t *)v)[index];
+  case SUPINE_VOXEL_U8:
+    return ((const uint8_t *)v)[index];
+  case SUPINE_VOXEL_I16:
+    return ((const int16_t *)v)[index];
+  case SUPINE_VOXEL_U16:
+    return ((const uint16_t *)v)[index];
+  case SUPINE_VOXEL_I32:
+    return ((const int32_t *)v)[index];
+  case SUPINE_VOXEL_U32:
+    return ((const uint32_t *)v)[index];
+  case SUPINE_VOXEL_F32:
+    return (double)((const float *)v)[index];
+  case SUPINE_VOXEL_F64:
+  case SUPINE_VOXEL_COUNT:
+    break;
+  }
+  return ((const double *)v)[index];
+}
+
+static double clip(double value, double low, double high) {
+  return fmin(fmax(rint(value), low), high);
+}
+
+void supine_image_set(supine_image *image, size_t index, double value) {
+  void *v = image->values;
+  switch (image->voxel) {
+  case SUPINE_VOXEL_I8:
+    ((int8_t *)v)[index] = (int8_t)clip(value, INT8_MIN, INT8_MAX);
+    break;
+  case SUPINE_VOXEL_U8:
+    ((uint8_t *)v)[index] = (uint8_t)clip(value, 0, UINT8_MAX);
+    break;
+  case SUPINE_VOXEL_I16:
+    ((int16_t *)v)[index] = (int16_t)clip(value, INT16_MIN, INT16_MAX);
+    break;
+  case SUPINE_VOXEL_U16:
+    ((uint16_t *)v)[index] = (uint16_t)clip(value, 0, UINT16_MAX);
+    break;
+  case SUPINE_VOXEL_I32:
+    ((int32_t *)v)[index] = (int32_t)clip(value, INT32_MIN, INT32_MAX);
+    break;
+  case SUPINE_VOXEL_U32:
+    ((uint32_t *)v)[index] = (uint32_t)clip(value, 0, UINT32_MAX);
+    break;
+  case SUPINE_VOXEL_F32:
+    ((float *)v)[index] = (float)value;
+    break;
+  case SUPINE_VOXEL_F64:
+  case SUPINE_VOXEL_COUNT:
+    ((double *)v)[index] = value;
+    break;
+  }
+}
+
+void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
+  const double whole = determinant(image->step);
+  double from[3];
+  for (int k = 0; k < 3; ++k) {
+    from[k] = point[k] - image->origin[k];
+  }
+  for (int a = 0; a < 3; ++a) { /* Cramer's rule */
+    double replaced[3][3];
+    memcpy(replaced, image->step, sizeof replaced);
+    memcpy(replaced[a], from, sizeof from);
+    voxel[a] = determinant((const double(*)[3])replaced) / whole;
+  }
+}

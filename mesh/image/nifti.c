@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* NIfTI, read through libnifti2, written as NIfTI-1. */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <nifti2_io.h>
+#include <zlib.h>
+
+#include "sh/base/output.h"
+
+#include "mesh/image/formats.h"
+
+static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
+                                              DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};
+
+/* Size, type and frame; NIfTI is RAS. */
+static supine_status check(const char *path, const nifti_image *nifti, size_t file_size,
+                           supine_image *image, supine_error *error) {
+  const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
+                      : nifti->xyz_units == NIFTI_UNITS_MICRON ? 1e-3
+                                                               : 1.0;
+  const nifti_dmat44 *m = nifti->sform_code > 0 ? &nifti->sto_xyz : &nifti->qto_xyz;
+  const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
+  size_t type = 0;
+  if (nifti->ndim != 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: %d axes; one number a voxel and three axes are wanted", path,
+                            (int)nifti->ndim);
+  }
+  if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the header has no orientation (qform and sform are 0)", path);
+  }
+  while (type < SUPINE_VOXEL_COUNT && types[type] != nifti->datatype) {
+    ++type;
+  }
+  if (type == SUPINE_VOXEL_COUNT) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: voxels of type %s are not read", path,
+                            nifti_datatype_string(nifti->datatype));
+  }
+  image->voxel = (supine_image_voxel)type;
+  for (int k = 0; k < 3; ++k) {
+    const double turn = k < 2 ? -unit : unit;
+    image->size[k] = (size_t)size[k];
+    image->origin[k] = turn * m->m[k][3];
+    for (int a = 0; a < 3; ++a) {
+      image->step[a][k] = turn * m->m[k][a];
+    }
+  }
+  if (size[0] < 1 || size[1] < 1 || size[2] < 1 || supine_image_bytes(image, file_size) == 0) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold", path,
+                            image->size[0], image->size[1], image->size[2], file_size);
+  }
+  return SUPINE_OK;
+}
+
+/* Stored numbers times slope, plus intercept, as F32. */
+static supine_status rescale(const char *path, const nifti_image *nifti, supine_image *image,
+                             supine_error *error) {
+  const double slope = nifti->scl_slope;
+  const double intercept = nifti->scl_inter;
+  if (slope == 0.0 || !isfinite(slope) || !isfinite(intercept) ||
+      (slope == 1.0 && intercept == 0.0)) {
+    return SUPINE_OK;
+  }
+  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  float *values = malloc(count * sizeof *values);
+  if (values == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    values[i] = (float)(slope * supine_image_get(image, i) + intercept);
+  }
+  free(image->values);
+  image->values = values;
+  image->voxel = SUPINE_VOXEL_F32;
+  return SUPINE_OK;
+}
+
+supine_status supine_image_read_nifti(const char *path, size_t file_size, supine_image *image,
+                                      supine_error *error) {
+  nifti_set_debug_level(0);
+  nifti_image *nifti = nifti_image_read(path, 0);
+  if (nifti == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no NIfTI header", path);
+  }
+  supine_status status = check(path, nifti, file_size, image, error);
+  if (status == SUPINE_OK && nifti_image_load(nifti) != 0) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: truncated or damaged", path);
+  }
+  if (status == SUPINE_OK) {
+    image->values = nifti->data;
+    nifti->data = NULL;
+    status = rescale(path, nifti, image, error);
+  }
+  nifti_image_free(nifti);
+  return status;
+}
+
+/* The header, 348 bytes and 4 that say that nothing comes before the voxels. */
+static void make_header(const supine_image *image, const char *note, unsigned char header[352]) {
+  nifti_1_header h = {0};
+  static const short bits[SUPINE_VOXEL_COUNT] = {8, 8, 16, 16, 32, 32, 32, 64};
+  float *rows[3] = {h.srow_x, h.srow_y, h.srow_z};
+  h.sizeof_hdr = 348;
+  h.dim[0] = 3;
+  h.datatype = (short)types[image->voxel];
+  h.bitpix = bits[image->voxel];
+  h.vox_offset = 352.0F;
+  h.scl_slope = 1.0F;
+  h.xyzt_units = NIFTI_UNITS_MM;
+  h.sform_code = NIFTI_XFORM_SCANNER_ANAT;
+  h.pixdim[0] = 1.0F;
+  for (int a = 0; a < 7; ++a) {
+    h.dim[1 + a] = 1;
+  }
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    h.dim[1 + a] = (short)image->size[a];
+    h.pixdim[1 + a] = (float)sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    for (int k = 0; k < 3; ++k) {
+      rows[k][a] = (float)(k < 2 ? -s[k] : s[k]);
+    }
+    rows[a][3] = (float)(a < 2 ? -image->origin[a] : image->origin[a]);
+  }
+  (void)snprintf(h.descrip, sizeof h.descrip, "%.79s", note != NULL ? note : "");
+  memcpy(h.magic, "n+1", 4);
+  memset(header, 0, 352);
+  memcpy(header, &h, sizeof h);
+}
+
+/* Deflates `bytes` more bytes into the file; `flush` is Z_FINISH for the last. */
+static bool deflate_bytes(z_stream *z, const unsigned char *values, size_t bytes, int flush,
+                          FILE *file) {
+  enum { PIECE = 1 << 28, SPACE = 1 << 16 };
+  unsigned char space[SPACE];
+  do {
+    const size_t piece = bytes < PIECE ? bytes : PIECE;
+    z->next_in = (unsigned char *)(uintptr_t)values; /* zlib does not write there */
+    z->avail_in = (unsigned)piece;
+    values += piece;
+    bytes -= piece;
+    do {
+      z->next_out = space;
+      z->avail_out = SPACE;
+      (void)deflate(z, bytes == 0 ? flush : Z_NO_FLUSH); /* fails on misuse alone */
+      const size_t made = SPACE - z->avail_out;
+      if (fwrite(space, 1, made, file) != made) {
+        return false;
+      }
+    } while (z->avail_out == 0);
+  } while (bytes > 0);
+  return true;
+}
+
+static bool write_gzip(FILE *file, const unsigned char *header, const unsigned char *values,
+                       size_t bytes) {
+  enum { LEVEL = 6, GZIP = 16 + MAX_WBITS, MEMORY = 8 };
+  z_stream z = {0};
+  if (deflateInit2(&z, LEVEL, Z_DEFLATED, GZIP, MEMORY, Z_DEFAULT_STRATEGY) != Z_OK) {
+    return false;
+  }
+  const bool well = deflate_bytes(&z, header, 352, Z_NO_FLUSH, file) &&
+                    deflate_bytes(&z, values, bytes, Z_FINISH, file);
+  (void)deflateEnd(&z);
+  return well;
+}
+
+supine_status supine_image_write_nifti(const char *path, bool compressed, const supine_image *image,
+                                       const char *note, supine_error *error) {
+  unsigned char header[352];
+  supine_output output = {0};
+  if (image->channels != 1 || image->size[0] > INT16_MAX || image->size[1] > INT16_MAX ||
+      image->size[2] > INT16_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: NIfTI-1 has one number a voxel and at most %d voxels a side: "
+                            "write .nrrd",
+                            path, INT16_MAX);
+  }
+  supine_status status = supine_output_open(path, &output, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  make_header(image, note, header);
+  const size_t bytes =
+      image->size[0] * image->size[1] * image->size[2] * supine_image_voxel_size(image->voxel);
+  const bool well = compressed ? write_gzip(output.file, header, image->values, bytes)
+                               : fwrite(header, 1, sizeof header, output.file) == sizeof header &&
+                                     fwrite(image->values, 1, bytes, output.file) == bytes;
+  if (!well) {
+    supine_output_abandon(&output);
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: is the disk full?", path);
+  }
+  return supine_output_commit(&output, error);
+}

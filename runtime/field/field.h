@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The displacement field over a grid that 'supine embed' made: where the tissue of each node goes,
+ * its inverse, and images moved by it. Between nodes fields are trilinear, and beyond the outermost
+ * ones as there. */
+#ifndef SUPINE_FIELD_H
+#define SUPINE_FIELD_H
+
+#include <supine/runtime.h>
+
+#include "mesh/image/image.h"
+
+/** u(x) at the nodes x of a grid, mm. */
+typedef struct supine_field {
+  supine_image nodes;    /**< three channels, F32 */
+  unsigned char *inside; /**< of each node: 1 inside a lung at rest, else 0 */
+} supine_field;
+
+/** The field of a basis's grid at some weights and scales. Outside the lungs, beyond the nodes that
+ * the basis has, it fades out to 0 over `fade` mm: smooth to look at, but it means nothing there.
+ * @param field  written; release with supine_field_free
+ * @retval SUPINE_ERROR_FORMAT  the basis is of no grid, or its grid is malformed
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_field_create(const supine_basis *basis, const double *weights,
+                                  const double *scales, double fade, supine_field *field,
+                                  supine_error *error);
+void supine_field_free(supine_field *field);
+
+/** u at any point. */
+void supine_field_at(const supine_field *field, const double point[3], double u[3]);
+
+/** How far forward and inverse together miss. */
+typedef struct supine_field_residual {
+  double rms, largest; /**< mm, over the nodes inside: |u(x) + v(x + u(x))| */
+  size_t lost; /**< nodes of the inverse at which none was found to 0.01 mm: the field folds */
+} supine_field_residual;
+
+/** The inverse v on the same nodes: v(y) = x - y where x + u(x) = y, by Newton's steps. What a
+ * resampled image takes its voxel at y from is y + v(y).
+ * @retval SUPINE_ERROR_MEMORY
+ * Cost: some ten evaluations a node, in parallel. */
+supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
+                                  supine_field_residual *residual, supine_error *error);
+
+/** image(y) = image(y + v(y)) in place, on its own voxels; where that lies outside the image, the
+ * nearest of its voxels.
+ * @param inverse  of supine_field_invert
+ * @param labels   nearest voxel instead of linear
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_field_resample(const supine_field *inverse, bool labels, supine_image *image,
+                                    supine_error *error);
+
+#endif

@@ -1,0 +1,371 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Fields over a grid: forward and inverse, images that follow, and what plastimatch makes of them.
+ */
+#include "inside_helpers.h"
+
+#include "precompute/inside/embed.h"
+#include "precompute/inside/grid.h"
+#include "runtime/field/field.h"
+
+static char folder[] = "/tmp/supine-field-XXXXXX";
+static supine_basis *surface;
+static supine_basis *grid;
+
+/* Half of the affine and the quadratic motion: up to about 20 mm. */
+static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
+static const double scales[2] = {1.0, 1.0};
+
+static const char *in_folder(const char *name) {
+  static char path[4][96];
+  static size_t next;
+  next = (next + 1) % 4;
+  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
+  return path[next];
+}
+
+static void make_grid(double spacing) {
+  supine_inside_shells shells;
+  supine_inside_content content = {0};
+  supine_inside_report report;
+  supine_error error;
+  const supine_inside_options options = {0};
+  if (supine_inside_shells_create(surface, &shells, &error) != SUPINE_OK ||
+      supine_inside_content_grid(&shells, NULL, spacing, 60.0, &content, &error) != SUPINE_OK ||
+      supine_inside_embed(&shells, &content, &options, in_folder("grid"), &report, &error) !=
+          SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  supine_inside_content_free(&content);
+  supine_inside_shells_free(&shells);
+}
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  helper_write_basis(in_folder("surface"), 10, 2);
+  surface = helper_open(in_folder("surface"));
+  make_grid(4.0);
+  grid = helper_open(in_folder("grid"));
+  return 0;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  char command[64];
+  supine_basis_close(surface);
+  supine_basis_close(grid);
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c) */
+}
+
+static supine_field made_field(void) {
+  supine_field field;
+  supine_error error;
+  if (supine_field_create(grid, weights, scales, 60.0, &field, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return field;
+}
+
+static double size_of(const double v[3]) {
+  return hypot(hypot(v[0], v[1]), v[2]);
+}
+
+/* On its nodes the field is the basis's; far outside it is 0; between, trilinear. */
+static void test_field_nodes_cells_and_border(void **state) {
+  (void)state;
+  supine_field field = made_field();
+  const supine_basis_info *info = supine_basis_get_info(grid);
+  float *moved = malloc(3 * info->vertex_count * sizeof *moved);
+  supine_displace_range(grid, weights, scales, 0, info->vertex_count, moved);
+  for (size_t i = 0; i < info->vertex_count; i += 97) {
+    double p[3];
+    double u[3];
+    for (size_t k = 0; k < 3; ++k) {
+      p[k] = (double)info->vertices[3 * i + k];
+    }
+    supine_field_at(&field, p, u);
+    for (size_t k = 0; k < 3; ++k) { /* positions are float32: 1e-5 mm of a slope below 1 */
+      assert_close(u[k], (double)moved[3 * i + k], 2e-5);
+    }
+  }
+  const float *values = field.nodes.values;
+  assert_true(values[0] == 0.0F && values[1] == 0.0F &&
+              values[2] == 0.0F); /* a corner of the box */
+  const size_t *n = field.nodes.size;
+  const size_t at = n[0] / 4 + n[0] * (n[1] / 2 + n[1] * (n[2] / 2));
+  double middle[3];
+  double u[3];
+  for (size_t k = 0; k < 3; ++k) {
+    middle[k] = field.nodes.origin[k] + (double)(n[0] / 4) * field.nodes.step[0][k] +
+                (double)(n[1] / 2) * field.nodes.step[1][k] +
+                (double)(n[2] / 2) * field.nodes.step[2][k] + 0.25 * field.nodes.step[0][k];
+  }
+  supine_field_at(&field, middle, u);
+  for (size_t k = 0; k < 3; ++k) {
+    assert_close(u[k], 0.75 * (double)values[3 * at + k] + 0.25 * (double)values[3 * (at + 1) + k],
+                 1e-5);
+  }
+  free(moved);
+  supine_field_free(&field);
+}
+
+static void test_field_inverse_composes_to_less_than_a_tenth(void **state) {
+  (void)state;
+  supine_field field = made_field();
+  supine_field inverse;
+  supine_field_residual residual;
+  assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+  print_message("forward and inverse: %.4f mm RMS, %.4f mm at most\n", residual.rms,
+                residual.largest);
+  assert_true(residual.largest <= 0.1);
+  assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
+  /* What is stated is what is: at points between the nodes too. */
+  const supine_basis_info *info = supine_basis_get_info(surface);
+  uint64_t seed = 3;
+  double largest = 0.0;
+  for (int i = 0; i < 4000; ++i) {
+    const double share = 0.9 * helper_random(&seed);
+    const size_t vertex = (size_t)(helper_random(&seed) * (double)info->vertex_count);
+    const double centre[3] = {vertex < info->lung_begin[1] ? 71.3 : -72.9, 3.1, -40.7};
+    double x[3];
+    double y[3];
+    double u[3];
+    double v[3];
+    for (size_t k = 0; k < 3; ++k) {
+      x[k] = centre[k] + share * ((double)info->vertices[3 * vertex + k] - centre[k]);
+    }
+    supine_field_at(&field, x, u);
+    for (int k = 0; k < 3; ++k) {
+      y[k] = x[k] + u[k];
+    }
+    supine_field_at(&inverse, y, v);
+    for (int k = 0; k < 3; ++k) {
+      v[k] += u[k];
+    }
+    largest = fmax(largest, size_of(v));
+  }
+  assert_true(largest <=
+              1.5 * residual.largest); /* points between the nodes are no worse but by chance */
+  supine_field_free(&field);
+  supine_field_free(&inverse);
+}
+
+/* 2 mm voxels over the left lump with a ball of radius 9 mm about each of some landmarks. */
+enum { LANDMARKS = 5 };
+static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
+                                               {90.0, 20.0, 10.0},
+                                               {60.0, -30.0, -90.0},
+                                               {95.0, 25.0, -70.0},
+                                               {50.0, 5.0, 30.0}};
+
+static supine_image ball_image(supine_image_voxel voxel) {
+  supine_image image = {.size = {100, 110, 160},
+                        .origin = {-28.0, -106.0, -210.0},
+                        .step = {{2, 0, 0}, {0, 2, 0}, {0, 0, 2}},
+                        .voxel = voxel,
+                        .channels = 1};
+  image.values =
+      calloc(image.size[0] * image.size[1] * image.size[2], supine_image_voxel_size(voxel));
+  for (size_t i = 0; i < image.size[0] * image.size[1] * image.size[2]; ++i) {
+    const double p[3] = {image.origin[0] + 2.0 * (double)(i % 100),
+                         image.origin[1] + 2.0 * (double)(i / 100 % 110),
+                         image.origin[2] + 2.0 * (double)(i / 11000)};
+    for (int l = 0; l < LANDMARKS; ++l) {
+      const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
+      if (size_of(d) < 9.0) { /* labels 1 to 5, or brightness that says which */
+        supine_image_set(&image, i, voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0);
+      }
+    }
+  }
+  return image;
+}
+
+/* Centroid of what is bright near a point. */
+static void centroid(const supine_image *image, const double about[3], int label, double c[3]) {
+  double sum = 0.0;
+  c[0] = c[1] = c[2] = 0.0;
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    double p[3];
+    double d[3];
+    for (size_t k = 0; k < 3; ++k) {
+      p[k] = image->origin[k] + (double)(i % image->size[0]) * image->step[0][k] +
+             (double)(i / image->size[0] % image->size[1]) * image->step[1][k] +
+             (double)(i / image->size[0] / image->size[1]) * image->step[2][k];
+      d[k] = p[k] - about[k];
+    }
+    const double value = supine_image_get(image, i);
+    const double weight = label > 0 ? (value == (double)label) : value;
+    if (size_of(d) < 14.0 && weight > 0.0) {
+      sum += weight;
+      for (int k = 0; k < 3; ++k) {
+        c[k] += weight * p[k];
+      }
+    }
+  }
+  assert_true(sum > 0.0);
+  for (int k = 0; k < 3; ++k) {
+    c[k] /= sum;
+  }
+}
+
+/* Where the points' own basis puts the landmarks. */
+static void moved_landmarks(double out[LANDMARKS][3]) {
+  supine_inside_shells shells;
+  supine_inside_report report;
+  const supine_inside_options options = {0};
+  uint32_t part[LANDMARKS] = {0, 1, 2, 3, 4};
+  char names[] = "a\nb\nc\nd\ne";
+  double points[3 * LANDMARKS];
+  memcpy(points, landmarks, sizeof points);
+  const supine_inside_content content = {
+      .count = LANDMARKS, .points = points, .part = part, .part_count = LANDMARKS, .names = names};
+  assert_int_equal(supine_inside_shells_create(surface, &shells, NULL), SUPINE_OK);
+  assert_int_equal(
+      supine_inside_embed(&shells, &content, &options, in_folder("points"), &report, NULL),
+      SUPINE_OK);
+  assert_int_equal(report.outside, 0);
+  assert_int_equal(report.in_lung[0], LANDMARKS);
+  supine_basis *inside = helper_open(in_folder("points"));
+  float xyz[3 * LANDMARKS];
+  supine_deform(inside, weights, scales, xyz);
+  for (int i = 0; i < 3 * LANDMARKS; ++i) {
+    out[i / 3][i % 3] = (double)xyz[i];
+  }
+  supine_basis_close(inside);
+  supine_inside_shells_free(&shells);
+}
+
+/* A moved image's landmarks against the moved points: within a voxel, 2 mm. */
+static void check_landmarks(const supine_image *image, bool labels) {
+  double moved[LANDMARKS][3];
+  double largest = 0.0;
+  moved_landmarks(moved);
+  for (int l = 0; l < LANDMARKS; ++l) {
+    double c[3];
+    double way[3];
+    centroid(image, moved[l], labels ? l + 1 : 0, c);
+    for (int k = 0; k < 3; ++k) {
+      way[k] = moved[l][k] - landmarks[l][k];
+      c[k] -= moved[l][k];
+    }
+    assert_true(size_of(way) > 4.0); /* it did move */
+    largest = fmax(largest, size_of(c));
+  }
+  print_message("landmarks off by %.2f mm at most\n", largest);
+  assert_true(largest < 2.0);
+}
+
+static void test_resample_landmarks_land_where_the_points_do(void **state) {
+  (void)state;
+  supine_field field = made_field();
+  supine_field inverse;
+  supine_field_residual residual;
+  assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+  for (int labels = 0; labels < 2; ++labels) {
+    supine_image image = ball_image(labels ? SUPINE_VOXEL_U8 : SUPINE_VOXEL_I16);
+    assert_int_equal(supine_field_resample(&inverse, labels != 0, &image, NULL), SUPINE_OK);
+    for (size_t i = 0; i < image.size[0] * image.size[1] * image.size[2] && labels; ++i) {
+      assert_true(supine_image_get(&image, i) <= LANDMARKS);
+    }
+    check_landmarks(&image, labels != 0);
+    supine_image_free(&image);
+  }
+  supine_field_free(&field);
+  supine_field_free(&inverse);
+}
+
+static void test_plastimatch_warps_by_the_inverse_field(void **state) {
+  (void)state;
+  if (system("plastimatch --version >/dev/null 2>&1") != 0) { /* NOLINT(cert-env33-c) */
+    print_message("skipped: plastimatch is not there\n");
+    skip();
+  }
+  supine_field field = made_field();
+  supine_field inverse;
+  supine_field_residual residual;
+  supine_image image = ball_image(SUPINE_VOXEL_I16);
+  supine_error error;
+  assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+  if (supine_image_write(in_folder("v.nrrd"), &inverse.nodes, "inverse", &error) != SUPINE_OK ||
+      supine_image_write(in_folder("balls.nrrd"), &image, NULL, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  char command[512];
+  (void)snprintf(command, sizeof command,
+                 "cd %s && plastimatch warp --input balls.nrrd --fixed balls.nrrd --xf v.nrrd "
+                 "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1",
+                 folder);
+  assert_int_equal(system(command), 0); /* NOLINT(cert-env33-c) */
+  supine_image_free(&image);
+  if (supine_image_read(in_folder("warped.nrrd"), &image, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  check_landmarks(&image, false);
+  supine_image_free(&image);
+  supine_field_free(&field);
+  supine_field_free(&inverse);
+}
+
+static void test_field_of_no_grid_refused(void **state) {
+  (void)state;
+  supine_field field;
+  supine_error error;
+  assert_int_equal(supine_field_create(surface, weights, scales, 60.0, &field, &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_non_null(strstr(error.message, "supine embed"));
+}
+
+/* A grid's tensors, one after the other made to lie. */
+static void test_field_malformed_grids_refused(void **state) {
+  (void)state;
+  const supine_basis_info *info = supine_basis_get_info(grid);
+  const size_t n = info->vertex_count;
+  uint32_t *part = malloc(n * sizeof *part);
+  for (int lie = 0; lie < 5; ++lie) {
+    double frame[12];
+    uint32_t size[3];
+    memcpy(frame, supine_basis_tensor(grid, "grid")->data, sizeof frame);
+    memcpy(size, supine_basis_tensor(grid, "grid_size")->data, sizeof size);
+    memcpy(part, supine_basis_tensor(grid, "part")->data, n * sizeof *part);
+    frame[4] = lie == 0 ? NAN : frame[4];
+    part[n / 2] = lie == 1 ? 3999999999U : part[n / 2];
+    size[2] = lie == 2 ? 4000000000U : lie == 3 ? 1 : size[2];
+    if (lie == 4) {
+      memcpy(frame + 6, frame + 3, 3 * sizeof *frame);
+    }
+    const supine_tensor tensors[] = {
+        *supine_basis_tensor(grid, "vertices"), *supine_basis_tensor(grid, "triangles"),
+        *supine_basis_tensor(grid, "lung"),     *supine_basis_tensor(grid, "coefficients"),
+        *supine_basis_tensor(grid, "modes"),    *supine_basis_tensor(grid, "depth"),
+        {"part", SUPINE_U32, 1, {n}, part},     {"grid", SUPINE_F64, 2, {4, 3}, frame},
+        {"grid_size", SUPINE_U32, 1, {3}, size}};
+    const supine_metadata metadata[] = {
+        {"format", "supine-basis"}, {"version", "2"}, {"kind", "vector"}};
+    assert_int_equal(
+        supine_writer_safetensors_write(in_folder("lie"), tensors, 9, metadata, 3, NULL),
+        SUPINE_OK);
+    supine_basis *bad = helper_open(in_folder("lie"));
+    supine_field field;
+    supine_error error;
+    assert_int_equal(supine_field_create(bad, weights, scales, 60.0, &field, &error),
+                     SUPINE_ERROR_FORMAT);
+    assert_non_null(strstr(error.message, "malformed"));
+    supine_basis_close(bad);
+  }
+  free(part);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_field_nodes_cells_and_border),
+      cmocka_unit_test(test_field_inverse_composes_to_less_than_a_tenth),
+      cmocka_unit_test(test_resample_landmarks_land_where_the_points_do),
+      cmocka_unit_test(test_plastimatch_warps_by_the_inverse_field),
+      cmocka_unit_test(test_field_of_no_grid_refused),
+      cmocka_unit_test(test_field_malformed_grids_refused),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}
