@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One subject: basis, comparison, and what came of it.
+
+    python3 subject.py FOLDER/result.json VOLUME yes|no 'PRECOMPUTE OPTIONS' MESH...
+
+Leaves basis.safetensors, report.html and result.json in the folder. A subject's own failure (bad
+input, impossible numbers) is a result too, with the program's message; a full disk is not: it ends
+with the program's exit code, so that the subject is done again. The program is $SUPINE."""
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+OUTPUT_FAILED = 4  # supine's exit code
+
+
+def run(*arguments):
+    done = subprocess.run([os.environ.get("SUPINE", "supine"), *arguments], capture_output=True,
+                          text=True, check=False)
+    if done.returncode == OUTPUT_FAILED or done.returncode < 0:
+        sys.exit(f"{done.stderr.strip()} (ended with {done.returncode})")
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or ["no message"]
+        errors = [line for line in lines if not line.startswith("Try ") and " note: " not in line]
+        raise ValueError((errors or lines)[-1])
+    return done.stdout
+
+
+def work(folder, volume, report, options, meshes):
+    basis = os.path.join(folder, "basis.safetensors")
+    page = ["-o", os.path.join(folder, "report.html")] if report == "yes" else []
+    run("precompute", *meshes, *options, "-o", basis)
+    comparison = run("compare", basis, "--volume", volume, "--json", *page)
+    return {"info": json.loads(run("info", basis, "--json")), "comparison": json.loads(comparison)}
+
+
+def main(output, volume, report, options, *meshes):
+    folder = os.path.dirname(output)
+    os.makedirs(folder, exist_ok=True)
+    result = {"subject": os.path.basename(folder)}
+    for stale in ("basis.safetensors", "report.html"):
+        if os.path.exists(os.path.join(folder, stale)):
+            os.unlink(os.path.join(folder, stale))
+    try:
+        result.update(work(folder, volume, report, shlex.split(options), meshes))
+    except ValueError as error:
+        result["failure"] = str(error)
+    with open(output + ".part", "w", encoding="utf-8") as file:
+        json.dump(result, file, indent=1)
+    os.replace(output + ".part", output)
+
+
+main(*sys.argv[1:])
