@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Runs a fuzzer where libFuzzer is not at hand (gcc), and makes its seeds.
+ *
+ *     fuzz_X FILE...                             the files, one after the other
+ *     fuzz_X -seeds FOLDER                       writes the seeds there
+ *     fuzz_X -runs N [-seed S] [-dict FILE]      N inputs made from the seeds
+ *
+ * Prints how many inputs were run, how long the slowest took and the most memory held; ends with 1
+ * where an input took more than 10 s or 2 GB. An input that crashes stays in the working folder. */
+#include <fcntl.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "fuzz.h"
+
+enum { SEEDS_MAX = 64, WORDS_MAX = 256, WORD_MAX = 64, SIZE_MOST = 1 << 16 };
+static const double seconds_most = 10.0;
+static const double megabytes_most = 2000.0;
+
+typedef struct word {
+  uint8_t bytes[WORD_MAX];
+  size_t size;
+} word;
+
+static word words[WORDS_MAX];
+static size_t word_count;
+static uint8_t *seeds[SEEDS_MAX];
+static size_t seed_size[SEEDS_MAX];
+static size_t seed_count;
+static uint64_t state;
+static double slowest;
+
+/* The input at hand, for the handler of a crash. */
+static const uint8_t *current;
+static size_t current_size;
+
+static uint64_t next_random(void) {
+  state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+  return state >> 33;
+}
+
+static void keep_crasher(int number) {
+  static const char name[] = "crash-input";
+  const int file = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (file >= 0 && write(file, current, current_size) >= 0) {
+    (void)!write(2, "kept as crash-input\n", 20);
+  }
+  (void)signal(number, SIG_DFL);
+  (void)raise(number);
+}
+
+/* name="word" or "word", with \\ \" and \xHH, a line each. */
+static void read_dictionary(const char *path) {
+  char line[512];
+  FILE *file = fopen(path, "r");
+  supine_fuzz_expect(file != NULL, path);
+  while (word_count < WORDS_MAX && fgets(line, sizeof line, file) != NULL) {
+    const char *at = line[0] == '#' ? NULL : strchr(line, '"');
+    word *made = &words[word_count];
+    made->size = 0;
+    while (at != NULL && *++at != '"' && *at != '\0' && made->size < WORD_MAX) {
+      unsigned value = (unsigned char)*at;
+      if (*at == '\\' && at[1] == 'x' && sscanf(at + 2, "%2x", &value) == 1) {
+        at += 3;
+      } else if (*at == '\\') {
+        value = (unsigned char)*++at;
+      }
+      made->bytes[made->size++] = (uint8_t)value;
+    }
+    word_count += made->size > 0;
+  }
+  (void)fclose(file);
+}
+
+static size_t put_word(uint8_t *bytes, size_t size, size_t place, const uint8_t *with, size_t count,
+                       bool insert) {
+  if (insert && size + count <= SIZE_MOST) {
+    memmove(bytes + place + count, bytes + place, size - place);
+    size += count;
+  }
+  memcpy(bytes + place, with, place + count <= size ? count : size - place);
+  return size;
+}
+
+/* One change: a bit, a byte, a word, a number in text, a piece cut out, doubled or from elsewhere.
+ */
+static size_t change(uint8_t *bytes, size_t size) {
+  static const char *const numbers[] = {"-1",    "0",   "4294967296",
+                                        "1e999", "nan", "99999999999999999999"};
+  const size_t place = size == 0 ? 0 : next_random() % size;
+  const size_t length = size == 0 ? 0 : 1 + next_random() % (size - place < 64 ? size - place : 64);
+  uint8_t piece[64];
+  switch (next_random() % 8) {
+  case 0:
+    bytes[place] = (uint8_t)(bytes[place] ^ 1U << next_random() % 8);
+    return size;
+  case 1:
+    bytes[place] = (uint8_t)(next_random() % 4 == 0 ? 0xFF : next_random());
+    return size;
+  case 2:
+    memmove(bytes + place, bytes + place + length, size - place - length);
+    return size - length;
+  case 3:
+    memcpy(piece, bytes + place, length);
+    return put_word(bytes, size, place, piece, length, true);
+  case 4: {
+    const char *number = numbers[next_random() % (sizeof numbers / sizeof *numbers)];
+    return put_word(bytes, size, place, (const uint8_t *)number, strlen(number), next_random() % 2);
+  }
+  case 5: {
+    const size_t other = next_random() % seed_count;
+    const size_t from = next_random() % (seed_size[other] + 1);
+    const size_t count = seed_size[other] - from < 64 ? seed_size[other] - from : 64;
+    return put_word(bytes, size, place, seeds[other] + from, count, next_random() % 2);
+  }
+  case 6:
+    return next_random() % 8 == 0 ? place : size;
+  default: {
+    const word *chosen = word_count == 0 ? NULL : &words[next_random() % word_count];
+    return chosen == NULL
+               ? size
+               : put_word(bytes, size, place, chosen->bytes, chosen->size, next_random() % 2);
+  }
+  }
+}
+
+static double seconds(void) {
+  struct timespec now;
+  (void)clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* As a block of its very size, so that a sanitizer sees every byte read beyond it. */
+static void run(const uint8_t *bytes, size_t size) {
+  uint8_t *copy = malloc(size + (size == 0));
+  supine_fuzz_expect(copy != NULL, "memory for an input");
+  memcpy(copy, bytes, size);
+  current = copy;
+  current_size = size;
+  const double begin = seconds();
+  (void)LLVMFuzzerTestOneInput(copy, size);
+  const double took = seconds() - begin;
+  slowest = took > slowest ? took : slowest;
+  free(copy);
+}
+
+static void run_made(unsigned long count) {
+  static uint8_t bytes[SIZE_MOST + WORD_MAX];
+  for (size_t i = 0; i < seed_count; ++i) {
+    run(seeds[i], seed_size[i]);
+  }
+  for (unsigned long n = 0; n < count; ++n) {
+    const size_t chosen = next_random() % seed_count;
+    size_t size = seed_size[chosen] < SIZE_MOST ? seed_size[chosen] : SIZE_MOST;
+    memcpy(bytes, seeds[chosen], size);
+    for (uint64_t changes = 1 + next_random() % 6; changes > 0; --changes) {
+      size = change(bytes, size);
+    }
+    run(bytes, size);
+  }
+}
+
+static void write_seeds(const char *folder) {
+  for (size_t i = 0; i < seed_count; ++i) {
+    char path[512];
+    (void)snprintf(path, sizeof path, "%s/seed-%zu", folder, i);
+    FILE *file = fopen(path, "wb");
+    supine_fuzz_expect(file != NULL && fwrite(seeds[i], 1, seed_size[i], file) == seed_size[i] &&
+                           fclose(file) == 0,
+                       path);
+  }
+}
+
+int main(int argc, char **argv) {
+  unsigned long runs = 0;
+  unsigned long inputs = 0;
+  static const int signals[] = {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL};
+  for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
+    (void)signal(signals[i], keep_crasher);
+  }
+  while (seed_count < SEEDS_MAX &&
+         (seeds[seed_count] = supine_fuzz_seed(seed_count, &seed_size[seed_count])) != NULL) {
+    ++seed_count;
+  }
+  supine_fuzz_expect(seed_count > 0, "no seeds");
+  state = 20080312;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (strcmp(argv[i], "-seeds") == 0 && has_value) {
+      write_seeds(argv[++i]);
+    } else if (strcmp(argv[i], "-runs") == 0 && has_value) {
+      runs = strtoul(argv[++i], NULL, 10);
+    } else if (strcmp(argv[i], "-seed") == 0 && has_value) {
+      state = strtoul(argv[++i], NULL, 10);
+    } else if (strcmp(argv[i], "-dict") == 0 && has_value) {
+      read_dictionary(argv[++i]);
+    } else {
+      FILE *file = fopen(argv[i], "rb");
+      static uint8_t bytes[16 << 20];
+      supine_fuzz_expect(file != NULL, argv[i]);
+      run(bytes, fread(bytes, 1, sizeof bytes, file));
+      (void)fclose(file);
+      ++inputs;
+    }
+  }
+  if (runs > 0) {
+    run_made(runs);
+    inputs += runs + seed_count;
+  }
+  struct rusage usage;
+  (void)getrusage(RUSAGE_SELF, &usage);
+  const double megabytes = (double)usage.ru_maxrss / 1024.0;
+  (void)printf("%lu inputs, slowest %.3f s, %.0f MB\n", inputs, slowest, megabytes);
+  for (size_t i = 0; i < seed_count; ++i) {
+    free(seeds[i]);
+  }
+  return slowest > seconds_most || megabytes > megabytes_most;
+}

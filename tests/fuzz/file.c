@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Inputs as files, and expectations. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "fuzz.h"
+
+void supine_fuzz_expect(int sound, const char *words) {
+  if (!sound) {
+    (void)fprintf(stderr, "not sound: %s\n", words);
+    abort();
+  }
+}
+
+uint8_t *supine_fuzz_text(const char *text, size_t *size) {
+  *size = strlen(text);
+  uint8_t *bytes = malloc(*size + 1);
+  supine_fuzz_expect(bytes != NULL, "memory for a seed");
+  memcpy(bytes, text, *size + 1);
+  return bytes;
+}
+
+const char *supine_fuzz_file(const uint8_t *bytes, size_t size, const char *ending) {
+  static char path[128];
+  const char *folder = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp";
+  (void)snprintf(path, sizeof path, "%s/supine-fuzz-%ld%s", folder, (long)getpid(), ending);
+  FILE *file = fopen(path, "wb");
+  supine_fuzz_expect(file != NULL && fwrite(bytes, 1, size, file) == size && fclose(file) == 0,
+                     "a file for the input");
+  return path;
+}
+
+uint8_t *supine_fuzz_take(const char *path, size_t *size) {
+  FILE *file = fopen(path, "rb");
+  supine_fuzz_expect(file != NULL && fseek(file, 0, SEEK_END) == 0, "the seed's file");
+  *size = (size_t)ftell(file);
+  rewind(file);
+  uint8_t *bytes = malloc(*size + 1);
+  supine_fuzz_expect(bytes != NULL && fread(bytes, 1, *size, file) == *size, "the seed's bytes");
+  (void)fclose(file);
+  (void)unlink(path);
+  return bytes;
+}

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Surfaces: FUZZ_ENDING says of which format. What loads must be whole, and load the same again. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "mesh/mesh.h"
+
+#include "fuzz.h"
+
+static void expect_whole(const supine_mesh *mesh) {
+  supine_topology topology = {0};
+  supine_fuzz_expect(mesh->triangle_count > 0 && mesh->vertex_count >= 3, "an empty mesh");
+  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+    supine_fuzz_expect(isfinite(mesh->vertices[i]), "a coordinate");
+  }
+  supine_fuzz_expect(supine_mesh_topology_create(mesh, &topology) == SUPINE_OK, "topology");
+  supine_fuzz_expect(!topology.closed || topology.genus >= -1, "genus");
+  supine_mesh_topology_free(&topology);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
+  const char *path = supine_fuzz_file(bytes, size, FUZZ_ENDING);
+  supine_mesh mesh = {0};
+  supine_error error = {0};
+  const supine_status status = supine_mesh_load(path, NULL, &mesh, NULL, &error);
+  if (status == SUPINE_OK) {
+    expect_whole(&mesh);
+  } else {
+    supine_fuzz_expect(error.status == status && strstr(error.message, path) != NULL &&
+                           strchr(error.message, '\n') == NULL && mesh.vertices == NULL,
+                       "a message of one line that names the file");
+  }
+  supine_mesh_free(&mesh);
+  double *rows = NULL;
+  size_t count = 0;
+  if (strcmp(FUZZ_ENDING, ".ply") == 0 &&
+      supine_mesh_load_property(path, "a", &rows, &count, NULL) == SUPINE_OK) {
+    supine_fuzz_expect(count > 0 && rows != NULL, "a property without vertices");
+    free(rows);
+  }
+  (void)unlink(path);
+  return 0;
+}
+
+/* A tetrahedron as the project writes it. */
+static uint8_t *saved(size_t *size) {
+  double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
+  uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  const supine_mesh mesh = {4, vertices, 4, triangles};
+  const supine_mesh_save_options options = {.rest = vertices};
+  const char *path = supine_fuzz_file((const uint8_t *)"", 0, FUZZ_ENDING);
+  supine_fuzz_expect(supine_mesh_save(path, &mesh, &options, NULL) == SUPINE_OK, "saving a seed");
+  return supine_fuzz_take(path, size);
+}
+
+uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
+  static const struct {
+    const char *ending;
+    const char *text;
+  } texts[] = {
+      {".ply", "ply\nformat ascii 1.0\ncomment SPACE=RAS\nelement vertex 4\nproperty float x\n"
+               "property double y\nproperty short z\nproperty uchar a\nelement face 2\nproperty "
+               "list uchar int vertex_indices\nproperty float w\nend_header\n0 0 0 1\n1 0 0 2\n"
+               "0.5 1e1 0 3\n0 0 1 4\n4 0 1 2 3 0.1\n3 0 2 3 -1e-3\n"},
+      {".ply", "ply\r\nformat ascii 1.0\r\nelement tristrips 1\r\nproperty list int int "
+               "vertex_indices\r\nelement vertex 4\r\nproperty int8 x\r\nproperty uint16 y\r\n"
+               "property float64 z\r\nend_header\r\n7 0 1 2 3 -1 0 1\r\n0 0 0\r\n1 0 0\r\n"
+               "0 1 0\r\n0 0 1\r\n"},
+      {".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e2 0 0\n"
+               "vertex 0 -.5 0\nendloop\nendfacet\nendsolid a\n"},
+      {".off",
+       "OFF\n4 4 6\n0 0 0\n120 0 0\n0 120 0\n0 0 120\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"},
+      {".off", "STCNOFF # odd\n5 2 0\n\n0 0 0 1 1 1\n9 0 0\n9 9 0 # c\n0 9 0\n1 1 9\n"
+               "5 0 1 2 4 3 255 0 0\n3 0 1 2\n"},
+      {".obj", "# SPACE=LPS\nmtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0.5\nvt 0 0\n"
+               "vn 0 0 1\nusemtl a\ns 1\nf 1//1 2/1/1 3\nf -1 -2 -3 -4\nl 1 2\np 3\n"}};
+  size_t seen = 0;
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    if (strcmp(texts[i].ending, FUZZ_ENDING) == 0 && seen++ == index) {
+      return supine_fuzz_text(texts[i].text, size);
+    }
+  }
+  return seen == index && supine_mesh_save_supports("a" FUZZ_ENDING) ? saved(size) : NULL;
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Tables of numbers: expandability and directions by vertex, samples of pressure and volume, and
+ * their fitted curves. The same bytes go to each reader. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "precompute/physics/force.h"
+#include "precompute/tissue/expandability.h"
+#include "runtime/breath/pv.h"
+
+#include "fuzz.h"
+
+enum { VERTICES = 3 };
+
+static void expect_words(supine_status status, const supine_error *error) {
+  supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
+                                             strchr(error->message, '\n') == NULL),
+                     "a message of one line");
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
+  const char *path = supine_fuzz_file(bytes, size, ".csv");
+  supine_error error = {0};
+  double a[VERTICES];
+  supine_status status = supine_tissue_expandability_load(path, VERTICES, a, &error);
+  expect_words(status, &error);
+  for (size_t i = 0; status == SUPINE_OK && i < VERTICES; ++i) {
+    supine_fuzz_expect(a[i] > 0.0 && isfinite(a[i]), "an expandability");
+  }
+  double vectors[3 * VERTICES];
+  status = supine_physics_directions_load(path, VERTICES, vectors, &error);
+  expect_words(status, &error);
+  for (size_t i = 0; status == SUPINE_OK && i < (size_t)3 * VERTICES; ++i) {
+    supine_fuzz_expect(isfinite(vectors[i]), "a direction");
+  }
+  supine_pv_samples samples = {0};
+  status = supine_breath_samples_load(path, &samples, &error);
+  expect_words(status, &error);
+  for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    for (size_t i = 0; i < samples.count[limb]; ++i) {
+      supine_fuzz_expect(isfinite(samples.pressure[limb][i]) && isfinite(samples.volume[limb][i]),
+                         "a sample");
+    }
+  }
+  supine_breath_samples_clear(&samples);
+  supine_pv pv;
+  status = supine_breath_load(path, &pv, &error);
+  expect_words(status, &error);
+  for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    supine_fuzz_expect(supine_breath_curve_check(&pv.limb[limb], NULL) == SUPINE_OK, "a curve");
+  }
+  (void)unlink(path);
+  return 0;
+}
+
+uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
+  static const char *const texts[] = {
+      "expandability\n1\n0.5\n# half\n2e-1\n", "vertex,expandability\n0,1\n2,0.25\n1,3\n",
+      "vertex,x,y,z\n0,1,0,0\n1,0,-1,0\n2,0.6,0,-0.8\n", "x,y,z\n1,0,0\n0,-1,0\n0.6,0,-0.8\n",
+      "pressure_cmH2O,volume_mL,limb\n0,100,inhale\n5,420,inhale\n10,900,inhale\n20,1500,inhale\n"
+      "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n"};
+  enum { TEXTS = sizeof texts / sizeof *texts };
+  if (index < TEXTS) {
+    return supine_fuzz_text(texts[index], size);
+  }
+  const char *path = supine_fuzz_file((const uint8_t *)"", 0, ".json");
+  return index == TEXTS && supine_breath_save(path, supine_breath_normal(), NULL) == SUPINE_OK
+             ? supine_fuzz_take(path, size)
+             : NULL;
+}

@@ -1,0 +1,35 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Fuzzes every reader with libFuzzer, for as long as it is told to.
+#
+#     tests/fuzz/run.sh [SECONDS A READER] [FOLDER]       3600 and build/fuzz by default
+#
+# Wants clang and its runtime (libclang-rt-14-dev in Debian 12). What is found stays in FOLDER as
+# crash-*, slow-unit-* or oom-*; what covers new code is kept in FOLDER/corpus for the next time.
+set -e
+seconds=${1:-3600}
+source=$(cd "$(dirname "$0")/../.." && pwd)
+folder=${2:-$source/build/fuzz}
+cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+  -DSUPINE_FUZZ=ON -DSUPINE_SANITIZE=address,undefined > "$folder.log" 2>&1
+targets=""
+for reader in ply stl off obj text basis; do
+  targets="$targets fuzz_$reader libfuzzer_$reader"
+done
+cmake --build "$folder" --target $targets >> "$folder.log" 2>&1
+cd "$folder"
+failed=0
+for reader in ply stl off obj text basis; do
+  case $reader in ply | stl | off | obj) dictionary=mesh ;; *) dictionary=$reader ;; esac
+  mkdir -p "corpus/$reader"
+  "tests/fuzz/fuzz_$reader" -seeds "corpus/$reader" > /dev/null
+  if "tests/fuzz/libfuzzer_$reader" -dict="$source/tests/fuzz/$dictionary.dict" -max_total_time="$seconds" \
+    -timeout=10 -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 "corpus/$reader" > "$reader.log" 2>&1; then
+    verdict="nothing found"
+  else
+    verdict="FOUND SOMETHING: see $folder/$reader.log"
+    failed=1
+  fi
+  echo "$reader: $(sed -n 's/^stat::number_of_executed_units: *//p' "$reader.log") inputs, $verdict"
+done
+exit $failed
