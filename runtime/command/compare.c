@@ -4,6 +4,7 @@
 
 #include "sh/base/output.h"
 
+#include "runtime/command/compare_content.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/report/comparison.h"
 
@@ -71,6 +72,14 @@ static int compare(const char *path, const supine_basis *basis, const request *w
                        path);
     return SUPINE_EXIT_INPUT;
   }
+  if (supine_basis_metadata(basis, "content") != NULL) { /* of 'supine embed' */
+    if (wanted->html != NULL || wanted->by_rms) {
+      return supine_options_usage(name,
+                                  "what is inside has no surface: -o and --rms are for lungs");
+    }
+    return supine_command_compare_content(name, basis, &comparison.postures, wanted->volume,
+                                          wanted->json, wanted->csv);
+  }
   if (supine_report_find(&comparison, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
@@ -113,7 +122,8 @@ const supine_command supine_command_compare = {
     .about =
         "Says how far the lungs move in each posture and between every two, how much each lung "
         "gains, and which heights ventilate; then searches all directions of gravity for the two "
-        "that differ most and for the one that is farthest from supine.",
+        "that differ most and for the one that is farthest from supine. Of what is inside ('supine "
+        "embed') it says how far each named part moves between every two postures, and where to.",
     .options = table,
     .notes =
         "Averages are over the surface's area; 95 % of the area moves no farther than the number "
