@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libxxhash-dev libegl-dev libgles-dev libcairo2-dev libgl1-mesa-dri
   libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev"
-tests="g++ libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
+tests="g++ poppler-utils libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
   python3-vtk9 gnuplot-nox plastimatch"
 
 install_missing() {

@@ -118,7 +118,7 @@ static json_t *slabs(const supine_comparison *c) {
     }
     (void)json_array_append_new(
         rows,
-        json_pack("{s:o, s:o}", "height",
+        json_pack("{s:o, s:o}", "name",
                   json_sprintf("%zu to %zu", 100 - 10 * (s + 1), 100 - 10 * s), "cells", cells));
   }
   return json_pack("{s:o, s:o}", "profiles", supine_report_profiles(c), "parts",

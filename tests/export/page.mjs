@@ -4,40 +4,10 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { pathToFileURL } from 'node:url';
-import {
-  evaluate, folder, largestDistance, load, randomDirections, randomSource, skip, supine,
-} from './support.mjs';
+import { browser, openLungs as open, picture } from './browser.mjs';
+import { evaluate, folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.001;
-const { chromium } = await load('playwright-core/index.mjs');
-if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM,
-  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
-    '--disable-sync', '--no-first-run'],
-});
-
-/** Opens a page and collects everything that it should not do. */
-async function open(path, options = {}) {
-  const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
-  const complaints = [];
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
-  page.on('pageerror', (error) => complaints.push(error.stack));
-  const own = pathToFileURL(path).href;
-  page.on('request', (request) => { if (request.url() !== own && !request.url().startsWith('data:')) complaints.push(`asked for ${request.url()}`); });
-  await page.goto(own);
-  await page.waitForFunction(() => window.supine?.state.moment, null, { timeout: 60000 });
-  return { page, complaints };
-}
-
-/** The picture after it has been drawn. */
-async function picture(page) {
-  await page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
-  return page.locator('#picture').screenshot();
-}
 
 /** Positions read back from the graphics card, against the C evaluator. */
 async function checkPositions(page, basis, volume) {

@@ -16,8 +16,8 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -50%)`;
 };
 
-/** L, R, A, P, H and F around the lungs of each pane, within the picture; those that point at the
- * viewer or away are left out. */
+/** L, R, A, P, H and F around the lungs of each pane, always within the picture; those that point at
+ * the viewer or away are left out. */
 class Letters {
   constructor(parent, panes) {
     this.sets = Array.from({ length: panes }, () => Object.keys(ENDS).map((letter) => {
@@ -37,8 +37,12 @@ class Letters {
       Object.values(ENDS).forEach((end, j) => {
         const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // past the arrow
         const at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
-        const inside = at && at.x > pane.box[0] / ratio + 8 && at.x < (pane.box[0] + pane.box[2]) / ratio - 8 && at.y > 8 && at.y < pane.canvasHeight / ratio - 8;
-        placed(set[j], at, Boolean(inside) && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio);
+        const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
+        if (at) { // at the picture's edge where it would be beyond
+          at.x = Math.max(pane.box[0] / ratio + 15, Math.min((pane.box[0] + pane.box[2]) / ratio - 15, at.x));
+          at.y = Math.max(15, Math.min(pane.canvasHeight / ratio - 15, at.y));
+        }
+        placed(set[j], at, Boolean(far));
       });
     });
   }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// axe-core finds nothing on page and report, in both themes; every control of the page has a name;
+// what bounds a control stands out by 3 to 1.
+import assert from 'node:assert/strict';
+import { join } from 'node:path';
+import { browser, open, openLungs } from './browser.mjs';
+import { folder, loadCommon, supine } from './support.mjs';
+
+const axe = loadCommon('axe-core').source;
+const mesh = join(folder, 'lungs.ply');
+const basis = join(folder, 'lungs.safetensors');
+const [html, report] = ['lungs.html', 'report.html'].map((name) => join(folder, name));
+supine('phantom', '-o', mesh, '--vertices', '500');
+supine('precompute', mesh, '-o', basis);
+supine('export', basis, '-o', html);
+supine('compare', basis, '--postures', 'supine,prone,left,supine+15', '-o', report);
+
+async function check(page, what) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
+  assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), [], what);
+}
+
+/** Contrast of two CSS colours as WCAG has it. */
+function contrast(a, b) {
+  const luminance = (hex) => {
+    const [r, g, bl] = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * bl;
+  };
+  const [low, high] = [luminance(a), luminance(b)].sort((x, y) => x - y);
+  return (high + 0.05) / (low + 0.05);
+}
+
+for (const colorScheme of ['light', 'dark']) {
+  const { page, complaints } = await openLungs(html, { colorScheme }, '#probes=3.250&colour=difference&show=beside.ghost');
+  for (const details of await page.locator('summary').all()) await details.click();
+  await check(page, `the page, ${colorScheme}`);
+  const nameless = await page.evaluate(() => [...document.querySelectorAll('button, input, select, canvas[tabindex]')].filter((e) => {
+    const label = e.getAttribute('aria-label') ?? (e.labels?.length ? [...e.labels].map((l) => l.textContent).join() : e.textContent);
+    return !label?.trim();
+  }).map((e) => e.outerHTML));
+  assert.deepEqual(nameless, []);
+  const colours = await page.evaluate(() => {
+    const style = getComputedStyle(document.documentElement);
+    return Object.fromEntries(['edge', 'accent', 'accent-ink', 'paper-solid', 'field', 'gravity', 'back-inner', 'back-outer'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  });
+  const long = (hex) => (hex.length === 4 ? `#${[...hex.slice(1)].map((c) => c + c).join('')}` : hex);
+  for (const [a, b] of [['edge', 'paper-solid'], ['accent', 'paper-solid'], ['accent', 'field'], ['accent', 'accent-ink'], ['gravity', 'back-inner'], ['gravity', 'back-outer']]) {
+    const ratio = contrast(long(colours[a]), long(colours[b]));
+    assert.ok(ratio >= 3, `${colorScheme}: ${a} on ${b} is ${ratio.toFixed(2)}`);
+  }
+  assert.deepEqual(complaints, []);
+  await page.close();
+
+  const second = await open(report, { colorScheme });
+  await check(second.page, `the report, ${colorScheme}`);
+  assert.deepEqual(second.complaints, []);
+  await second.page.close();
+}
+await browser.close();

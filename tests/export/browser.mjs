@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A headless Chromium that draws in software, and pages opened in it from disk.
+import { pathToFileURL } from 'node:url';
+import { load, skip } from './support.mjs';
+
+const { chromium } = await load('playwright-core/index.mjs');
+if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
+
+export const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM,
+  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
+    '--disable-sync', '--no-first-run'],
+});
+
+/** Opens a page and collects everything that it should not do. */
+export async function open(path, options = {}, hash = '') {
+  const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
+  page.setDefaultTimeout(60000);
+  const complaints = [];
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(error.stack));
+  const own = pathToFileURL(path).href;
+  page.on('request', (request) => { if (request.url() !== own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
+  await page.goto(own + hash);
+  return { page, complaints };
+}
+
+/** The same for the page of a basis, drawn once. */
+export async function openLungs(path, options, hash) {
+  const opened = await open(path, options, hash);
+  await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
+  return opened;
+}
+
+/** The picture after it has been drawn. */
+export async function picture(page) {
+  await page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+  return page.locator('#picture').screenshot();
+}

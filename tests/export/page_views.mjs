@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What people reach for in the page: views, pan, zoom, probes, cut, links, touch, a lost context; and
+// pictures of it at four sizes in two themes, kept in page_views/ beside the test.
+import assert from 'node:assert/strict';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { browser, openLungs, picture } from './browser.mjs';
+import { folder, supine } from './support.mjs';
+
+const mesh = join(folder, 'lungs.ply');
+const basis = join(folder, 'lungs.safetensors');
+const html = join(folder, 'lungs.html');
+supine('phantom', '-o', mesh, '--vertices', '1500');
+supine('precompute', mesh, '-o', basis);
+supine('export', basis, '-o', html);
+mkdirSync('page_views', { recursive: true });
+
+const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+/** The letters that are shown, and where. */
+const letters = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => {
+  const box = e.getBoundingClientRect();
+  return [e.textContent, [box.x + box.width / 2, box.y + box.height / 2]];
+})));
+
+/** From each side the letters are where the body's axes are. */
+async function checkViews(page) {
+  const expected = { a: ['R', 'L', 'H', 'F'], p: ['L', 'R', 'H', 'F'], l: ['A', 'P', 'H', 'F'], r: ['P', 'A', 'H', 'F'], f: ['R', 'L', 'A', 'P'], h: ['R', 'L', 'P', 'A'] };
+  for (const [key, [left, right, top, bottom]] of Object.entries(expected)) {
+    await page.keyboard.press(key);
+    await settled(page);
+    const at = await letters(page);
+    assert.deepEqual(Object.keys(at).sort(), [left, right, top, bottom].sort(), `seen from ${key}`);
+    assert.ok(at[left][0] < at[top][0] && at[top][0] < at[right][0] && at[top][1] < at[left][1] && at[left][1] < at[bottom][1], `seen from ${key}: ${JSON.stringify(at)}`);
+  }
+  await page.keyboard.press('a');
+  await settled(page);
+  /* The left lung's vertices are where L is. */
+  const [left, middle] = await page.evaluate(() => {
+    const { basis } = window.supine;
+    const mean = (lung) => { let sum = 0; for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v]; return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]); };
+    const names = basis.lungNames;
+    return [mean(names.indexOf('left')), mean(names.indexOf('right'))];
+  });
+  assert.ok(left > middle);
+}
+
+/** Zoom keeps what is under the pointer; panning moves it along. */
+async function checkCamera(page) {
+  const box = await page.locator('#picture').boundingBox();
+  const [x, y] = [box.x + box.width * 0.6, box.y + box.height * 0.4];
+  const under = () => page.evaluate(([px, py]) => {
+    const pane = window.supine.panes()[0];
+    const aspect = pane.box[2] / pane.box[3];
+    const distance = -(pane.toEye[14] + pane.toEye[10] * 0) - 0;
+    return [pane.toEye[12], pane.toEye[13], px, py, aspect, distance];
+  }, [x, y]);
+  const before = await under();
+  await page.mouse.move(x, y);
+  await page.mouse.down({ button: 'right' });
+  await page.mouse.move(x + 60, y + 30, { steps: 3 });
+  await page.mouse.up({ button: 'right' });
+  await settled(page);
+  const after = await under();
+  assert.ok(after[0] > before[0] + 5 && after[1] < before[1] - 2, 'the right button does not pan');
+  await page.keyboard.press('0');
+  await page.mouse.move(x, y);
+  await page.mouse.wheel(0, -400);
+  await settled(page);
+  const pan = await page.evaluate(() => window.supine.state.camera.pan);
+  assert.ok(pan[0] < -1 && pan[1] < -1, `zooming to the upper right moves the lungs to the lower left: ${pan}`);
+  await page.keyboard.press('0');
+}
+
+/** Postures are written as the program reads them. */
+async function checkPostures(page) {
+  const texts = await page.evaluate(() => {
+    const { postureText, postureFrom, gravityOf } = window.supine;
+    const turned = (text) => { const { q, tilt } = postureFrom(text); const g = gravityOf(q); const t = (tilt * Math.PI) / 180; return [g[0], g[1] * Math.cos(t) - g[2] * Math.sin(t), g[1] * Math.sin(t) + g[2] * Math.cos(t)]; };
+    return ['supine', 'prone', 'left', 'right', 'upright', 'inverted', 'supine+15', 'prone-20', '0.60:0.00:-0.80', '0:-1:0', 'HFP'].map((text) => [text, postureText(turned(text)), turned(text)]);
+  });
+  for (const [text, again, gravity] of texts) {
+    assert.equal(again, { '0:-1:0': 'prone', HFP: 'prone' }[text] ?? text);
+    if (text === 'supine+15') assert.ok(Math.abs(gravity[2] - Math.sin(Math.PI / 12)) < 1e-12);
+  }
+  await page.locator('#posture-name').fill('0.6:0:-0.8');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => Math.abs(window.supine.state.gravity[0] - 0.6) < 1e-9);
+  await page.locator('#posture-name').fill('prune');
+  await page.keyboard.press('Enter');
+  assert.match(await page.locator('#posture-trouble').textContent(), /prune/);
+  await page.locator('#posture-name').fill('supine');
+  await page.keyboard.press('Enter');
+  await page.locator('#posture-name').blur();
+}
+
+/** Each thing that can be shown changes the picture, and is undone. */
+async function checkShown(page) {
+  for (const [name, act, undo] of [
+    ['a faded lung', () => page.locator('[name=lung-0][value="0.35"]').check(), () => page.locator('[name=lung-0][value="1"]').check()],
+    ['a hidden lung', () => page.locator('[name=lung-1][value="0"]').check(), () => page.locator('[name=lung-1][value="1"]').check()],
+    ['a cut', () => page.locator('#cut-axis').selectOption('1'), () => page.locator('#cut-axis').selectOption('-1')],
+    ...['ghost', 'arrows', 'wires', 'contours', 'beside'].map((id) => [id, () => page.locator(`#${id}`).check(), () => page.locator(`#${id}`).uncheck()]),
+    ['expansion', () => page.locator('[name=kind][value=expansion]').check(), () => page.locator('[name=kind][value=displacement]').check()],
+    ['height', () => page.locator('[name=kind][value=height]').check(), () => page.locator('[name=kind][value=displacement]').check()],
+    ['a typed range', async () => { await page.locator('#range-end').fill('11'); await page.locator('#range-end').blur(); }, () => page.locator('#range-auto').click()],
+  ]) {
+    const before = await picture(page);
+    await act();
+    assert.ok(!(await picture(page)).equals(before), `${name} changes nothing`);
+    await undo();
+    assert.ok((await picture(page)).equals(before), `${name} is not undone`);
+  }
+}
+
+/** Probes stay on the tissue, and measure between each other; a link brings all of it back. */
+async function checkProbes(page) {
+  const box = await page.locator('#picture').boundingBox();
+  for (const [x, y] of [[0.38, 0.5], [0.62, 0.55]]) {
+    const had = await page.evaluate(() => window.supine.state.probes.length);
+    await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
+    await page.waitForFunction((n) => window.supine.state.probes.length > n, had);
+  }
+  await page.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
+  const [list, between] = [await page.locator('#probes').textContent(), await page.locator('#probes-text').textContent()];
+  assert.match(list, /1  (left|right) lung  [\d.]+ mm  [LR] \d+  [PA] \d+  [HF] \d+ mm/);
+  assert.match(between, /1 to 2: [\d.]+ mm, at rest [\d.]+ mm/);
+  await page.keyboard.press('2');
+  await settled(page);
+  await page.waitForFunction(() => location.hash.includes('prone') && location.hash.includes('probes='));
+  const hash = await page.evaluate(() => location.hash);
+  const { page: again } = await openLungs(html, {}, hash);
+  await again.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
+  const facts = (p) => p.evaluate(() => [window.supine.state.gravity.map((v) => v.toFixed(6)), document.getElementById('probes').textContent, document.getElementById('depth-value').textContent]);
+  assert.deepEqual(await facts(again), await facts(page));
+  await again.close();
+  await page.locator('#probes-clear').click();
+}
+
+/** A context that is lost comes back with the same picture. */
+async function checkLoss(page) {
+  await page.keyboard.press('3');
+  await page.mouse.move(5, 5);
+  const before = await picture(page);
+  await page.evaluate(() => { window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context'); window.lose.loseContext(); });
+  await page.waitForFunction(() => window.supine.picture === null);
+  await page.evaluate(() => window.lose.restoreContext());
+  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
+  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+}
+
+/** Idle pages draw nothing; a frame that moves costs little script. */
+async function checkFrames(page) {
+  const [drawn, median] = await page.evaluate(async () => {
+    const { picture: p, touch } = window.supine;
+    let count = 0;
+    const draw = p.draw.bind(p);
+    p.draw = (panes) => { ++count; draw(panes); };
+    const frames = (n) => new Promise((done) => { const next = () => (n-- > 0 ? requestAnimationFrame(next) : done()); next(); });
+    await frames(3);
+    count = 0;
+    await frames(10);
+    const idle = count;
+    touch();
+    await frames(3);
+    delete p.draw;
+    return [idle, count];
+  });
+  assert.equal(drawn, 0, 'drawn while idle');
+  assert.ok(median >= 1);
+}
+
+const { page, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 } });
+await checkViews(page);
+await checkCamera(page);
+await checkPostures(page);
+await checkShown(page);
+await checkProbes(page);
+await checkFrames(page);
+await checkLoss(page);
+const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)));
+assert.deepEqual(bytes, [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
+/* The reference is the posture that is gone to, not one on the way. */
+const goal = await page.evaluate(() => {
+  const { state, postureText, gravityOf, postureFrom } = window.supine;
+  state.settle(postureFrom('prone').q, 0, 0.7);
+  state.turning = { from: state.q, to: state.goal, time: 0.3, seconds: 9 };
+  document.getElementById('pin').click();
+  return postureText(gravityOf(state.pinnedQ));
+});
+assert.equal(goal, 'prone');
+assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
+await page.close();
+
+const sizes = [[1400, 900], [900, 600], [844, 390], [390, 844]];
+for (const [width, height] of sizes) {
+  for (const colorScheme of ['light', 'dark']) {
+    const touch = Math.min(width, height) < 400;
+    const { page: sized, complaints: said } = await openLungs(html, { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left');
+    assert.ok(await sized.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
+    if (touch) { // a tap keeps a probe and says what is there; dragging turns
+      const box = await sized.locator('#picture').boundingBox();
+      const azimuth = await sized.evaluate(() => window.supine.state.camera.azimuth);
+      await sized.touchscreen.tap(box.x + box.width * 0.38, box.y + box.height * 0.48);
+      await sized.waitForFunction(() => window.supine.state.probes.length === 1);
+      assert.equal(await sized.evaluate(() => window.supine.state.camera.azimuth), azimuth);
+    }
+    await settled(sized);
+    writeFileSync(join('page_views', `${width}x${height}-${colorScheme}.png`), await sized.screenshot());
+    assert.deepEqual(said, []);
+    await sized.close();
+  }
+}
+await browser.close();
