@@ -35,9 +35,9 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
 }
 
 static const char *const shown[] = {
-    "route",     "force",      "direction",      "direction_constants",
-    "stiffness", "midline_mm", "rest_volume_ml", "lung_share",
-    "lesions",   "reach_mm",   "made_by"};
+    "patient",   "route",      "force",          "direction",  "direction_constants",
+    "stiffness", "midline_mm", "rest_volume_ml", "lung_share", "lesions",
+    "reach_mm",  "made_by"};
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rms_mm",
                                      "error_p95_mm",      "error_max_mm"};
