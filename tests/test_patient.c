@@ -16,6 +16,7 @@
 
 #include "precompute/patient/fit.h"
 #include "precompute/patient/patient_file.h"
+#include "precompute/patient/validate.h"
 
 #include "lungs_helpers.h"
 
@@ -449,6 +450,44 @@ static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) 
   supine_patient_pairs_free(&pairs);
 }
 
+/* Each map finds what it can express, and nothing beyond: literal maps, their own distances. */
+static void test_maps_explain_what_they_can(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(80, 21);
+  supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT];
+  supine_error error;
+  static const double turned[3][3] = {/* by about 10 degrees about z, times 1.1 */
+                                      {1.08329, -0.19101, 0.0},
+                                      {0.19101, 1.08329, 0.0},
+                                      {0.0, 0.0, 1.1}};
+  for (size_t i = 0; i < pairs.count; ++i) {
+    for (size_t a = 0; a < 3; ++a) {
+      pairs.to[3 * i + a] = 3.0 + (double)a;
+      for (size_t b = 0; b < 3; ++b) {
+        pairs.to[3 * i + a] += turned[a][b] * pairs.from[3 * i + b];
+      }
+    }
+  }
+  assert_int_equal(supine_patient_validate_points(&pairs, pairs.to, distance, &error), SUPINE_OK);
+  const double none = distance[SUPINE_PATIENT_MAP_NONE].rms;
+  assert_true(none > 10.0);
+  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest == 0.0);
+  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 1.0);
+  assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].rms > 0.3 * none);
+  assert_true(distance[SUPINE_PATIENT_MAP_SIMILARITY].largest < 1e-3); /* digits of `turned` */
+  assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
+  for (size_t i = 0; i < pairs.count; ++i) {
+    pairs.to[3 * i] += 0.2 * pairs.from[3 * i + 1]; /* a shear */
+  }
+  assert_int_equal(supine_patient_validate_points(&pairs, pairs.from, distance, &error), SUPINE_OK);
+  assert_true(distance[SUPINE_PATIENT_MAP_SIMILARITY].rms > 1.0);
+  assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
+  /* Predicting nothing is worth nothing. */
+  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
+  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
+  supine_patient_pairs_free(&pairs);
+}
+
 int main(void) {
   static const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_public_pairs_hold_out_as_measured),
@@ -460,6 +499,7 @@ int main(void) {
       cmocka_unit_test(test_pair_files_say_what_is_wrong),
       cmocka_unit_test(test_pair_files_go_from_rest),
       cmocka_unit_test(test_law_asked_for_needs_points_enough),
+      cmocka_unit_test(test_maps_explain_what_they_can),
       cmocka_unit_test(test_record_survives_text),
       cmocka_unit_test(test_force_is_one_at_the_centre_in_the_fitted_posture)};
   (void)gsl_set_error_handler_off();

@@ -109,9 +109,9 @@ static int teardown(void **state) {
 
 static void test_help_every_command_teaches(void **state) {
   (void)state;
-  static const char *const commands[] = {"phantom", "precompute", "info",    "deform",
-                                         "compare", "render",     "breathe", "export",
-                                         "bench",   "solve",      "pv",      "fit"};
+  static const char *const commands[] = {"phantom", "precompute", "info",    "deform", "compare",
+                                         "render",  "breathe",    "export",  "bench",  "solve",
+                                         "pv",      "fit",        "validate"};
   EXPECT(0, "precompute", "--help");
   EXPECT(0, "supine ", "--version");
   EXPECT(1, "Commands:", "%s", "");

@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A prediction against another state of the same lungs. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_linalg.h>
+#include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics.h>
+
+#include "precompute/patient/validate.h"
+
+#include "precompute/inside/surface.h"
+#include "sh/base/parallel.h"
+
+const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT] = {
+    "predicted", "none", "translation", "rigid+scale", "affine"};
+
+enum { ROUNDS = 20, FITTED_MAX = 2000, GRAIN = 64 };
+
+/* x -> m x + t, row by row. */
+typedef struct map {
+  double m[9], t[3];
+} map;
+
+static void apply(const map *by, const double *from, double *to) {
+  for (int a = 0; a < 3; ++a) {
+    to[a] =
+        by->t[a] + by->m[3 * a] * from[0] + by->m[3 * a + 1] * from[1] + by->m[3 * a + 2] * from[2];
+  }
+}
+
+/* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, the last column of U
+ * turned where that would mirror; scale tr(S) over the spread. */
+static bool similarity(double cross[9], double spread, double m[9]) {
+  double v[9];
+  double s[3];
+  double work[3];
+  double u[9];
+  gsl_matrix_view cross_view = gsl_matrix_view_array(cross, 3, 3);
+  gsl_matrix_view v_view = gsl_matrix_view_array(v, 3, 3);
+  gsl_vector_view s_view = gsl_vector_view_array(s, 3);
+  gsl_vector_view work_view = gsl_vector_view_array(work, 3);
+  if (gsl_linalg_SV_decomp(&cross_view.matrix, &v_view.matrix, &s_view.vector, &work_view.vector) !=
+      GSL_SUCCESS) {
+    return false;
+  }
+  memcpy(u, cross, sizeof u);
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        m[3 * a + b] =
+            u[3 * a] * v[3 * b] + u[3 * a + 1] * v[3 * b + 1] + u[3 * a + 2] * v[3 * b + 2];
+      }
+    }
+    const double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) -
+                               m[1] * (m[3] * m[8] - m[5] * m[6]) +
+                               m[2] * (m[3] * m[7] - m[4] * m[6]);
+    if (determinant > 0.0) {
+      break;
+    }
+    u[2] = -u[2];
+    u[5] = -u[5];
+    u[8] = -u[8];
+    s[2] = -s[2];
+  }
+  for (int k = 0; k < 9; ++k) {
+    m[k] *= (s[0] + s[1] + s[2]) / spread;
+  }
+  return true;
+}
+
+/* The map of a kind that brings points nearest to others, in least squares. */
+static bool fit_map(supine_patient_map kind, size_t count, const double *from, const double *to,
+                    map *found) {
+  double mean[2][3] = {{0.0}};
+  double cross[9] = {0.0};
+  double own[9] = {0.0};
+  *found = (map){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
+  if (kind == SUPINE_PATIENT_MAP_NONE) {
+    return true;
+  }
+  for (size_t i = 0; i < 3 * count; ++i) {
+    mean[0][i % 3] += from[i] / (double)count;
+    mean[1][i % 3] += to[i] / (double)count;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t a = 0; a < 3; ++a) {
+      for (size_t b = 0; b < 3; ++b) {
+        const double at = from[3 * i + b] - mean[0][b];
+        cross[3 * a + b] += (to[3 * i + a] - mean[1][a]) * at;
+        own[3 * a + b] += (from[3 * i + a] - mean[0][a]) * at;
+      }
+    }
+  }
+  bool right = true;
+  if (kind == SUPINE_PATIENT_MAP_SIMILARITY) {
+    right = similarity(cross, own[0] + own[4] + own[8], found->m);
+  } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
+    gsl_matrix_view own_view = gsl_matrix_view_array(own, 3, 3);
+    right = gsl_linalg_cholesky_decomp1(&own_view.matrix) == GSL_SUCCESS;
+    for (size_t a = 0; a < 3 && right; ++a) {
+      gsl_vector_view row = gsl_vector_view_array(cross + 3 * a, 3);
+      (void)gsl_linalg_cholesky_svx(&own_view.matrix, &row.vector);
+      memcpy(found->m + 3 * a, cross + 3 * a, 3 * sizeof(double));
+    }
+  }
+  double moved[3];
+  apply(found, mean[0], moved);
+  for (int a = 0; a < 3; ++a) {
+    found->t[a] = mean[1][a] - moved[a];
+  }
+  return right;
+}
+
+static void summarise(double *distances, size_t count, supine_patient_distance *of) {
+  gsl_sort(distances, 1, count);
+  of->mean = gsl_stats_mean(distances, 1, count);
+  of->rms = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    of->rms += distances[i] * distances[i] / (double)count;
+  }
+  of->rms = sqrt(of->rms);
+  of->p95 = gsl_stats_quantile_from_sorted_data(distances, 1, count, 0.95);
+  of->largest = distances[count - 1];
+}
+
+static void explain(supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
+  const double none = distance[SUPINE_PATIENT_MAP_NONE].rms;
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    distance[k].explained = none > 0.0 ? 1.0 - pow(distance[k].rms / none, 2.0) : 0.0;
+  }
+}
+
+supine_status
+supine_patient_validate_points(const supine_patient_pairs *pairs, const double *predicted,
+                               supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                               supine_error *error) {
+  double *space = malloc(pairs->count * sizeof *space);
+  if (space == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
+  }
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    map by;
+    if (k != SUPINE_PATIENT_MAP_PREDICTED &&
+        !fit_map((supine_patient_map)k, pairs->count, pairs->from, pairs->to, &by)) {
+      free(space);
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the points determine no %s map: they lie in one plane",
+                              supine_patient_map_names[k]);
+    }
+    for (size_t i = 0; i < pairs->count; ++i) {
+      double at[3];
+      const double *to = pairs->to + 3 * i;
+      if (k == SUPINE_PATIENT_MAP_PREDICTED) {
+        memcpy(at, predicted + 3 * i, sizeof at);
+      } else {
+        apply(&by, pairs->from + 3 * i, at);
+      }
+      space[i] = sqrt(pow(at[0] - to[0], 2.0) + pow(at[1] - to[1], 2.0) + pow(at[2] - to[2], 2.0));
+    }
+    summarise(space, pairs->count, &distance[k]);
+  }
+  explain(distance);
+  free(space);
+  return SUPINE_OK;
+}
+
+/* --- surfaces -------------------------------------------------------------------------------- */
+
+typedef struct search {
+  const supine_inside_surface *tree;
+  const double *points;
+  double *distance; /* [count] */
+  double *nearest;  /* [count, 3]; NULL: not wanted */
+} search;
+
+static void search_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const search *s = context;
+  supine_inside_place place;
+  for (size_t i = begin; i < end; ++i) {
+    place = supine_inside_surface_find(s->tree, s->points + 3 * i, i > begin ? &place : NULL);
+    s->distance[i] = fabs(place.depth);
+    if (s->nearest != NULL) {
+      memcpy(s->nearest + 3 * i, place.nearest, 3 * sizeof(double));
+    }
+  }
+}
+
+/* Both ways, pooled. */
+static supine_status surface_distance(const supine_mesh *rest, const double *moved,
+                                      const supine_mesh *state,
+                                      const supine_inside_surface *state_tree, double *nearest,
+                                      supine_patient_distance *of, supine_error *error) {
+  const size_t n = rest->vertex_count;
+  supine_inside_surface *tree = NULL;
+  double *space = malloc((n + state->vertex_count) * sizeof *space);
+  supine_status status =
+      space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for distances")
+                    : supine_inside_surface_create(moved, rest->triangle_count, rest->triangles,
+                                                   &tree, error);
+  if (status == SUPINE_OK) {
+    search there = {state_tree, moved, space, nearest};
+    search back = {tree, state->vertices, space + n, NULL};
+    supine_parallel_for(n, GRAIN, 0, search_range, &there);
+    supine_parallel_for(state->vertex_count, GRAIN, 0, search_range, &back);
+    summarise(space, n + state->vertex_count, of);
+  }
+  supine_inside_surface_destroy(tree);
+  free(space);
+  return status;
+}
+
+/* Vertices moved by the map of a kind that nearest points settle on. */
+static bool settle(supine_patient_map kind, const supine_mesh *rest,
+                   const supine_inside_surface *tree, double *space, double *moved) {
+  const size_t n = rest->vertex_count;
+  const size_t count = n < FITTED_MAX ? n : FITTED_MAX;
+  double *from = space;
+  double *at = from + 3 * count;
+  double *to = at + 3 * count;
+  double *distance = to + 3 * count;
+  map by = {.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
+  for (size_t i = 0; i < count; ++i) {
+    memcpy(from + 3 * i, rest->vertices + 3 * (i * n / count), 3 * sizeof(double));
+  }
+  for (int round = 0; round < (kind == SUPINE_PATIENT_MAP_NONE ? 0 : ROUNDS); ++round) {
+    search s = {tree, at, distance, to};
+    for (size_t i = 0; i < count; ++i) {
+      apply(&by, from + 3 * i, at + 3 * i);
+    }
+    supine_parallel_for(count, GRAIN, 0, search_range, &s);
+    if (!fit_map(kind, count, from, to, &by)) {
+      return false;
+    }
+  }
+  for (size_t i = 0; i < n; ++i) {
+    apply(&by, rest->vertices + 3 * i, moved + 3 * i);
+  }
+  return true;
+}
+
+static supine_status check_overlap(const supine_mesh *rest, const supine_mesh *state,
+                                   supine_error *error) {
+  double low[2][3];
+  double high[2][3];
+  supine_mesh_box(rest, low[0], high[0]);
+  supine_mesh_box(state, low[1], high[1]);
+  for (int k = 0; k < 3; ++k) {
+    if (fmin(high[0][k], high[1][k]) <= fmax(low[0][k], low[1][k])) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
+                              "%.0f mm): different frames, units or sides?",
+                              "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_patient_validate_surface(
+    const supine_mesh *rest, const double *predicted, const supine_mesh *state, double *nearest,
+    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
+  supine_inside_surface *tree = NULL;
+  double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
+  double *moved = malloc(3 * rest->vertex_count * sizeof *moved);
+  supine_status status = check_overlap(rest, state, error);
+  if (status == SUPINE_OK && (space == NULL || moved == NULL)) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              rest->vertex_count);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                          &tree, error);
+  }
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
+    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
+    if (!own && !settle((supine_patient_map)k, rest, tree, space, moved)) {
+      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the surface determines no %s map",
+                                supine_patient_map_names[k]);
+    } else {
+      status = surface_distance(rest, own ? predicted : moved, state, tree, own ? nearest : NULL,
+                                &distance[k], error);
+    }
+  }
+  if (status == SUPINE_OK) {
+    explain(distance);
+  }
+  supine_inside_surface_destroy(tree);
+  free(space);
+  free(moved);
+  return status;
+}

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * How far a prediction is from another state of the same lungs, beside what no model needs. */
+#ifndef SUPINE_PATIENT_VALIDATE_H
+#define SUPINE_PATIENT_VALIDATE_H
+
+#include "mesh/mesh.h"
+#include "precompute/patient/pairs.h"
+
+/** The prediction, and maps of the state at rest that are fitted to the other state itself: what a
+ * prediction has to be better than. */
+typedef enum supine_patient_map {
+  SUPINE_PATIENT_MAP_PREDICTED = 0,
+  SUPINE_PATIENT_MAP_NONE,
+  SUPINE_PATIENT_MAP_TRANSLATION,
+  SUPINE_PATIENT_MAP_SIMILARITY, /**< rotation, translation and scale */
+  SUPINE_PATIENT_MAP_AFFINE,
+  SUPINE_PATIENT_MAP_COUNT
+} supine_patient_map;
+
+/** "predicted", "none", "translation", "rigid+scale", "affine". */
+extern const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT];
+
+/** Distances, mm. */
+typedef struct supine_patient_distance {
+  double mean, rms, p95;
+  double largest;   /**< of surfaces: the Hausdorff distance */
+  double explained; /**< share of the squared distance without any map */
+} supine_patient_distance;
+
+/** Distances of points that are known in both states.
+ * @param predicted  [count, 3] where the pairs' first points were predicted to go
+ * @retval SUPINE_ERROR_NUMERICAL (all in one plane), SUPINE_ERROR_MEMORY */
+supine_status
+supine_patient_validate_points(const supine_patient_pairs *pairs, const double *predicted,
+                               supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                               supine_error *error);
+
+/** Distances between surfaces of any meshing, of the vertices of each to the other surface. The
+ * maps are fitted to nearest points, over and over.
+ * @param rest       vertices at rest
+ * @param predicted  [rest vertices, 3]
+ * @param nearest    optional [rest vertices, 3]: the state's point nearest to each predicted one
+ * @retval SUPINE_ERROR_MESH  boxes that do not overlap
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status supine_patient_validate_surface(
+    const supine_mesh *rest, const double *predicted, const supine_mesh *state, double *nearest,
+    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
+
+#endif

@@ -1,0 +1,92 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# From a law to a patient's basis and back: test_patient_command.sh PROGRAM
+#
+# Lungs are moved by a known law; fit finds it from the surfaces, precompute makes a basis of it, and
+# validate finds what fit said was left; and the same from landmarks. Then what is refused.
+set -u
+supine=$1
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+number() { # KEY FILE [N]: the Nth number of that key
+  sed -n "s/^ *\"$1\": \(-*[0-9.e+-]*\),*\$/\1/p" "$2" | sed -n "${3:-1}p"
+}
+near() { # A B TOLERANCE
+  awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { exit !(a != "" && b != "" && a - b < t && b - a < t) }'
+}
+
+"$supine" phantom -o rest.ply --vertices 800 >/dev/null || fail phantom
+"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+  --constants 5,2.2,9,1.1,20,1.4 --scale 30 -o state.ply >/dev/null || fail solve
+
+# Surfaces: the law comes back, and its basis lies on the state.
+"$supine" fit rest.ply state.ply --name "somebody" -o surface.json --json >fit.json || fail fit
+"$supine" precompute rest.ply --patient surface.json --reach 10 -o surface.safetensors >/dev/null ||
+  fail precompute
+"$supine" info surface.safetensors | grep -q 'patient *somebody: paper law .* held out' ||
+  fail "info does not say whose"
+"$supine" validate surface.safetensors --state state.ply --json >valid.json || fail validate
+near "$(number rms_mm valid.json)" 0 0.1 || fail "surfaces $(number rms_mm valid.json) mm apart"
+near "$(number explained_percent valid.json)" 100 0.1 || fail "not explained"
+awk -v a="$(number rms_mm valid.json)" -v b="$(number rms_mm valid.json 5)" \
+  'BEGIN { exit !(a < b / 3) }' || fail "no better than an affine map"
+"$supine" deform surface.safetensors --posture left --volume 300 -o left.ply >/dev/null ||
+  fail "no other posture"
+
+# Landmarks: vertices of the two, every fourth, with half a millimetre of noise.
+vertices() { # FILE: x y z of its vertices
+  awk '/^v / { print $2 "," $3 "," $4 }' "$1"
+}
+"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+  --constants 5,2.2,9,1.1,20,1.4 --scale 30 -o state.obj >/dev/null || fail "solve to OBJ"
+"$supine" solve rest.ply --posture supine --reach 10 --scale 0.000001 -o rest.obj >/dev/null ||
+  fail "solve at rest"
+{
+  echo x,y,z,to_x,to_y,to_z
+  vertices rest.obj >from.csv
+  vertices state.obj | awk -F, 'BEGIN { srand(7) } {
+    printf "%.4f,%.4f,%.4f\n", $1 + rand() - 0.5, $2 + rand() - 0.5, $3 + rand() - 0.5 }' >to.csv
+  paste -d, from.csv to.csv | awk 'NR % 4 == 3'
+} >pairs.csv
+for law in paper affine quadratic; do
+  "$supine" fit --landmarks pairs.csv --law $law -o points.json --json >fit.json || fail "fit $law"
+  "$supine" validate points.json --landmarks pairs.csv --json >valid.json || fail "validate $law"
+  near "$(number fitted_rms_mm fit.json)" "$(number rms_mm valid.json)" 1e-6 ||
+    fail "$law: $(number fitted_rms_mm fit.json) is not $(number rms_mm valid.json)"
+  "$supine" precompute rest.ply --patient points.json --reach 10 -o points.safetensors >/dev/null ||
+    fail "precompute $law"
+  "$supine" validate points.safetensors --landmarks pairs.csv --state state.ply --json >basis.json ||
+    fail "validate the basis of $law"
+  near "$(number rms_mm basis.json 6)" "$(number rms_mm valid.json)" 1e-6 ||
+    fail "$law: the basis leaves $(number rms_mm basis.json 6)"
+done
+
+# What is refused, with its exit code.
+refused() { # CODE WORDS COMMAND...
+  code=$1
+  words=$2
+  shift 2
+  "$supine" "$@" >out 2>&1
+  got=$?
+  [ $got -eq "$code" ] || fail "exit code $got of $*: $(cat out)"
+  grep -q -- "$words" out || fail "'$words' is not in: $(cat out)"
+}
+refused 1 'against what' validate points.safetensors
+refused 1 'make a basis of it first' validate points.json --state state.ply
+refused 1 'knows its own posture only' validate points.json --landmarks pairs.csv --posture prone
+refused 1 'what to fit to' fit rest.ply
+refused 2 'the same as the one at rest' fit rest.ply rest.ply
+echo '{}' >fit.csv
+refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
+awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
+  pairs.csv >far.csv
+"$supine" fit --landmarks far.csv -o far.json >/dev/null || fail "fit far away"
+refused 2 'another frame, unit or person' precompute rest.ply --patient far.json -o x.safetensors
+refused 2 'another frame, unit or person' validate points.safetensors --landmarks far.csv
+[ ! -e x.safetensors ] || fail "a refused command left a file"
+echo passed
