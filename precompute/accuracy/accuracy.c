@@ -13,9 +13,10 @@
 #include "precompute/physics/network.h"
 #include "precompute/projection/compression.h"
 
-enum { BLOCK = 512, VOLUME_HALVINGS = 10 };
+/* Sums are of so many parts of the vertices, whatever the number of threads. */
+enum { BLOCK = 512, PARTS = 16, VOLUME_HALVINGS = 10 };
 
-/* What one thread has seen. */
+/* What is seen of one part of the vertices. */
 typedef struct tally {
   double field2;
   supine_tally error;    /* at one breath scale */
@@ -28,7 +29,7 @@ typedef struct accuracy_work {
   const double *directions; /* [N, 3] */
   const double *weights;    /* [D, K] */
   const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
-  tally *tallies;           /* one a thread */
+  tally *tallies;           /* [PARTS] */
   struct turned_block *blocks;
 } accuracy_work;
 
@@ -120,10 +121,15 @@ static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
 
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
+  const size_t n = work->compression->vertex_count;
+  const size_t blocks = (n + BLOCK - 1) / BLOCK;
   turned_block *block = &work->blocks[thread];
-  for (size_t first = begin; first < end; first += BLOCK) {
-    turn_block(work, first, end - first < BLOCK ? end - first : BLOCK, block);
-    compare_block(work, &work->tallies[thread], first, block);
+  for (size_t part = begin; part < end; ++part) {
+    for (size_t b = blocks * part / PARTS; b < blocks * (part + 1) / PARTS; ++b) {
+      const size_t left = n - b * BLOCK;
+      turn_block(work, b * BLOCK, left < BLOCK ? left : BLOCK, block);
+      compare_block(work, &work->tallies[part], b * BLOCK, block);
+    }
   }
 }
 
@@ -170,10 +176,18 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   const bool closed = forms != NULL && truth->cubic != NULL;
   double *weights = malloc(count * compression->mode_count * sizeof *weights);
   double *scales = malloc(2 * count * sizeof *scales);
-  tally *tallies = calloc(threads, sizeof *tallies);
+  tally *tallies = calloc(PARTS, sizeof *tallies);
   turned_block *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
   supine_status status = SUPINE_OK;
+  if (compression->mode_count > SUPINE_MODES_MADE_MAX ||
+      (truth->fields == NULL && truth->rank > SUPINE_FORCE_COLUMNS_MAX)) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%zu modes against %zu columns: at most %d and %d can be compared",
+                              compression->mode_count, truth->rank, SUPINE_MODES_MADE_MAX,
+                              SUPINE_FORCE_COLUMNS_MAX);
+    goto cleanup;
+  }
   if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
@@ -197,9 +211,9 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
                         tallies, blocks};
-  supine_parallel_for(n, BLOCK, threads, compare_range, &work);
+  supine_parallel_for(PARTS, 1, threads, compare_range, &work);
   tally *all = &tallies[0];
-  for (size_t t = 1; t < threads; ++t) {
+  for (size_t t = 1; t < PARTS; ++t) {
     all->field2 += tallies[t].field2;
     supine_accuracy_tally_merge(&all->error, &tallies[t].error);
     supine_accuracy_tally_merge(&all->error_mm, &tallies[t].error_mm);

@@ -42,6 +42,8 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
  * @param directions  [N, 3] d
  * @param forms       of the compression's coefficients; NULL: open surface
  * @param volume      mL to compare at, as 500; halved until every direction reaches it
+ * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX modes or SUPINE_FORCE_COLUMNS_MAX
+ * columns
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (no volume is reached) */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
@@ -55,6 +57,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * looks torn: neighbours move apart by more than lies between them.
  * @param directions  [N, 3] d
  * @param forms       of the compression's coefficients: the surface is closed
+ * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX modes
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,

@@ -91,8 +91,8 @@ supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const 
   }
   status = supine_projection_sampler_create(lungs, model, &sampler, error);
   if (status == SUPINE_OK) {
-    status =
-        supine_projection_sampler_solve(sampler, count, made.directions, false, made.fields, NULL, error);
+    status = supine_projection_sampler_solve(sampler, count, made.directions, false, made.fields,
+                                             NULL, error);
   }
   for (size_t d = 0; d < count && closed && status == SUPINE_OK; ++d) {
     supine_volume_forms forms = {0};

@@ -90,6 +90,9 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, double volume,
                                           double *share) {
+  if (compression->mode_count > SUPINE_MODES_MADE_MAX) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
   const supine_mesh *mesh = &lungs->mesh;
   const size_t threads = supine_thread_count();
   const size_t stride = (mesh->triangle_count + SAMPLES_MAX - 1) / SAMPLES_MAX;

@@ -36,23 +36,27 @@ static double determinant(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
+/* Triangles are summed in so many parts, whatever the number of threads, and so are the parts. */
+enum { PARTS = 16 };
+
 typedef struct forms_work {
   const supine_lungs *lungs;
   const double *share; /* of each lung; NULL: 1 */
   const double *directions, *columns;
   size_t count, first; /* columns; first triangle of this lung */
   double centre[3];
-  double *linear, *quadratic, *cubic; /* one set a thread */
+  size_t triangles;                   /* of this lung */
+  double *linear, *quadratic, *cubic; /* one set a part */
 } forms_work;
 
 /* Adds a range of one lung's triangles: (1/6) det(p0 + F0 d0, p1 + F1 d1, p2 + F2 d2), by powers of
  * F. */
-SUPINE_CLONES static void forms_range(void *context, size_t begin, size_t end, size_t thread) {
-  const forms_work *work = context;
+SUPINE_CLONES static void scalar_part(const forms_work *work, size_t begin, size_t end,
+                                      size_t part) {
   const size_t count = work->count;
-  double *linear = work->linear + thread * count;
-  double *quadratic = work->quadratic + thread * count * count;
-  double *cubic = work->cubic + thread * count * count * count;
+  double *linear = work->linear + part * count;
+  double *quadratic = work->quadratic + part * count * count;
+  double *cubic = work->cubic + part * count * count * count;
   for (size_t t = begin; t < end; ++t) {
     const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
     double p[3][3];
@@ -89,12 +93,11 @@ SUPINE_CLONES static void forms_range(void *context, size_t begin, size_t end, s
 }
 
 /* The same for columns of three components: a determinant for each choice of columns. */
-static void forms_range_vector(void *context, size_t begin, size_t end, size_t thread) {
-  const forms_work *work = context;
+static void vector_part(const forms_work *work, size_t begin, size_t end, size_t part) {
   const size_t count = work->count;
-  double *linear = work->linear + thread * count;
-  double *quadratic = work->quadratic + thread * count * count;
-  double *cubic = work->cubic + thread * count * count * count;
+  double *linear = work->linear + part * count;
+  double *quadratic = work->quadratic + part * count * count;
+  double *cubic = work->cubic + part * count * count * count;
   for (size_t t = begin; t < end; ++t) {
     const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
     double p[3][3];
@@ -127,15 +130,23 @@ static void forms_range_vector(void *context, size_t begin, size_t end, size_t t
   }
 }
 
-/* Sums the threads' parts and makes the forms symmetric. */
-static void forms_collect(const forms_work *work, size_t threads, size_t lung,
-                          supine_volume_forms *forms) {
+static void forms_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const forms_work *work = context;
+  for (size_t part = begin; part < end; ++part) {
+    (work->directions != NULL ? scalar_part : vector_part)(
+        work, work->triangles * part / PARTS, work->triangles * (part + 1) / PARTS, part);
+  }
+}
+
+/* Sums the parts and makes the forms symmetric. */
+static void forms_collect(const forms_work *work, size_t lung, supine_volume_forms *forms) {
   const size_t n = work->count;
   const double unit = millilitres / 6.0 * (work->share == NULL ? 1.0 : work->share[lung]);
   double *linear = forms->linear + lung * n;
   double *quadratic = forms->quadratic + lung * n * n;
   double *cubic = forms->cubic + lung * n * n * n;
-  for (size_t t = 0; t < threads; ++t) {
+  for (size_t t = 0; t < PARTS; ++t) {
     const double *l = work->linear + t * n;
     const double *q = work->quadratic + t * n * n;
     const double *c = work->cubic + t * n * n * n;
@@ -157,7 +168,6 @@ static void forms_collect(const forms_work *work, size_t threads, size_t lung,
 static supine_status create(const supine_lungs *lungs, const double *share,
                             const double *directions, const double *columns, size_t count,
                             supine_volume_forms *forms, supine_error *error) {
-  const size_t threads = supine_thread_count();
   forms_work work = {
       .lungs = lungs, .share = share, .directions = directions, .columns = columns, .count = count};
   supine_volume_forms made = {0};
@@ -174,9 +184,9 @@ static supine_status create(const supine_lungs *lungs, const double *share,
                             lungs->topology.inconsistent_edges);
   }
   status = forms_allocate(lungs->lung_count, count, &made);
-  work.linear = malloc(threads * count * sizeof(double));
-  work.quadratic = malloc(threads * count * count * sizeof(double));
-  work.cubic = malloc(threads * count * count * count * sizeof(double));
+  work.linear = malloc(PARTS * count * sizeof(double));
+  work.quadratic = malloc(PARTS * count * count * sizeof(double));
+  work.cubic = malloc(PARTS * count * count * count * sizeof(double));
   if (status != SUPINE_OK || work.linear == NULL || work.quadratic == NULL || work.cubic == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY,
                               "no memory for volume forms of %zu columns", count);
@@ -186,13 +196,13 @@ static supine_status create(const supine_lungs *lungs, const double *share,
     work.centre[k] = 0.5 * (lungs->minimum[k] + lungs->maximum[k]);
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    memset(work.linear, 0, threads * count * sizeof(double));
-    memset(work.quadratic, 0, threads * count * count * sizeof(double));
-    memset(work.cubic, 0, threads * count * count * count * sizeof(double));
+    memset(work.linear, 0, PARTS * count * sizeof(double));
+    memset(work.quadratic, 0, PARTS * count * count * sizeof(double));
+    memset(work.cubic, 0, PARTS * count * count * count * sizeof(double));
     work.first = lungs->triangle_begin[lung];
-    supine_parallel_for(lungs->triangle_begin[lung + 1] - work.first, 1024, threads,
-                        directions != NULL ? forms_range : forms_range_vector, &work);
-    forms_collect(&work, threads, lung, &made);
+    work.triangles = lungs->triangle_begin[lung + 1] - work.first;
+    supine_parallel_for(PARTS, 1, 0, forms_range, &work);
+    forms_collect(&work, lung, &made);
   }
   *forms = made;
   made = (supine_volume_forms){0};

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A basis file is the same, byte for byte, whatever the number of threads. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "precompute/phantom/phantom.h"
+#include "precompute/precompute.h"
+
+enum { VERTICES = 9000 }; /* several blocks of every sum, the last of them short */
+
+static supine_lungs phantom(void) {
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_phantom_create(VERTICES, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+  supine_mesh_free(&mesh);
+  return lungs;
+}
+
+/* The bytes of a basis made in so many threads. */
+static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precompute_options *options,
+                               const char *threads, size_t *size) {
+  char path[] = "/tmp/supine-threads-XXXXXX";
+  supine_error error;
+  (void)close(mkstemp(path));
+  assert_int_equal(setenv("SUPINE_THREADS", threads, 1), 0);
+  if (supine_precompute(lungs, options, path, NULL, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  unsigned char *bytes = malloc(*size);
+  assert_int_equal(fread(bytes, 1, *size, file), *size);
+  (void)fclose(file);
+  (void)unlink(path);
+  return bytes;
+}
+
+static void check(double soften, double reach) {
+  static const char *const threads[] = {"2", "3", "7"};
+  supine_lungs lungs = phantom();
+  supine_precompute_options options = {
+      .model = supine_physics_model_default(), .band = 3, .modes = 8, .held_out = 20};
+  options.model.force.soften = soften;
+  options.model.reach = reach;
+  size_t size;
+  unsigned char *one = bytes_of(&lungs, &options, "1", &size);
+  for (size_t t = 0; t < sizeof threads / sizeof *threads; ++t) {
+    size_t other_size;
+    unsigned char *other = bytes_of(&lungs, &options, threads[t], &other_size);
+    assert_int_equal(other_size, size);
+    for (size_t i = 0; i < size; ++i) {
+      if (one[i] != other[i]) {
+        fail_msg("soften %g, reach %g: byte %zu of %zu differs with %s threads", soften, reach, i,
+                 size, threads[t]);
+      }
+    }
+    free(other);
+  }
+  free(one);
+  supine_lungs_free(&lungs);
+  (void)unsetenv("SUPINE_THREADS");
+}
+
+static void test_linear_route_same_bytes(void **state) {
+  (void)state;
+  check(0.0, 0.0);
+  check(0.0, 10.0);
+}
+
+static void test_sampled_route_same_bytes(void **state) {
+  (void)state;
+  check(1.0, 0.0);
+  check(1.0, 10.0);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_linear_route_same_bytes),
+      cmocka_unit_test(test_sampled_route_same_bytes),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
