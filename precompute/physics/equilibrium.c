@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/physics/chebyshev.h"
 #include "precompute/physics/conjugate_gradients.h"
 
 enum { STEPS_MAX = 400 };
@@ -26,8 +27,9 @@ struct supine_equilibrium {
   size_t count;      /* of the last solve */
   double *solution;  /* [N, lanes] t */
   supine_system system;
-  float *lane_conductance; /* [2 E, lanes] without a reach, where every lane has its stiffness */
-  supine_rows links;       /* without a reach: the network's, with values of one stiffness */
+  double radius;      /* of its eigenvalues over its diagonal about 1 */
+  float *lane_single; /* [N, lanes] S, without a reach, where every lane has its stiffness */
+  supine_rows links;  /* without a reach: the network's, with values of one stiffness */
   supine_gradients gradients;
 };
 
@@ -41,7 +43,7 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
       free(stage->right);
       free(stage->work);
     }
-    free(equilibrium->lane_conductance);
+    free(equilibrium->lane_single);
     free(equilibrium->links.value);
     free(equilibrium->stiffness);
     free(equilibrium->give);
@@ -148,19 +150,55 @@ typedef struct soften_work {
   const double *exponents;
 } soften_work;
 
-static void soften_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const soften_work *work = context;
+/* exp to rounding, in vectors, which the library's is not: 2^k times a power series of degree 12 on
+ * |x| <= ln 2 / 2. For exponents within 700. */
+SUPINE_INLINE double exponential(double exponent) {
+  const double shift = 0x1.8p52; /* added, it leaves the nearest integer in the lowest bits */
+  const double limited = fmin(fmax(exponent, -700.0), 700.0);
+  const double shifted = limited * M_LOG2E + shift;
+  const double k = shifted - shift;
+  const double x = limited - k * 0x1.62e42fefa39efp-1 - k * 0x1.abc9e3b39803fp-56; /* ln 2 */
+  double sum = 1.0 / 479001600.0;
+  for (int n = 12; n > 0; --n) {
+    static const double inverse[] = {1.0,
+                                     1.0,
+                                     1.0 / 2.0,
+                                     1.0 / 6.0,
+                                     1.0 / 24.0,
+                                     1.0 / 120.0,
+                                     1.0 / 720.0,
+                                     1.0 / 5040.0,
+                                     1.0 / 40320.0,
+                                     1.0 / 362880.0,
+                                     1.0 / 3628800.0,
+                                     1.0 / 39916800.0};
+    sum = sum * x + inverse[n - 1];
+  }
+  uint64_t bits;
+  memcpy(&bits, &shifted, sizeof bits);
+  bits = (bits << 52) + ((uint64_t)1023 << 52);
+  double power;
+  memcpy(&power, &bits, sizeof power);
+  return power * sum;
+}
+
+SUPINE_INLINE void soften_rows(size_t lanes, const soften_work *work, size_t begin, size_t end) {
   const supine_equilibrium *eq = work->eq;
-  const size_t count = work->count;
   for (size_t i = begin; i < end; ++i) {
-    const double *exponent = work->exponents + (size_t)eq->network->order[i] * count;
-    for (size_t r = 0; r < count; ++r) {
-      eq->lane_give[i * count + r] = eq->give[i] * exp(exponent[r]);
+    const double *exponent = work->exponents + (size_t)eq->network->order[i] * lanes;
+    const double give = eq->give[i];
+    double *restrict out = eq->lane_give + i * lanes;
+    SUPINE_EACH_LANE(r, lanes) {
+      out[r] = give * exponential(exponent[r]);
     }
   }
 }
 
+SUPINE_CLONES static void soften_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const soften_work *work = context;
+  SUPINE_FOR_LANES(work->count, soften_rows, work, begin, end);
+}
 supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium, size_t count,
                                                 const double *exponents) {
   const supine_network *net = equilibrium->network;
@@ -171,12 +209,10 @@ supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium,
   if (equilibrium->lane_give == NULL) {
     equilibrium->lane_give = malloc(n * equilibrium->rhs_max * sizeof(double));
   }
-  if (net->coarse == NULL && equilibrium->lane_conductance == NULL) {
-    equilibrium->lane_conductance =
-        malloc((net->links.begin[n] * equilibrium->rhs_max + 1) * sizeof(float));
+  if (net->coarse == NULL && equilibrium->lane_single == NULL) {
+    equilibrium->lane_single = malloc(n * equilibrium->rhs_max * sizeof(float));
   }
-  if (equilibrium->lane_give == NULL ||
-      (net->coarse == NULL && equilibrium->lane_conductance == NULL)) {
+  if (equilibrium->lane_give == NULL || (net->coarse == NULL && equilibrium->lane_single == NULL)) {
     return SUPINE_ERROR_MEMORY;
   }
   soften_work work = {equilibrium, count, exponents};
@@ -196,61 +232,117 @@ typedef struct solve_pass {
   bool warm;                     /* catch_ holds a guess */
   double unit[SUPINE_RHS_MAX];   /* norm of the force, that single precision counts in */
   double wanted[SUPINE_RHS_MAX]; /* of the next round, squared */
+  double gain;                   /* asked of the next round */
   double relative;               /* largest residual over the force's norm */
 } solve_pass;
+
+static void run(const solve_pass *pass, supine_range_function *function) {
+  supine_physics_system_run(pass->eq->system.threads, pass->eq->network->vertex_count, function,
+                            (void *)pass);
+}
 
 /* Without a reach: c of a link of distance d, and what the link adds to the mass of its first end
  * beside S^2, which is what its spring catches. */
 SUPINE_INLINE void paper_link(double give, double other, double d, double *c, double *mass) {
   const double product = give * other;
-  const double sum = d + 2.0 * product;
-  *c = product / (d * sum);
-  *mass = (give + other) / (2.0 * other * sum);
+  const double share = 1.0 / (2.0 * d * other * (d + 2.0 * product)); /* one division for both */
+  *c = 2.0 * other * product * share;
+  *mass = d * (give + other) * share;
 }
 
-/* Masses and conductances in single precision. */
+/* Masses, and without a reach conductances, where all lanes share one stiffness or links do not
+ * depend on it. */
 static void prepare_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
-  supine_equilibrium *eq = pass->eq;
+  const supine_equilibrium *eq = pass->eq;
   const supine_network *net = eq->network;
-  const size_t lanes = eq->count;
   const size_t own = pass->give_lanes;
-  supine_stage *stage = &eq->system.stage[0];
+  float *mass = eq->system.stage[0].mass;
   for (size_t i = begin; i < end; ++i) {
-    for (size_t r = 0; r < own; ++r) {
-      const double give = pass->give[i * own + r];
-      double mass = (net->own == NULL ? 1.0 : net->own[i]) * give * give;
-      for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->own == NULL; ++s) {
-        double c;
-        double more;
-        paper_link(give, pass->give[net->links.column[s] * own + r], net->distance[s], &c, &more);
-        mass += more;
-        if (own == 1) {
-          eq->links.value[s] = (float)c;
-        } else {
-          stage->conductance[s * own + r] = (float)c;
-        }
-      }
-      stage->mass[i * lanes + r] = (float)mass;
+    double more = 0.0;
+    for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->own == NULL; ++s) {
+      double c;
+      double caught;
+      paper_link(pass->give[i], pass->give[net->links.column[s]], net->distance[s], &c, &caught);
+      eq->links.value[s] = (float)c;
+      more += caught;
     }
-    for (size_t r = own; r < lanes; ++r) {
-      stage->mass[i * lanes + r] = stage->mass[i * lanes];
+    for (size_t r = 0; r < eq->count; ++r) {
+      const double give = pass->give[own == 1 ? i : i * own + r];
+      mass[i * eq->count + r] =
+          (float)((net->own == NULL ? 1.0 : net->own[i]) * give * give + more);
     }
   }
 }
 
-/* Sets the system up for the lanes of this solve, where it is not. */
-static void prepare(solve_pass *pass) {
-  supine_equilibrium *eq = pass->eq;
-  eq->system.lanes = eq->count;
-  if (eq->prepared != eq->count) {
-    eq->system.stage[0].conductance =
-        eq->network->coarse == NULL && eq->lane_count > 0 ? eq->lane_conductance : NULL;
-    supine_physics_system_run(eq->system.threads, eq->network->vertex_count, prepare_range, pass);
-    supine_physics_system_set_masses(&eq->system);
-    eq->prepared = eq->count;
+static void copy_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  const supine_equilibrium *eq = pass->eq;
+  for (size_t at = begin * eq->count; at < end * eq->count; ++at) {
+    eq->lane_single[at] = (float)pass->give[at];
   }
+  for (size_t s = eq->links.begin[begin]; s < eq->links.begin[end]; ++s) {
+    eq->links.value[s] = (float)eq->network->distance[s];
+  }
+}
+
+/* Masses and diagonals without a reach, where every lane has its stiffness. */
+SUPINE_INLINE void lane_masses(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
+  const supine_equilibrium *eq = pass->eq;
+  for (size_t i = begin; i < end; ++i) {
+    float mass[SUPINE_RHS_MAX];
+    float sum[SUPINE_RHS_MAX];
+    const float *inner = eq->lane_single + i * lanes;
+    SUPINE_EACH_LANE(r, lanes) {
+      sum[r] = mass[r] = inner[r] * inner[r];
+    }
+    for (size_t s = eq->links.begin[i]; s < eq->links.begin[i + 1]; ++s) {
+      const float *outer = eq->lane_single + (size_t)eq->links.column[s] * lanes;
+      const float d = eq->links.value[s];
+      SUPINE_EACH_LANE(r, lanes) { /* paper_link */
+        const float product = inner[r] * outer[r];
+        const float more = (inner[r] + outer[r]) / (2.0F * outer[r] * (d + 2.0F * product));
+        mass[r] += more;
+        sum[r] += more + product / (d * (d + 2.0F * product));
+      }
+    }
+    float *restrict to = eq->system.stage[0].mass + i * lanes;
+    float *restrict inverse = eq->system.stage[0].inverse + i * lanes;
+    SUPINE_EACH_LANE(r, lanes) {
+      to[r] = mass[r];
+      inverse[r] = 1.0F / sum[r];
+    }
+  }
+}
+
+SUPINE_CLONES static void lane_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  SUPINE_FOR_LANES(pass->eq->count, lane_masses, pass, begin, end);
+}
+
+/* Sets the system up for the lanes of this solve, where it is not. */
+static void prepare(const solve_pass *pass) {
+  supine_equilibrium *eq = pass->eq;
+  supine_system *system = &eq->system;
+  const bool each = eq->network->coarse == NULL && eq->lane_count > 0;
+  system->lanes = eq->count;
+  if (eq->prepared == eq->count) {
+    return;
+  }
+  system->stage[0].give = each ? eq->lane_single : NULL;
+  if (each) {
+    run(pass, copy_range);
+    run(pass, lane_range);
+  } else {
+    run(pass, prepare_range);
+  }
+  supine_physics_system_set_masses(system);
+  eq->radius =
+      system->stage_count > 1 ? 1.0 : supine_physics_chebyshev_radius(system, eq->gradients.sums);
+  eq->prepared = eq->count;
 }
 
 /* The norm of own f, and the t to begin with. */
@@ -354,11 +446,6 @@ static void store_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-static void run(const solve_pass *pass, supine_range_function *function) {
-  supine_physics_system_run(pass->eq->system.threads, pass->eq->network->vertex_count, function,
-                            (void *)pass);
-}
-
 static double total(const solve_pass *pass, size_t lane) {
   const supine_equilibrium *eq = pass->eq;
   return supine_physics_gradients_total(eq->gradients.sums, eq->network->vertex_count, eq->count, 0,
@@ -369,12 +456,28 @@ static double total(const solve_pass *pass, size_t lane) {
 static void look(solve_pass *pass, double tolerance) {
   run(pass, residual_range);
   pass->relative = 0.0;
+  pass->gain = 1.0;
   for (size_t r = 0; r < pass->eq->count; ++r) {
     const double relative = sqrt(total(pass, r)) / pass->unit[r];
     const double next = fmax(round_gain * relative, 0.5 * tolerance);
     pass->wanted[r] = next * next;
+    pass->gain = fmin(pass->gain, next / relative);
     pass->relative = relative <= pass->relative ? pass->relative : relative; /* keeps NaN */
   }
+}
+
+/* Where the diagonal dominates less, conjugate gradients find their way better. */
+static const double radius_max = 0.8;
+
+/* One round in single precision; returns its steps. */
+static size_t improve(const solve_pass *pass, size_t steps_max) {
+  supine_equilibrium *eq = pass->eq;
+  if (eq->radius > radius_max) {
+    return supine_physics_conjugate_gradients(&eq->gradients, steps_max);
+  }
+  const size_t steps = supine_physics_chebyshev_steps(eq->radius, pass->gain);
+  supine_physics_chebyshev(&eq->system, eq->radius, steps, pass->unit, eq->solution);
+  return steps;
 }
 
 /* Rounds until the residual is as wanted, or no longer halves. */
@@ -385,7 +488,7 @@ static size_t iterate(solve_pass *pass, double tolerance) {
        pass->relative > tolerance && pass->relative < 0.5 * last && steps < STEPS_MAX;
        look(pass, tolerance)) {
     last = pass->relative;
-    steps += supine_physics_conjugate_gradients(&pass->eq->gradients, STEPS_MAX - steps);
+    steps += improve(pass, STEPS_MAX - steps);
   }
   return steps;
 }

@@ -109,8 +109,7 @@ static void invert_range(void *context, size_t begin, size_t end, size_t thread)
     for (size_t r = 0; r < pass->lanes; ++r) {
       double sum = (double)stage->mass[i * pass->lanes + r];
       for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
-        sum += (double)(stage->conductance != NULL ? stage->conductance[s * pass->lanes + r]
-                                                   : links->value[s]);
+        sum += (double)links->value[s];
       }
       stage->inverse[i * pass->lanes + r] = (float)(1.0 / sum);
     }
@@ -121,7 +120,9 @@ void supine_physics_system_set_masses(supine_system *system) {
   for (size_t k = 0; k < system->stage_count; ++k) {
     const supine_stage *stage = &system->stage[k];
     row_pass pass = {stage, NULL, system->lanes, 0.0F, NULL, NULL, NULL};
-    supine_physics_system_run(system->threads, stage->links->count, invert_range, &pass);
+    if (stage->give == NULL) {
+      supine_physics_system_run(system->threads, stage->links->count, invert_range, &pass);
+    }
     if (k + 1 < system->stage_count) { /* shares sum to 1: the mass stays the same in all */
       apply(system, stage->whole, 0.0F, stage->mass, system->stage[k + 1].mass);
     }

@@ -19,7 +19,7 @@ typedef struct supine_stage {
   const supine_rows *links; /* who is linked, and c where it does not depend on the stiffness */
   const supine_rows *part;  /* shares of its rows in those of the next stage */
   const supine_rows *whole; /* the transpose */
-  float *conductance;       /* [links, lanes] c where it does; NULL */
+  const float *give;        /* [rows, lanes] S that c is found from, links' values being D; NULL */
   float *mass;              /* [rows, lanes] */
   float *inverse;           /* [rows, lanes] of the diagonal */
   float *solution, *right, *work; /* [rows, lanes] */
@@ -35,7 +35,8 @@ typedef struct supine_system {
 void supine_physics_system_run(size_t threads, size_t rows, supine_range_function *function,
                                void *context);
 
-/* The coarse masses of the fine ones, and the inverse of every stage's diagonal. */
+/* The coarse masses of the fine ones, and the inverse of every diagonal that is not there already,
+ * as it is where c depends on the stiffness. */
 void supine_physics_system_set_masses(supine_system *system);
 
 /* Share of a full step that smoothing takes: stable for diagonals of half the largest eigenvalue or
@@ -91,15 +92,18 @@ SUPINE_INLINE void supine_physics_stage_image(size_t lanes, const supine_stage *
   }
   for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
     const float *other = from + (size_t)links->column[s] * lanes;
-    if (stage->conductance == NULL) {
+    if (stage->give == NULL) {
       const float c = links->value[s];
       SUPINE_EACH_LANE(r, lanes) {
         out[r] += c * (own[r] - other[r]);
       }
     } else {
-      const float *c = stage->conductance + s * lanes;
-      SUPINE_EACH_LANE(r, lanes) {
-        out[r] += c[r] * (own[r] - other[r]);
+      const float *outer = stage->give + (size_t)links->column[s] * lanes;
+      const float *inner = stage->give + i * lanes;
+      SUPINE_EACH_LANE(r, lanes) { /* as paper_link: cheaper than to fetch */
+        const float product = inner[r] * outer[r];
+        out[r] +=
+            product / (links->value[s] * (links->value[s] + 2.0F * product)) * (own[r] - other[r]);
       }
     }
   }
