@@ -154,26 +154,21 @@ typedef struct soften_work {
  * |x| <= ln 2 / 2. For exponents within 700. */
 SUPINE_INLINE double exponential(double exponent) {
   const double shift = 0x1.8p52; /* added, it leaves the nearest integer in the lowest bits */
-  const double limited = fmin(fmax(exponent, -700.0), 700.0);
+  const double above = exponent < -700.0 ? -700.0 : exponent;
+  const double limited = above > 700.0 ? 700.0 : above;
   const double shifted = limited * M_LOG2E + shift;
   const double k = shifted - shift;
   const double x = limited - k * 0x1.62e42fefa39efp-1 - k * 0x1.abc9e3b39803fp-56; /* ln 2 */
-  double sum = 1.0 / 479001600.0;
-  for (int n = 12; n > 0; --n) {
-    static const double inverse[] = {1.0,
-                                     1.0,
-                                     1.0 / 2.0,
-                                     1.0 / 6.0,
-                                     1.0 / 24.0,
-                                     1.0 / 120.0,
-                                     1.0 / 720.0,
-                                     1.0 / 5040.0,
-                                     1.0 / 40320.0,
-                                     1.0 / 362880.0,
-                                     1.0 / 3628800.0,
-                                     1.0 / 39916800.0};
-    sum = sum * x + inverse[n - 1];
-  }
+  const double high =
+      1.0 / 5040.0 +
+      x * (1.0 / 40320.0 +
+           x * (1.0 / 362880.0 +
+                x * (1.0 / 3628800.0 + x * (1.0 / 39916800.0 + x * (1.0 / 479001600.0)))));
+  const double sum =
+      1.0 +
+      x * (1.0 +
+           x * (0.5 + x * (1.0 / 6.0 +
+                           x * (1.0 / 24.0 + x * (1.0 / 120.0 + x * (1.0 / 720.0 + x * high))))));
   uint64_t bits;
   memcpy(&bits, &shifted, sizeof bits);
   bits = (bits << 52) + ((uint64_t)1023 << 52);
@@ -241,11 +236,18 @@ static void run(const solve_pass *pass, supine_range_function *function) {
                             (void *)pass);
 }
 
+/* 1 / value to 1e-14: a division in single precision and a step of Newton's, which take a fraction
+ * of a division in double. */
+SUPINE_INLINE double reciprocal(double value) {
+  const double guess = (double)(1.0F / (float)value);
+  return guess * (2.0 - value * guess);
+}
+
 /* Without a reach: c of a link of distance d, and what the link adds to the mass of its first end
  * beside S^2, which is what its spring catches. */
 SUPINE_INLINE void paper_link(double give, double other, double d, double *c, double *mass) {
   const double product = give * other;
-  const double share = 1.0 / (2.0 * d * other * (d + 2.0 * product)); /* one division for both */
+  const double share = reciprocal(2.0 * d * other * (d + 2.0 * product)); /* one for both */
   *c = 2.0 * other * product * share;
   *mass = d * (give + other) * share;
 }
@@ -346,25 +348,38 @@ static void prepare(const solve_pass *pass) {
 }
 
 /* The norm of own f, and the t to begin with. */
-static void load_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
+SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
+                             size_t end) {
   const supine_equilibrium *eq = pass->eq;
-  const size_t count = eq->count;
-  const float *inverse = eq->system.stage[0].inverse;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     double sums[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
-      const size_t file = (size_t)eq->network->order[i] * count;
+      const size_t file = (size_t)eq->network->order[i] * lanes;
       const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
-      for (size_t r = 0; r < count; ++r) {
-        const double give = pass->give[pass->give_lanes == 1 ? i : i * count + r];
-        const double right = own * pass->force[file + r];
-        eq->solution[i * count + r] = pass->warm ? pass->catch_[file + r] / (give * give) : 0.0;
-        sums[r] += right * right * (double)inverse[i * count + r];
+      const double *give = pass->give + (each ? i * lanes : i);
+      const double *force = pass->force + file;
+      const double *guess = pass->catch_ + file;
+      const float *inverse = eq->system.stage[0].inverse + i * lanes;
+      double *restrict t = eq->solution + i * lanes;
+      SUPINE_EACH_LANE(r, lanes) {
+        sums[r] += own * force[r] * (own * force[r]) * (double)inverse[r];
+      }
+      SUPINE_EACH_LANE(r, lanes) {
+        const double s = give[each ? r : 0];
+        t[r] = pass->warm ? guess[r] / (s * s) : 0.0;
       }
     }
-    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * count, sums, count * sizeof *sums);
+    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * lanes, sums, lanes * sizeof *sums);
+  }
+}
+
+SUPINE_CLONES static void load_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const solve_pass *pass = context;
+  if (pass->give_lanes > 1) {
+    SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, true, begin, end);
+  } else {
+    SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, false, begin, end);
   }
 }
 
