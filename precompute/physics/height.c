@@ -2,16 +2,18 @@
 /* Extent of the lungs along many directions: the min and max of the heights in (18). */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "precompute/physics/force.h"
 #include "sh/base/parallel.h"
 
 #include "precompute/physics/network.h"
 
-/* Vertices are taken in blocks of the file's order, each with its box. The box's own extent along a
- * direction bounds its vertices', so that only the few blocks that can hold an extreme are read:
- * the result is exact, and its cost next to nothing where the file's order is local. */
-enum { BLOCK = 256 };
+/* Vertices are taken in blocks, each with its box. The box's own extent along a direction bounds
+ * its vertices', so that only the few blocks that can hold an extreme are read: the result is
+ * exact, and its cost next to nothing. Blocks are of neighbours in space, whatever the file's
+ * order: vertices are put in the order of a curve through 32 x 32 x 32 cells (Morton 1966). */
+enum { BLOCK = 256, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
 
 typedef struct block_box {
   double centre[3];
@@ -19,7 +21,8 @@ typedef struct block_box {
 } block_box;
 
 typedef struct range_work {
-  const supine_mesh *mesh;
+  size_t count;           /* vertices */
+  const double *vertices; /* [count, 3] */
   const block_box *boxes;
   size_t box_count;
   const double *directions;
@@ -42,7 +45,7 @@ static block_box box_of(const double *vertices, size_t count) {
 }
 
 static size_t block_size(const range_work *work, size_t block) {
-  const size_t left = work->mesh->vertex_count - block * BLOCK;
+  const size_t left = work->count - block * BLOCK;
   return left < BLOCK ? left : BLOCK;
 }
 
@@ -58,7 +61,7 @@ static double highest(const range_work *work, const double *g, size_t *seed) {
     if (supine_dot(g, box->centre) + supine_dot(size, box->half) <= best) {
       continue;
     }
-    const double *p = work->mesh->vertices + 3 * block * BLOCK;
+    const double *p = work->vertices + 3 * block * BLOCK;
     for (size_t i = 0; i < block_size(work, block); ++i) {
       const double h = supine_dot(g, p + 3 * i);
       if (h > best) {
@@ -83,19 +86,53 @@ static void height_range(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
+/* Which cell of the mesh's box a vertex lies in, along the curve. */
+static size_t cell_of(const block_box *box, const double *p) {
+  size_t cell = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const double share = 0.5 + 0.5 * (p[k] - box->centre[k]) / box->half[k]; /* within 0 to 1 */
+    const size_t step = (size_t)(share * ((1 << CELL_BITS) - 1));
+    for (size_t bit = 0; bit < CELL_BITS; ++bit) {
+      cell |= (step >> bit & 1) << (3 * bit + k);
+    }
+  }
+  return cell;
+}
+
+/* The vertices along the curve, by counting. */
+static void sort_vertices(const supine_mesh *mesh, size_t *begin, double *sorted) {
+  const block_box box = box_of(mesh->vertices, mesh->vertex_count);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    ++begin[cell_of(&box, mesh->vertices + 3 * i) + 1];
+  }
+  for (size_t c = 0; c < CELLS; ++c) {
+    begin[c + 1] += begin[c];
+  }
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    const double *p = mesh->vertices + 3 * i;
+    memcpy(sorted + 3 * begin[cell_of(&box, p)]++, p, 3 * sizeof *p);
+  }
+}
+
 supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
                                           const double *directions, double *minimum,
                                           double *maximum) {
   const size_t box_count = (mesh->vertex_count + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
-  if (boxes == NULL) {
-    return SUPINE_ERROR_MEMORY;
+  double *sorted = malloc((3 * mesh->vertex_count + 1) * sizeof *sorted);
+  size_t *begin = calloc(CELLS + 1, sizeof *begin);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (boxes != NULL && sorted != NULL && begin != NULL) {
+    range_work work = {mesh->vertex_count, sorted, boxes, box_count, directions, minimum, maximum};
+    sort_vertices(mesh, begin, sorted);
+    for (size_t b = 0; b < box_count; ++b) {
+      boxes[b] = box_of(sorted + 3 * b * BLOCK, block_size(&work, b));
+    }
+    supine_parallel_for(count, 16, 0, height_range, &work);
+    status = SUPINE_OK;
   }
-  range_work work = {mesh, boxes, box_count, directions, minimum, maximum};
-  for (size_t b = 0; b < box_count; ++b) {
-    boxes[b] = box_of(mesh->vertices + 3 * b * BLOCK, block_size(&work, b));
-  }
-  supine_parallel_for(count, 16, 0, height_range, &work);
   free(boxes);
-  return SUPINE_OK;
+  free(sorted);
+  free(begin);
+  return status;
 }
