@@ -32,8 +32,9 @@ static int fail(const char *what) {
   return 1;
 }
 
-/* Starts the server; its port, or 0. */
-static int serve(const char *supine, const char *basis, const char *what, pid_t *server) {
+/* Starts the server, whose output is to be closed; its port, or 0. */
+static int serve(const char *supine, const char *basis, const char *what, pid_t *server,
+                 FILE **lines) {
   int ends[2];
   int port = 0;
   if (pipe(ends) != 0) {
@@ -48,12 +49,12 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
     _exit(127);
   }
   (void)close(ends[1]);
-  FILE *lines = fdopen(ends[0], "r");
+  *lines = fdopen(ends[0], "r");
   char line[256];
-  while (lines != NULL && port == 0 && fgets(line, sizeof line, lines) != NULL) {
+  while (*lines != NULL && port == 0 && fgets(line, sizeof line, *lines) != NULL) {
     (void)sscanf(line, "listening on port %d", &port);
   }
-  return port; /* `lines` stays open: the server's report is not wanted, but may be written */
+  return port;
 }
 
 /* Resident memory of a process, KiB. */
@@ -156,7 +157,9 @@ static bool take(int s, tally *t) {
 
 static int measure(const char *supine, const char *basis, const char *what, double seconds) {
   pid_t server = 0;
-  const int port = serve(supine, basis, what, &server);
+  FILE *lines = NULL;
+  char line[256];
+  const int port = serve(supine, basis, what, &server, &lines);
   const int s = port == 0 ? -1 : dial(port);
   const size_t count = (size_t)(seconds / interval);
   tally t = {.sent = calloc(count, sizeof(double)),
@@ -192,12 +195,18 @@ static int measure(const char *supine, const char *basis, const char *what, doub
   const long after = memory_of(server);
   (void)close(s);
   (void)kill(server, SIGTERM);
-  (void)waitpid(server, NULL, 0);
   qsort(t.latency, t.answered, sizeof(double), compare);
   (void)printf("%-8s %8zu %8zu %6zu %10.3f %10.3f %10.3f %12ld %12ld\n", what, t.poses, t.answered,
                t.old, 1e3 * t.latency[t.answered / 2],
                1e3 * t.latency[(size_t)(0.99 * (double)t.answered)],
                1e3 * t.latency[t.answered == 0 ? 0 : t.answered - 1], before, after);
+  while (lines != NULL && fgets(line, sizeof line, lines) != NULL) { /* what it says of itself */
+    if (strstr(line, "pose received to") != NULL) {
+      (void)printf("         %s", line);
+    }
+  }
+  (void)waitpid(server, NULL, 0);
+  (void)fclose(lines);
   (void)fflush(stdout);
   free(t.sent);
   free(t.latency);

@@ -65,7 +65,7 @@ for version in (1, 2):
         triangles = triangles or corners
         assert far(points, basis.deform(frames[stamp - 100])) < MM
         assert far(points, basis.vertices) > 1.0
-    link.set_volume("rest")
+    link.set_volume("0")
     kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
     assert far(unpack(kind, content)[0], basis.vertices) < MM
     link.send("STRING", "VOLUME", string("rest+400"))

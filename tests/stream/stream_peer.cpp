@@ -71,12 +71,15 @@ struct State {
   std::vector<double> scales;
 };
 
-static State state_of(const supine_basis *basis, const double gravity[3], double volume) {
+static State state_of(const supine_basis *basis, const double gravity[3], double above) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   State state{std::vector<double>(info->mode_count), std::vector<double>(info->lung_count)};
   double scale = 0.0;
+  double resting = 0.0;
+  expect(supine_basis_resting_volume(basis, gravity, &resting) == SUPINE_OK, "a resting volume");
   expect(supine_basis_weights(basis, gravity, state.weights.data()) == SUPINE_OK, "weights");
-  expect(supine_basis_scale(basis, state.weights.data(), volume, &scale, nullptr) == SUPINE_OK,
+  expect(supine_basis_scale(basis, state.weights.data(), resting + above, &scale, nullptr) ==
+             SUPINE_OK,
          "a scale");
   for (double &s : state.scales) {
     s = scale;

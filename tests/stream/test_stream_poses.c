@@ -11,6 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "precompute/writer/safetensors_write.h"
 #include "runtime/stream/latency.h"
 #include "runtime/stream/poses.h"
 #include "runtime/stream/volume.h"
@@ -151,6 +152,67 @@ static void test_volumes_in_words(void **state) {
   fixture_destroy(made);
 }
 
+/* A basis that knows of a rest: it depends on the posture, and breaths are on top of it. */
+static void test_volumes_follow_the_postures_rest(void **state) {
+  (void)state;
+  fixture *f = fixture_create(200, 4, 2, 2, false, true, 10.0, 6);
+  double resting[9] = {-2000.0, 300.0, -450.0, 60.0, 10.0, -20.0, 30.0, 40.0, -50.0};
+  const supine_tensor tensors[] = {
+      {"vertices", SUPINE_F32, 2, {f->vertices, 3}, f->vertex},
+      {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
+      {"coefficients", SUPINE_F32, 2, {f->vertices, 4}, f->coefficient},
+      {"modes", SUPINE_F64, 2, {4, 9}, f->mode},
+      {"lung", SUPINE_U8, 1, {f->vertices}, f->lung},
+      {"direction", SUPINE_F32, 2, {f->vertices, 3}, f->direction},
+      {"volume_linear", SUPINE_F64, 2, {2, 4}, f->linear},
+      {"volume_quadratic", SUPINE_F64, 3, {2, 4, 4}, f->quadratic},
+      {"volume_cubic", SUPINE_F64, 4, {2, 4, 4, 4}, f->cubic},
+      {"resting_volume", SUPINE_F64, 1, {9}, resting}};
+  const supine_metadata metadata[] = {
+      {"format", "supine-basis"}, {"version", "2"}, {"kind", "scalar"}, {"units", "mm"}};
+  char path[256];
+  supine_error error;
+  supine_basis *basis = NULL;
+  (void)snprintf(path, sizeof path, "%s/resting.safetensors", folder);
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 10, metadata, 4, &error),
+                   SUPINE_OK);
+  assert_int_equal(supine_basis_open(path, &basis, &error), SUPINE_OK);
+  supine_stream_volume *volume = fixture_allocate(1, sizeof *volume);
+  /* Harmonics of the axes by hand: Y00 = 0.2820947917738781, Y1 0.4886025119029199 along its axis,
+   * Y20 = 0.6307831305050401 at z and half of it, negative, across; Y22 = 0.5462742152960396 at x,
+   * negative at y. */
+  const double y00 = 0.2820947917738781;
+  const double y1 = 0.4886025119029199;
+  const double y20 = 0.6307831305050401;
+  const double y22 = 0.5462742152960396;
+  const struct {
+    double gravity[3], rest;
+  } known[] = {{{0, 1, 0}, -2000 * y00 + 300 * y1 - 0.5 * 30 * y20 + 50 * y22},
+               {{0, -1, 0}, -2000 * y00 - 300 * y1 - 0.5 * 30 * y20 + 50 * y22},
+               {{1, 0, 0}, -2000 * y00 + 60 * y1 - 0.5 * 30 * y20 - 50 * y22},
+               {{0, 0, -1}, -2000 * y00 + 450 * y1 + 30 * y20}};
+  for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
+    const double *g = known[i].gravity;
+    assert_int_equal(supine_stream_volume_fix(volume, "rest+350", &error), SUPINE_OK);
+    assert_true(fabs(supine_stream_volume_at(volume, basis, g, 0.0) - known[i].rest - 350.0) <
+                1e-9);
+    assert_int_equal(supine_stream_volume_fix(volume, "-350", &error), SUPINE_OK);
+    assert_true(supine_stream_volume_at(volume, basis, g, 0.0) == -350.0);
+    assert_int_equal(supine_stream_volume_fix(volume, "full", &error), SUPINE_OK);
+    assert_true(supine_stream_volume_at(volume, basis, g, 0.0) == 0.0);
+    const supine_pv_breath breath = supine_breath_default();
+    assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &breath, &error),
+                     SUPINE_OK);
+    assert_true(fabs(supine_stream_volume_at(volume, basis, g, 0.0) - known[i].rest) < 1e-9);
+    /* The peak, a third into the period. */
+    assert_true(fabs(supine_stream_volume_at(volume, basis, g, 5.0 / 3.0) - known[i].rest - 500.0) <
+                1.0);
+  }
+  free(volume);
+  supine_basis_close(basis);
+  fixture_destroy(f);
+}
+
 static int make_folder(void **state) {
   (void)state;
   folder = fixture_folder();
@@ -169,6 +231,7 @@ int main(void) {
       cmocka_unit_test(test_files_that_are_no_poses),
       cmocka_unit_test(test_latencies_are_counted),
       cmocka_unit_test(test_volumes_in_words),
+      cmocka_unit_test(test_volumes_follow_the_postures_rest),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

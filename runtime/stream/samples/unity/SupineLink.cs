@@ -193,6 +193,7 @@ namespace Supine
         [DllImport(Library)] static extern IntPtr supine_basis_vertices(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
         [DllImport(Library)] static extern int supine_basis_weights(IntPtr basis, double[] gravity, double[] weights);
+        [DllImport(Library)] static extern int supine_basis_resting_volume(IntPtr basis, double[] gravity, out double volume);
         [DllImport(Library)] static extern int supine_basis_scale(IntPtr basis, double[] weights, double volume, out double scale, IntPtr error);
         [DllImport(Library)] static extern void supine_deform(IntPtr basis, double[] weights, double[] scales, float[] xyz);
 
@@ -229,12 +230,14 @@ namespace Supine
             supine_deform(handle, weights, scales, xyz);
         }
 
-        /// <summary>The frame of a direction of gravity and a volume, as the server makes it.</summary>
-        public float[] Frame(double[] gravity, double volume)
+        /// <summary>The frame of a direction of gravity and a volume, mL above the posture's rest, as
+        /// the server makes it.</summary>
+        public float[] Frame(double[] gravity, double above)
         {
-            double scale;
-            if (supine_basis_weights(handle, gravity, weights) != 0 ||
-                supine_basis_scale(handle, weights, volume, out scale, IntPtr.Zero) != 0)
+            double rest, scale;
+            if (supine_basis_resting_volume(handle, gravity, out rest) != 0 ||
+                supine_basis_weights(handle, gravity, weights) != 0 ||
+                supine_basis_scale(handle, weights, rest + above, out scale, IntPtr.Zero) != 0)
                 throw new ArgumentException("no such state");
             float[] frame = new float[weights.Length + scales.Length];
             for (int i = 0; i < frame.Length; ++i)
