@@ -20,5 +20,6 @@ add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_no_data_lost
   $<TARGET_FILE:supine>)
 set_tests_properties(no_data_lost PROPERTIES TIMEOUT 600)
 supine_test(thread_count supine_precompute supine_phantom)
+supine_test(torture supine_precompute supine_phantom supine_mesh_read)
 supine_test(projection supine_precompute supine_phantom supine_mesh_read supine_gsl)
 supine_test(fields supine_precompute supine_phantom supine_mesh_read supine_mesh_save supine_safetensors_write)
