@@ -12,6 +12,7 @@
 
 #include <gsl/gsl_linalg.h>
 
+#include "precompute/accuracy/tally.h"
 #include "precompute/phantom/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
@@ -194,10 +195,53 @@ static void test_modes_beat_harmonics_of_the_same_number(void **state) {
   (void)unlink(path);
 }
 
+/* Singular values of 3e-7 and 3e-8 of the first lie on either side of what the Gram matrix tells
+ * from rounding. */
+static void test_modes_end_where_rounding_begins(void **state) {
+  (void)state;
+  enum { ROWS = 7, TERMS = 4 };
+  static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
+  double columns[ROWS * TERMS] = {0.0};
+  for (size_t t = 0; t < TERMS; ++t) {
+    columns[(t + 2) * TERMS + t] = sizes[t];
+  }
+  const supine_projection projection = {
+      .vertex_count = ROWS, .band = 1, .rank = TERMS, .columns = columns};
+  supine_compression modes;
+  double singular[TERMS];
+  assert_int_equal(
+      supine_projection_compress_modes(&projection, NULL, TERMS, &modes, singular, NULL, NULL),
+      SUPINE_OK);
+  assert_int_equal(modes.mode_count, 3);
+  assert_close(singular[2], 6e-7, 1e-9);
+  assert_close(singular[3], 0.0, 0.0);
+  supine_projection_compression_free(&modes);
+}
+
+/* Bins are 1/256 of a power of two wide, and a percentile is the upper edge of its bin. */
+static void test_tally_percentile_is_the_edge_above(void **state) {
+  (void)state;
+  supine_tally *tally = calloc(1, sizeof *tally);
+  supine_tally *other = calloc(1, sizeof *other);
+  static const double low[] = {1.0, 1.001, 1.003};
+  static const double high[] = {5.01};
+  supine_accuracy_tally_add(tally, 3, low);
+  supine_accuracy_tally_add(other, 1, high);
+  supine_accuracy_tally_merge(tally, other);
+  assert_close(supine_accuracy_tally_percentile(tally, 0.75), 1.0 + 1.0 / 256.0, 0.0);
+  assert_close(supine_accuracy_tally_percentile(tally, 0.76), 5.015625, 0.0);
+  assert_close(tally->largest, 5.01, 0.0);
+  assert_close(tally->square_sum, 28.108110, 1e-12);
+  free(tally);
+  free(other);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_routes_agree_where_stiffness_does_not_turn),
       cmocka_unit_test(test_modes_equal_dense_decomposition),
+      cmocka_unit_test(test_modes_end_where_rounding_begins),
+      cmocka_unit_test(test_tally_percentile_is_the_edge_above),
       cmocka_unit_test(test_modes_beat_harmonics_of_the_same_number),
   };
   return cmocka_run_group_tests(tests, setup, teardown);
