@@ -111,6 +111,7 @@ static void check_positions(const char *path, double depth, double tolerance) {
   const json_t *mesh = json_array_get(json_object_get(root, "meshes"), 0);
   const json_t *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
   const json_t *targets = json_object_get(primitive, "targets");
+  const size_t base = number(json_object_get(primitive, "attributes"), "POSITION");
   const json_t *node = json_array_get(json_object_get(root, "nodes"), 1);
   const double mm = 1000 * json_number_value(json_array_get(json_object_get(node, "scale"), 0));
   export_source source = {0};
@@ -130,7 +131,7 @@ static void check_positions(const char *path, double depth, double tolerance) {
       json_object_get(json_object_get(json_object_get(mesh, "extras"), "supine"), "modes");
   for (size_t i = 0; i < VERTICES; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      double x = component(root, numbers, 1, i, axis);
+      double x = component(root, numbers, base, i, axis);
       for (size_t j = 0; j < json_array_size(targets); ++j) {
         double sum = 0;
         for (size_t t = 0; t < (BAND + 1) * (BAND + 1); ++t) {

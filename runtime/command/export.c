@@ -64,8 +64,8 @@ static const supine_option table[] = {
      "8,clamp-safe: both",
      SUPINE_FILLS(request, glb), .read = read_profile, SUPINE_SAYS_GIVEN(request, glb_only)},
     {"quantise", 0, NULL,
-     "targets as 16-bit integers (KHR_mesh_quantization): a third smaller, within a hundredth of "
-     "a millimetre",
+     "targets' positions as 16-bit integers (KHR_mesh_quantization): a tenth smaller, within a "
+     "hundredth of a millimetre",
      SUPINE_FILLS(request, glb.quantise), .alias = "quantize",
      SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,

@@ -43,11 +43,13 @@ supine_status supine_export_breath_set(const export_source *source, double volum
 }
 
 supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
-                                         const double *weights, double fraction, double *scale,
-                                         supine_error *error) {
+                                         const double g[3], const double *weights, double fraction,
+                                         double *scale, supine_error *error) {
   if (!source->info->has_volume) {
     *scale = fraction * breath->scale;
     return SUPINE_OK;
   }
-  return supine_basis_scale(source->basis, weights, fraction * breath->volume, scale, error);
+  double rest = 0;
+  (void)supine_basis_resting_volume(source->basis, g, &rest); /* a direction that is legal */
+  return supine_basis_scale(source->basis, weights, rest + fraction * breath->volume, scale, error);
 }

@@ -49,18 +49,20 @@ typedef struct export_breath {
 supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
                                        export_breath *breath, supine_error *error);
 
-/** The breath scale s at a fraction of the breath (0 rest, 1 all of it) for the basis' weights.
+/** The breath scale s at a fraction of the breath (0 rest, 1 all of it) for gravity and the basis'
+ * weights there.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
 supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
-                                         const double *weights, double fraction, double *scale,
-                                         supine_error *error);
+                                         const double g[3], const double *weights, double fraction,
+                                         double *scale, supine_error *error);
 
 /** How to write glTF. Zeros: every mode as a target, float32, no animation. */
 typedef struct export_glb_options {
   bool eight;      /**< at most eight targets, the best there are */
   bool clamp_safe; /**< weights from 0 to 1 for every gravity and breaths up to `breath` */
   bool quantise;   /**< targets as 16-bit counts (KHR_mesh_quantization) */
-  bool animate;    /**< an animation that breathes and turns the patient */
+  bool animate;    /**< an animation that breathes and turns the patient; clamp-safe too, because
+                      there are engines whose animations know no other weights */
   export_breath breath;
 } export_glb_options;
 
@@ -77,7 +79,10 @@ typedef struct export_glb_report {
  *     weight_k   = (s sum over lm of modes[k, lm] Y_lm(g) - offset_k) / unit_k
  *
  * with modes, offset, unit and the volume forms that give s in the mesh's `extras`, and vertices
- * in the basis' order. The node turns and scales millimetres LPS to glTF's metres, y up.
+ * in the basis' order. Each lung is a primitive of its own material, named for it. Targets hold
+ * normals as well: the linear change with the weights that fits the surface's own best, over
+ * breaths up to `breath` in all postures. The node turns and scales millimetres LPS to glTF's
+ * metres, y up.
  * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */

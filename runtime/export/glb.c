@@ -16,7 +16,11 @@ typedef struct glb {
   const export_glb_options *options;
   export_targets targets;
   glb_animation animation;
-  float *xyz;      /* [N, 3] */
+  float *xyz;         /* [N, 3] */
+  float *base_normal; /* [N, 3] */
+  float *normal;      /* [J, N, 3], what the targets add */
+  uint32_t *corners;  /* [M, 3], lung by lung */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1];
   int16_t *short4; /* [N, 4], where quantised */
   glb_plan plan;
 } glb;
@@ -35,34 +39,90 @@ static void find_bounds(const float *xyz, size_t count, bool rounded, double low
   }
 }
 
-/* Accessors in the order in which write_numbers writes them: indices, base, normals, targets. */
+/* Triangles in the order of their lungs. */
+static void group_triangles(glb *g) {
+  const supine_basis_info *info = g->source->info;
+  size_t count = 0;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    g->corner_begin[lung] = 3 * count;
+    for (size_t t = 0; t < info->triangle_count; ++t) {
+      const uint32_t *corner = g->source->triangles + 3 * t;
+      if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
+        memcpy(g->corners + 3 * count++, corner, 3 * sizeof *corner);
+      }
+    }
+  }
+  g->corner_begin[info->lung_count] = 3 * count;
+}
+
+/* Names of the lungs, in their order: the metadata's, else their numbers. */
+static json_t *lung_names(const export_source *source) {
+  const char *at = supine_basis_metadata(source->basis, "lungs");
+  json_t *names = json_array();
+  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+    const size_t length = at != NULL ? strcspn(at, ",") : 0;
+    json_t *name = length > 0 ? json_stringn(at, length) : NULL;
+    (void)json_array_append_new(names, name != NULL ? name : json_sprintf("lung %zu", lung));
+    at = length > 0 && at[length] == ',' ? at + length + 1 : NULL;
+  }
+  return names;
+}
+
+/* Accessors in the order in which write_numbers writes them: each lung's indices, base, normals,
+ * targets and what they add to the normals. */
 static json_t *plan_mesh(glb *g) {
   const size_t n = g->source->info->vertex_count;
-  const bool quantise = g->options->quantise;
+  const size_t lungs = g->source->info->lung_count;
+  const int type = g->options->quantise ? GLTF_SHORT : GLTF_FLOAT;
   double low[3];
   double high[3];
-  (void)supine_export_glb_plan_add(&g->plan, GLTF_UINT, "SCALAR",
-                                   3 * g->source->info->triangle_count, GLTF_INDICES, 1, NULL,
-                                   NULL);
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    (void)supine_export_glb_plan_add(&g->plan, GLTF_UINT, "SCALAR",
+                                     g->corner_begin[lung + 1] - g->corner_begin[lung],
+                                     GLTF_INDICES, 1, NULL, NULL);
+  }
   supine_export_targets_base(g->source, &g->targets, g->xyz);
   find_bounds(g->xyz, n, false, low, high);
-  (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, low, high);
+  const json_int_t base = (json_int_t)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n,
+                                                                 GLTF_VERTICES, 3, low, high);
   (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
   json_t *targets = json_array();
   json_t *weights = json_array();
   for (size_t j = 0; j < g->targets.count; ++j) {
     supine_export_targets_fill(g->source, &g->targets, j, g->xyz);
-    find_bounds(g->xyz, n, quantise, low, high);
-    const size_t accessor = supine_export_glb_plan_add(&g->plan, quantise ? GLTF_SHORT : GLTF_FLOAT,
-                                                       "VEC3", n, GLTF_VERTICES, 3, low, high);
-    (void)json_array_append_new(targets, json_pack("{s:I}", "POSITION", (json_int_t)accessor));
-    /* At rest: breath scale 0. Stored as the positions are, so that no engine sees another rest. */
+    find_bounds(g->xyz, n, g->options->quantise, low, high);
+    const json_int_t at = (json_int_t)supine_export_glb_plan_add(&g->plan, type, "VEC3", n,
+                                                                 GLTF_VERTICES, 3, low, high);
+    (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
+    (void)json_array_append_new(targets, json_pack("{s:I, s:I}", "POSITION", at, "NORMAL", at + 1));
+    /* At breath scale 0. Stored as the positions are, so that no engine sees another. */
     (void)json_array_append_new(weights, json_real(0 - g->targets.offset[j] / g->targets.unit[j]));
   }
-  return json_pack("{s:s, s:[{s:{s:i, s:i}, s:i, s:i, s:o}], s:o, s:o}", "name", "lungs",
-                   "primitives", "attributes", "POSITION", 1, "NORMAL", 2, "indices", 0, "material",
-                   0, "targets", targets, "weights", weights, "extras",
-                   supine_export_glb_extras(g->source, g->options, &g->targets));
+  json_t *primitives = json_array();
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    (void)json_array_append_new(primitives,
+                                json_pack("{s:{s:I, s:I}, s:I, s:I, s:O}", "attributes", "POSITION",
+                                          base, "NORMAL", base + 1, "indices", (json_int_t)lung,
+                                          "material", (json_int_t)lung, "targets", targets));
+  }
+  json_decref(targets);
+  return json_pack("{s:s, s:o, s:o, s:o}", "name", "lungs", "primitives", primitives, "weights",
+                   weights, "extras", supine_export_glb_extras(g->source, g->options, &g->targets));
+}
+
+/* A material for each lung, by its name. */
+static json_t *materials(const export_source *source) {
+  json_t *names = lung_names(source);
+  json_t *list = json_array();
+  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+    (void)json_array_append_new(list, json_pack("{s:O, s:{s:[f,f,f,f], s:f, s:f}, s:b}", "name",
+                                                json_array_get(names, lung), "pbrMetallicRoughness",
+                                                "baseColorFactor", 0.80, 0.45, 0.42, 1.0,
+                                                "metallicFactor", 0.0, "roughnessFactor", 0.55,
+                                                "doubleSided", 1));
+  }
+  json_decref(names);
+  return list;
 }
 
 /* Node 0, the patient, turns; node 1 takes millimetres LPS, or counts, to metres with y up. */
@@ -77,13 +137,10 @@ static json_t *nodes(const glb *g) {
 static json_t *make_json(glb *g) {
   g->plan = (glb_plan){json_array(), json_array(), 0};
   json_t *mesh = plan_mesh(g);
-  json_t *root = json_pack(
-      "{s:{s:s, s:s}, s:i, s:[{s:s, s:[i]}], s:o, s:[o], s:[{s:s, s:{s:[f,f,f,f], s:f, s:f}, "
-      "s:b}]}",
-      "asset", "version", "2.0", "generator", "supine", "scene", 0, "scenes", "name", "lungs",
-      "nodes", 0, "nodes", nodes(g), "meshes", mesh, "materials", "name", "pleura",
-      "pbrMetallicRoughness", "baseColorFactor", 0.80, 0.45, 0.42, 1.0, "metallicFactor", 0.0,
-      "roughnessFactor", 0.55, "doubleSided", 1);
+  json_t *root =
+      json_pack("{s:{s:s, s:s}, s:i, s:[{s:s, s:[i]}], s:o, s:[o], s:o}", "asset", "version", "2.0",
+                "generator", "supine", "scene", 0, "scenes", "name", "lungs", "nodes", 0, "nodes",
+                nodes(g), "meshes", mesh, "materials", materials(g->source));
   if (root == NULL) {
     return NULL;
   }
@@ -114,23 +171,23 @@ static void write_target(glb *g, size_t j, FILE *file) {
   supine_export_targets_fill(g->source, &g->targets, j, g->xyz);
   if (!g->options->quantise) {
     (void)fwrite(g->xyz, 3 * sizeof *g->xyz, n, file);
-    return;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      g->short4[4 * i + axis] = (int16_t)rint((double)g->xyz[3 * i + axis]);
+  } else {
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        g->short4[4 * i + axis] = (int16_t)rint((double)g->xyz[3 * i + axis]);
+      }
     }
+    (void)fwrite(g->short4, 4 * sizeof *g->short4, n, file);
   }
-  (void)fwrite(g->short4, 4 * sizeof *g->short4, n, file);
+  (void)fwrite(g->normal + 3 * j * n, 3 * sizeof *g->normal, n, file);
 }
 
-static supine_status write_numbers(glb *g, FILE *file, supine_error *error) {
-  const supine_basis_info *info = g->source->info;
-  (void)fwrite(g->source->triangles, 3 * sizeof *g->source->triangles, info->triangle_count, file);
+static void write_numbers(glb *g, FILE *file) {
+  const size_t n = g->source->info->vertex_count;
+  (void)fwrite(g->corners, sizeof *g->corners, g->corner_begin[g->source->info->lung_count], file);
   supine_export_targets_base(g->source, &g->targets, g->xyz);
-  (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
-  const supine_status status = supine_export_glb_normals(g->source, g->xyz, error);
-  (void)fwrite(g->xyz, 3 * sizeof *g->xyz, info->vertex_count, file);
+  (void)fwrite(g->xyz, 3 * sizeof *g->xyz, n, file);
+  (void)fwrite(g->base_normal, 3 * sizeof *g->base_normal, n, file);
   for (size_t j = 0; j < g->targets.count; ++j) {
     write_target(g, j, file);
   }
@@ -140,7 +197,6 @@ static supine_status write_numbers(glb *g, FILE *file, supine_error *error) {
     (void)fwrite(a->weights, g->targets.count * sizeof *a->weights, a->frames, file);
     (void)fwrite(a->rotations, 4 * sizeof *a->rotations, a->frames, file);
   }
-  return status;
 }
 
 static supine_status write_file(glb *g, const char *path, const char *text, size_t *bytes,
@@ -165,10 +221,8 @@ static supine_status write_file(glb *g, const char *path, const char *text, size
   (void)fwrite(text, 1, length, output.file);
   (void)fwrite("   ", 1, padded - length, output.file);
   (void)fwrite(tail, sizeof tail, 1, output.file);
-  status = write_numbers(g, output.file, error);
-  if (status == SUPINE_OK) {
-    status = supine_output_commit(&output, error);
-  }
+  write_numbers(g, output.file);
+  status = supine_output_commit(&output, error);
   supine_output_abandon(&output);
   *bytes = total;
   return status;
@@ -178,22 +232,34 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, export_glb_report *report,
                                       supine_error *error) {
   const size_t n = source->info->vertex_count;
-  glb g = {.source = source, .options = options};
+  export_glb_options safe = *options;
+  safe.clamp_safe |= options->animate;
+  glb g = {.source = source, .options = &safe};
   json_t *root = NULL;
   char *text = NULL;
   if (source->info->triangle_count == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH, "a basis without triangles shows nothing");
   }
-  supine_status status = supine_export_targets_choose(source, options, &g.targets, error);
+  supine_status status = supine_export_targets_choose(source, &safe, &g.targets, error);
   if (status == SUPINE_OK && options->animate) {
-    status = supine_export_glb_animation_make(source, options, &g.targets, &g.animation, error);
+    status = supine_export_glb_animation_make(source, &safe, &g.targets, &g.animation, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   g.xyz = malloc(3 * n * sizeof *g.xyz);
+  g.base_normal = malloc(3 * n * sizeof *g.base_normal);
+  g.normal = malloc((3 * n * g.targets.count + 1) * sizeof *g.normal);
+  g.corners = malloc(3 * source->info->triangle_count * sizeof *g.corners);
   g.short4 = calloc(options->quantise ? 4 * n : 4, sizeof *g.short4);
-  if (g.xyz != NULL && g.short4 != NULL) {
+  if (g.xyz != NULL && g.base_normal != NULL && g.normal != NULL && g.corners != NULL &&
+      g.short4 != NULL) {
+    group_triangles(&g);
+    status = supine_export_targets_normals(source, &safe.breath, &g.targets, g.base_normal,
+                                           g.normal, error);
+    if (status != SUPINE_OK) {
+      goto cleanup;
+    }
     root = make_json(&g);
     text = root == NULL ? NULL : json_dumps(root, JSON_COMPACT);
   }
@@ -211,6 +277,9 @@ cleanup:
   json_decref(g.plan.views);
   json_decref(g.plan.accessors);
   free(g.xyz);
+  free(g.base_normal);
+  free(g.normal);
+  free(g.corners);
   free(g.short4);
   supine_export_glb_animation_free(&g.animation);
   supine_export_targets_free(&g.targets);

@@ -32,11 +32,6 @@ json_t *supine_export_glb_numbers(const double *values, size_t count);
 json_t *supine_export_glb_extras(const export_source *source, const export_glb_options *options,
                                  const export_targets *targets);
 
-/** Unit normals of the resting surface [N, 3]; (0, 0, 1) where a vertex has no area.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_export_glb_normals(const export_source *source, float *normals,
-                                        supine_error *error);
-
 /** The patient on the back turns over the left side onto the belly and over the right side back,
  * and breathes. */
 typedef struct glb_animation {

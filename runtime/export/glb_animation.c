@@ -40,7 +40,7 @@ static supine_status make_frame(const export_source *source, const export_glb_op
   double scale = 0;
   (void)supine_basis_weights(source->basis, g, weights); /* a direction that is legal */
   const supine_status status =
-      supine_export_breath_scale(source, &options->breath, weights, fraction, &scale, error);
+      supine_export_breath_scale(source, &options->breath, g, weights, fraction, &scale, error);
   (void)supine_sh_evaluate(source->info->band, g, y);
   supine_export_targets_weights(targets, source->terms, y, scale, weights);
   for (size_t j = 0; j < targets->count; ++j) {

@@ -1,44 +1,132 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Normals of the resting surface: the sum of the triangles' at each vertex, by area. */
+/* Normals of morph targets. Engines add weight times a target's normals to the base's and make the
+ * sum unit again, so that a vertex' normal is linear in the weights, while the surface's own is
+ * not. With w the weights less those at the reference surface (breath scale 0) and n_0 the normals
+ * there,
+ *
+ *     n(w) ~ n_0 + sum over j of w_j d_j          d: least squares over postures and the breath
+ *
+ * The base, where the weights themselves are 0, has n_0 less what the reference's weights add; as
+ * only directions count, a vertex' base and additions are divided by the length of its base. */
 #include <math.h>
 #include <stdlib.h>
 
-#include "runtime/export/glb.h"
+#include <gsl/gsl_blas.h>
+#include <gsl/gsl_linalg.h>
 
-static void add_triangle(const export_source *source, const uint32_t *corner, double *sum) {
-  double a[3];
-  double b[3];
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double origin = (double)source->vertices[3 * (size_t)corner[0] + axis];
-    a[axis] = (double)source->vertices[3 * (size_t)corner[1] + axis] - origin;
-    b[axis] = (double)source->vertices[3 * (size_t)corner[2] + axis] - origin;
+#include "runtime/export/targets.h"
+
+enum { POSES = 96 };
+static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
+
+/* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
+static bool invert(gsl_matrix *a) {
+  const size_t count = a->size2;
+  gsl_matrix *v = gsl_matrix_alloc(count, count);
+  gsl_matrix *u = gsl_matrix_alloc(a->size1, count);
+  gsl_vector *s = gsl_vector_alloc(count);
+  const bool good =
+      v != NULL && u != NULL && s != NULL && gsl_linalg_SV_decomp_jacobi(a, v, s) == 0;
+  if (good) {
+    (void)gsl_matrix_memcpy(u, a);
+    for (size_t j = 0; j < count; ++j) {
+      const double value = gsl_vector_get(s, j);
+      gsl_vector_view column = gsl_matrix_column(u, j);
+      (void)gsl_vector_scale(&column.vector,
+                             value > singular * gsl_vector_get(s, 0) ? 1 / value : 0);
+    }
+    (void)gsl_blas_dgemm(CblasNoTrans, CblasTrans, 1, u, v, 0, a);
   }
-  const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                           a[0] * b[1] - a[1] * b[0]};
-  for (size_t v = 0; v < 3; ++v) {
+  gsl_matrix_free(v);
+  gsl_matrix_free(u);
+  gsl_vector_free(s);
+  return good;
+}
+
+/* Divides base and additions by the base's length, once `base` is n_0. */
+static void settle(const export_targets *targets, size_t n, float *base, float *added) {
+  static const double least =
+      0.2; /* a base that the fit makes shorter has no direction of its own */
+  for (size_t i = 0; i < n; ++i) {
+    double sum[3];
     for (size_t axis = 0; axis < 3; ++axis) {
-      sum[3 * (size_t)corner[v] + axis] += cross[axis];
+      sum[axis] = (double)base[3 * i + axis];
+      for (size_t j = 0; j < targets->count; ++j) { /* the reference's weight is -offset / unit */
+        sum[axis] += targets->offset[j] / targets->unit[j] * (double)added[(j * n + i) * 3 + axis];
+      }
+    }
+    const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+    if (length < least) {
+      continue; /* n_0 stays: what is added is off by a constant */
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      base[3 * i + axis] = (float)(sum[axis] / length);
+      for (size_t j = 0; j < targets->count; ++j) {
+        added[(j * n + i) * 3 + axis] = (float)((double)added[(j * n + i) * 3 + axis] / length);
+      }
     }
   }
 }
 
-supine_status supine_export_glb_normals(const export_source *source, float *normals,
-                                        supine_error *error) {
-  const size_t n = source->info->vertex_count;
-  double *sum = calloc(3 * n, sizeof *sum);
-  if (sum == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
-  for (size_t t = 0; t < source->info->triangle_count; ++t) {
-    add_triangle(source, source->triangles + 3 * t, sum);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const double *v = sum + 3 * i;
-    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      normals[3 * i + axis] = (float)(length > 0 ? v[axis] / length : (axis == 2 ? 1.0 : 0.0));
+/* The surface's own normals in every pose, summed into the fit. */
+static void add_pose(const export_targets *targets, const gsl_matrix *inverse, size_t p, size_t n,
+                     const float *base, const float *normals, float *added) {
+  for (size_t j = 0; j < targets->count; ++j) {
+    const float amount = (float)gsl_matrix_get(inverse, p, j);
+    float *to = added + 3 * j * n;
+    for (size_t i = 0; i < 3 * n; ++i) {
+      to[i] += amount * (normals[i] - base[i]);
     }
   }
-  free(sum);
-  return SUPINE_OK;
+}
+
+supine_status supine_export_targets_normals(const export_source *source,
+                                            const export_breath *breath,
+                                            const export_targets *targets, float *base,
+                                            float *added, supine_error *error) {
+  const size_t n = source->info->vertex_count;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  export_pose *pose = malloc(POSES * sizeof *pose);
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *normals = malloc(3 * n * sizeof *normals);
+  gsl_matrix *a = gsl_matrix_alloc(POSES, targets->count);
+  if (pose == NULL || xyz == NULL || normals == NULL || a == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  for (size_t p = 0; p < POSES; ++p) {
+    double g[3];
+    supine_export_direction(p, POSES, g);
+    status = SUPINE_ERROR_NUMERICAL; /* a breath that folds is no pose: one less deep is */
+    for (double part = (double)(p % 4 + 1) / 4; status != SUPINE_OK && part > 1e-3; part /= 2) {
+      status = supine_export_targets_at(source, breath, targets, g, part, &pose[p], error);
+    }
+    if (status != SUPINE_OK && status != SUPINE_ERROR_NUMERICAL) {
+      goto cleanup;
+    }
+    status = SUPINE_OK; /* without any breath: the reference surface, which tells nothing new */
+    for (size_t j = 0; j < targets->count; ++j) {
+      gsl_matrix_set(a, p, j, pose[p].weights[j] + targets->offset[j] / targets->unit[j]);
+    }
+  }
+  if (!invert(a)) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the targets' normals were not found");
+    goto cleanup;
+  }
+  supine_normals(source->basis, source->vertices, base);
+  for (size_t i = 0; i < 3 * n * targets->count; ++i) {
+    added[i] = 0;
+  }
+  for (size_t p = 0; p < POSES; ++p) {
+    supine_deform(source->basis, pose[p].basis, pose[p].scale, xyz);
+    supine_normals(source->basis, xyz, normals);
+    add_pose(targets, a, p, n, base, normals, added);
+  }
+  settle(targets, n, base, added);
+cleanup:
+  free(pose);
+  free(xyz);
+  free(normals);
+  gsl_matrix_free(a);
+  return status;
 }

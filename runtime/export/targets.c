@@ -49,30 +49,51 @@ void supine_export_targets_weights(const export_targets *targets, size_t terms, 
   }
 }
 
-/* Least and largest weight of each target over directions (a Fibonacci lattice) and the breath. As
- * the scale grows from 0 with the breath, its end and rest are the extremes. */
+void supine_export_direction(size_t i, size_t count, double g[3]) {
+  static const double turn = 2.39996322972865332; /* the golden angle */
+  const double z = (2 * (double)i + 1) / (double)count - 1;
+  const double r = sqrt(1 - z * z);
+  g[0] = r * cos(turn * (double)i);
+  g[1] = r * sin(turn * (double)i);
+  g[2] = z;
+}
+
+supine_status supine_export_targets_at(const export_source *source, const export_breath *breath,
+                                       const export_targets *targets, const double g[3],
+                                       double fraction, export_pose *pose, supine_error *error) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
+  double scale = 0;
+  (void)supine_basis_weights(source->basis, g, pose->basis); /* a direction that is legal */
+  const supine_status status =
+      supine_export_breath_scale(source, breath, g, pose->basis, fraction, &scale, error);
+  if (status != SUPINE_OK) {
+    scale = 0;
+  }
+  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+    pose->scale[lung] = scale;
+  }
+  (void)supine_sh_evaluate(source->info->band, g, y);
+  supine_export_targets_weights(targets, source->terms, y, scale, pose->weights);
+  return status;
+}
+
+/* Least and largest weight of each target over directions and the breath, the reference surface
+ * included. As the scale goes one way with the volume, the breath's two ends are the extremes. */
 static supine_status find_ranges(const export_source *source, const export_breath *breath,
                                  const export_targets *targets, double *low, double *high,
                                  supine_error *error) {
-  static const double turn = 2.39996322972865332; /* the golden angle */
-  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
-  double weights[SUPINE_MODES_MAX];
-  for (int i = 0; i < DIRECTIONS; ++i) {
-    const double z = (2 * i + 1) / (double)DIRECTIONS - 1;
-    const double r = sqrt(1 - z * z);
-    const double g[3] = {r * cos(turn * i), r * sin(turn * i), z};
-    double scale = 0;
-    (void)supine_basis_weights(source->basis, g, weights); /* a direction that is legal */
+  export_pose pose;
+  for (size_t i = 0; i < 2 * (size_t)DIRECTIONS; ++i) {
+    double g[3];
+    supine_export_direction(i / 2, DIRECTIONS, g);
     const supine_status status =
-        supine_export_breath_scale(source, breath, weights, 1, &scale, error);
+        supine_export_targets_at(source, breath, targets, g, (double)(i % 2), &pose, error);
     if (status != SUPINE_OK) {
       return status;
     }
-    (void)supine_sh_evaluate(source->info->band, g, y);
-    supine_export_targets_weights(targets, source->terms, y, scale, weights);
     for (size_t j = 0; j < targets->count; ++j) {
-      low[j] = fmin(low[j], weights[j]);
-      high[j] = fmax(high[j], weights[j]);
+      low[j] = fmin(low[j], pose.weights[j]);
+      high[j] = fmax(high[j], pose.weights[j]);
     }
   }
   return SUPINE_OK;

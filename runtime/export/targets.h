@@ -34,6 +34,30 @@ void supine_export_targets_free(export_targets *targets);
 void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
                                    double scale, double *weights);
 
+/** Direction `i` of `count`, evenly over the sphere: a Fibonacci lattice. */
+void supine_export_direction(size_t i, size_t count, double g[3]);
+
+/** The lungs at a fraction of the breath. */
+typedef struct export_pose {
+  double basis[SUPINE_MODES_MAX];   /**< the basis' weights */
+  double scale[SUPINE_LUNGS_MAX];   /**< the breath scale, for each lung */
+  double weights[SUPINE_MODES_MAX]; /**< the targets' */
+} export_pose;
+
+/** @retval SUPINE_ERROR_NUMERICAL  the surface folds before: the pose is the reference surface */
+supine_status supine_export_targets_at(const export_source *source, const export_breath *breath,
+                                       const export_targets *targets, const double g[3],
+                                       double fraction, export_pose *pose, supine_error *error);
+
+/** Normals of the base [N, 3], unit length, and what each weight adds to them, [J, N, 3], before
+ * they are made unit again: the least-squares fit to the surface's own over postures and the
+ * breath.
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status supine_export_targets_normals(const export_source *source,
+                                            const export_breath *breath,
+                                            const export_targets *targets, float *base,
+                                            float *added, supine_error *error);
+
 /** Target `j` for a weight of 1, in stored units, xyz [N, 3]. */
 void supine_export_targets_fill(const export_source *source, const export_targets *targets,
                                 size_t j, float *xyz);
