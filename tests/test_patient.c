@@ -15,6 +15,7 @@
 #include <gsl/gsl_rng.h>
 
 #include "precompute/patient/fit.h"
+#include "precompute/patient/gain.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/validate.h"
 
@@ -73,6 +74,20 @@ static supine_patient known(const supine_patient_pairs *pairs) {
                           .frame = supine_patient_frame_of_points(pairs->count, pairs->from, NULL),
                           .powers = {2.1, 1.3, 1.6, 0.2, -0.7, 0.3},
                           .lengths = {7.3, 5.9, 21.7}};
+}
+
+static supine_patient_record record_of(const supine_patient *patient) {
+  supine_patient_record record = {.patient = *patient,
+                                  .rest = {"supine", "rest", {0.0, 1.0, 0.0}},
+                                  .state = {"supine", "full", {0.0, 1.0, 0.0}},
+                                  .points = 300,
+                                  .held_out = 4.25,
+                                  .held_out_baseline = 10.5,
+                                  .fitted = 3.125,
+                                  .explained = 0.81};
+  record.inflation = supine_patient_inflation(patient);
+  record.force = supine_patient_force(patient, 0.4, record.state.gravity);
+  return record;
 }
 
 static void test_public_pairs_hold_out_as_measured(void **state) {
@@ -360,20 +375,6 @@ static void test_law_asked_for_needs_points_enough(void **state) {
 
 /* --- patient.json and what it makes of a surface --------------------------------------------- */
 
-static supine_patient_record record_of(const supine_patient *patient) {
-  supine_patient_record record = {.patient = *patient,
-                                  .rest = {"supine", "rest", {0.0, 1.0, 0.0}},
-                                  .state = {"supine", "full", {0.0, 1.0, 0.0}},
-                                  .points = 300,
-                                  .held_out = 4.25,
-                                  .held_out_baseline = 10.5,
-                                  .fitted = 3.125,
-                                  .explained = 0.81};
-  record.inflation = supine_patient_inflation(patient);
-  record.force = supine_patient_force(patient, 0.4, record.state.gravity);
-  return record;
-}
-
 static void test_record_survives_text(void **state) {
   (void)state;
   supine_patient_pairs pairs = scatter(30, 2);
@@ -450,6 +451,53 @@ static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) 
   supine_patient_pairs_free(&pairs);
 }
 
+/* Known gains come back from a third scan, prone or upright, within three of their standard errors;
+ * one in the same posture is refused. */
+static void test_third_scan_tells_what_turns(void **state) {
+  (void)state;
+  static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
+  static const double gains[2] = {0.23, 0.71};
+  supine_patient_pairs pairs = scatter(200, 55);
+  const supine_patient patient = known(&pairs);
+  const supine_patient_record record = record_of(&patient);
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  supine_patient_gain found;
+  supine_error error;
+  gsl_rng_set(random, 19);
+  for (size_t c = 0; c < 4; ++c) {
+    const double *g = postures[c % 2];
+    const double gain = gains[c / 2];
+    const bool moved = c % 2 == 1;
+    const double scale = 0.8;
+    const supine_force_law law = supine_patient_force(&patient, gain, record.state.gravity);
+    for (size_t i = 0; i < pairs.count; ++i) {
+      double u[3];
+      const supine_patient_place at = supine_patient_find(&patient.frame, pairs.from + 3 * i);
+      const double *b = at.box;
+      const double fixed = law.base + law.box[0] * b[0] + law.box[1] * b[1] + law.box[2] * b[2];
+      const double then = fixed + gain * (1.0 - b[1]); /* supine */
+      const double now = fixed + gain * (c % 2 == 0 ? b[1] : b[2]);
+      supine_patient_displacement(&patient, pairs.from + 3 * i, u);
+      for (size_t k = 0; k < 3; ++k) {
+        pairs.to[3 * i + k] = pairs.from[3 * i + k] + scale * now / then * u[k] +
+                              (moved ? 20.0 : 0.0) + gsl_ran_gaussian(random, 0.3);
+      }
+    }
+    assert_int_equal(supine_patient_gain_fit(&record, &pairs, g, moved, &found, &error), SUPINE_OK);
+    printf("gain %.2f found %.3f +- %.3f, scale %.3f, left %.2f mm, %.2f without\n", gain,
+           found.gain, found.error, found.scale, found.left, found.left_without);
+    assert_true(fabs(found.gain - gain) <= 3.0 * found.error);
+    assert_true(found.error < 0.1);
+    assert_true(fabs(found.scale - scale) < 0.03);
+    assert_true(found.left < 0.3 * sqrt(3.0) * 1.1 && found.left < found.left_without);
+  }
+  gsl_rng_free(random);
+  assert_int_equal(
+      supine_patient_gain_fit(&record, &pairs, record.state.gravity, false, &found, &error),
+      SUPINE_ERROR_ARGUMENT);
+  supine_patient_pairs_free(&pairs);
+}
+
 /* Each map finds what it can express, and nothing beyond: literal maps, their own distances. */
 static void test_maps_explain_what_they_can(void **state) {
   (void)state;
@@ -499,6 +547,7 @@ int main(void) {
       cmocka_unit_test(test_pair_files_say_what_is_wrong),
       cmocka_unit_test(test_pair_files_go_from_rest),
       cmocka_unit_test(test_law_asked_for_needs_points_enough),
+      cmocka_unit_test(test_third_scan_tells_what_turns),
       cmocka_unit_test(test_maps_explain_what_they_can),
       cmocka_unit_test(test_record_survives_text),
       cmocka_unit_test(test_force_is_one_at_the_centre_in_the_fitted_posture)};

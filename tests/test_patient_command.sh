@@ -80,6 +80,7 @@ refused 1 'against what' validate points.safetensors
 refused 1 'make a basis of it first' validate points.json --state state.ply
 refused 1 'knows its own posture only' validate points.json --landmarks pairs.csv --posture prone
 refused 1 'what to fit to' fit rest.ply
+refused 1 'is the one that was fitted' fit --landmarks pairs.csv --third supine:pairs.csv
 refused 2 'the same as the one at rest' fit rest.ply rest.ply
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/patient/gain.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
 #include "runtime/options/command.h"
@@ -18,7 +19,8 @@ typedef struct request {
   double midline, gain, reach;
   supine_mesh_load_options load;
 
-  supine_patient_scan rest, state;
+  supine_patient_scan rest, state, third;
+  const char *third_path;
 } request;
 
 /* "supine", "prone:rest", "supine+15:-3000" */
@@ -45,6 +47,19 @@ static int read_scan(const char *command, const char *text, void *field) {
 }
 
 static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+/* "prone:PAIRS.csv", into the whole request. */
+static int read_third(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  const char *colon = strchr(text, ':');
+  char posture[SUPINE_PATIENT_TEXT];
+  if (colon == NULL || colon[1] == '\0' || (size_t)(colon - text) >= sizeof posture) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
+  wanted->third_path = colon + 1;
+  return read_scan(command, posture, &wanted->third);
+}
 
 #define FILLS(member) SUPINE_FILLS(request, member)
 
@@ -77,6 +92,9 @@ static const supine_option table[] = {
      "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
      "stays with the body; default 0.4, the 'deep' law's",
      FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
+    {"third", 0, "POSTURE:FILE",
+     "landmarks from the same rest to a third scan in another posture: they tell the gain",
+     .read = read_third, .wants = "a posture, a colon and a file of landmarks"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
     {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
@@ -137,6 +155,19 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
   }
 }
 
+static void print_gain(const supine_patient_record *record, const supine_patient_gain *found,
+                       bool given) {
+  if (found != NULL) {
+    (void)printf("gain %.2f +- %.2f turns with gravity, by the third scan: %.1f mm RMS left there, "
+                 "%.1f were it 0\n",
+                 found->gain, found->error, found->left, found->left_without);
+  } else if (!given) {
+    (void)printf("one posture cannot tell what turns with gravity from what stays with the body:\n"
+                 "gain %.2g is the deep law's, or --gain, or --third\n",
+                 record->force.gain);
+  }
+}
+
 static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
                        const request *wanted) {
   const supine_patient *patient = &record->patient;
@@ -163,11 +194,6 @@ static void print_text(const supine_patient_record *record, const supine_patient
   (void)printf("the paper's constants were accurate to 1 %%, its validation to 2 mm: here %.1f mm "
                "are left\n",
                record->held_out);
-  if (!wanted->has_gain) {
-    (void)printf("one posture cannot tell what turns with gravity from what stays with the body:\n"
-                 "gain %.2g is the deep law's, or --gain\n",
-                 record->force.gain);
-  }
 }
 
 /* "left.ply,right.ply" as one model. */
@@ -238,6 +264,26 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
+/* The gain of a third scan's landmarks into the record. */
+static supine_status find_gain(const request *wanted, supine_patient_record *record,
+                               supine_patient_gain *gain, supine_error *error) {
+  const bool moved = wanted->translation || wanted->rigid;
+  supine_patient_pairs pairs = {0};
+  supine_status status =
+      supine_patient_pairs_load(wanted->third_path, wanted->reverse, &pairs, error);
+  if (status == SUPINE_OK) {
+    status = supine_patient_pairs_check(&pairs, moved, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_patient_gain_fit(record, &pairs, wanted->third.gravity, moved, gain, error);
+  }
+  if (status == SUPINE_OK) {
+    record->force = supine_patient_force(&record->patient, gain->gain, record->state.gravity);
+  }
+  supine_patient_pairs_free(&pairs);
+  return status;
+}
+
 static void keep(const request *wanted, const supine_arguments *given,
                  const supine_patient_fit_report *report, supine_patient_record *record) {
   const supine_patient_law law = record->patient.law;
@@ -263,7 +309,8 @@ static void keep(const request *wanted, const supine_arguments *given,
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
                          supine_patient_record *record, supine_patient_fit_report *report,
-                         supine_patient_surface_report *surface, supine_error *error) {
+                         supine_patient_surface_report *surface, supine_patient_gain *gain,
+                         supine_error *error) {
   const supine_patient_fit_options options = {.law_given = wanted->has_law,
                                               .law = (supine_patient_law)wanted->law,
                                               .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
@@ -286,7 +333,10 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   }
   if (status == SUPINE_OK) {
     keep(wanted, given, report, record);
-    if (wanted->path != NULL) {
+    if (wanted->third_path != NULL) {
+      status = find_gain(wanted, record, gain, error);
+    }
+    if (status == SUPINE_OK && wanted->path != NULL) {
       status = supine_patient_write(wanted->path, record, report, given->made_by, error);
     }
   }
@@ -299,12 +349,13 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_patient_record record = {0};
   supine_patient_fit_report report;
   supine_patient_surface_report surface = {0};
+  supine_patient_gain gain = {0};
   supine_error error;
   if (given->count == 1 || (given->count == 0 && wanted->landmarks == NULL)) {
     return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
                                       "and the one in the other state, or both");
   }
-  if (fit(wanted, given, &record, &report, &surface, &error) != SUPINE_OK) {
+  if (fit(wanted, given, &record, &report, &surface, &gain, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   if (wanted->json) {
@@ -316,6 +367,7 @@ static int run(void *chosen, const supine_arguments *given) {
       print_surface(&surface, wanted->landmarks != NULL);
     }
     print_text(&record, &report, wanted);
+    print_gain(&record, wanted->third_path != NULL ? &gain : NULL, wanted->has_gain);
   }
   return supine_options_finish(name);
 }
