@@ -303,17 +303,42 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
              : refuse(c, "resting_volume is not finite, or 2^30 and more");
 }
 
+/* Normals are optional: the modes and their weights, or neither. */
+static supine_status check_normals(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  const size_t terms = (info->mode_count + 1) * (info->mode_count + 2) / 2;
+  if (supine_safetensors_find(c->file, "normals") == NULL &&
+      supine_safetensors_find(c->file, "normal_weights") == NULL) {
+    return SUPINE_OK;
+  }
+  const supine_tensor *normals = want(c, "normals", SUPINE_I16, 3);
+  if (normals == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  const size_t count = normals->shape[2];
+  if (normals->shape[0] != info->vertex_count || normals->shape[1] != 3 || count < 1 ||
+      count > SUPINE_NORMAL_MODES_MAX) {
+    return refuse(c, "normals must be [N, 3, Q], N = %zu, Q from 1 to %d", info->vertex_count,
+                  SUPINE_NORMAL_MODES_MAX);
+  }
+  info->normals = normals->data;
+  info->normal_weights =
+      want_shape(c, "normal_weights", SUPINE_F64, 3, (size_t[]){info->lung_count, count, terms});
+  if (info->normal_weights == NULL) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  info->normal_count = count;
+  return finite_doubles(info->normal_weights, info->lung_count * count * terms)
+             ? SUPINE_OK
+             : refuse(c, "normal_weights is not finite");
+}
+
 /* Chooses the code and packs: AUTO is the smallest storage that is accurate enough. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
   static const double error_limit = 0.005; /* mm */
   supine_storage storage = options->storage;
   supine_simd simd = options->simd;
-  if (options->size < sizeof *options) {
-    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
-                            "options of %zu bytes: set their size to sizeof(supine_basis_options)",
-                            options->size);
-  }
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
     return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "no such storage or code: %d, %d",
@@ -342,6 +367,14 @@ static supine_status prepare(const check *c, supine_basis *basis,
     }
     storage = storage == SUPINE_STORAGE_MIXED ? SUPINE_STORAGE_INT16 : SUPINE_STORAGE_EXACT;
   }
+  if (options->without_normals) {
+    basis->info.normal_count = 0;
+    basis->info.normals = NULL;
+    basis->info.normal_weights = NULL;
+  }
+  if (status == SUPINE_OK && basis->info.normal_count > 0) {
+    status = supine_basis_pack_normals(basis);
+  }
   if (status != SUPINE_OK) {
     return supine_error_set(c->error, status, "%s: out of memory", c->name);
   }
@@ -351,11 +384,28 @@ static supine_status prepare(const check *c, supine_basis *basis,
   return SUPINE_OK;
 }
 
+/* Options of a program that knew fewer of them: the others are zero. */
+static supine_status take_options(const check *c, const supine_basis_options *options,
+                                  supine_basis_options *taken) {
+  const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
+  *taken = (supine_basis_options){.size = sizeof *taken};
+  if (options == NULL) {
+    return SUPINE_OK;
+  }
+  if (options->size < oldest) {
+    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
+                            "options of %zu bytes: set their size to sizeof(supine_basis_options)",
+                            options->size);
+  }
+  memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
+  return SUPINE_OK;
+}
+
 /* Takes the file, whatever comes of it. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
-  static const supine_basis_options defaults = {.size = sizeof defaults};
+  supine_basis_options taken;
   const check c = {file, name, error};
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_basis *basis = calloc(1, sizeof *basis);
@@ -367,12 +417,16 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface, check_field, check_modes, check_lungs, check_volume, check_rest};
+      check_surface, check_field, check_modes,  check_lungs,
+      check_volume,  check_rest,  check_normals};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }
   if (status == SUPINE_OK) {
-    status = prepare(&c, basis, options == NULL ? &defaults : options);
+    status = take_options(&c, options, &taken);
+  }
+  if (status == SUPINE_OK) {
+    status = prepare(&c, basis, &taken);
   }
   if (status != SUPINE_OK) {
     supine_basis_close(basis);
@@ -415,6 +469,7 @@ void supine_basis_close(supine_basis *basis) {
   }
   supine_safetensors_close(basis->file);
   free(basis->tiles.bytes);
+  free(basis->lit.bytes);
   free(basis);
 }
 

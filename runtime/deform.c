@@ -4,8 +4,7 @@
 
 #include "runtime/internal.h"
 
-/* Moves a target on by `count` vertices. */
-static supine_target target_after(const supine_target *target, size_t count) {
+supine_target supine_target_after(const supine_target *target, size_t count) {
   supine_target moved = *target;
   moved.x += target->y == NULL ? 3 * count : count;
   if (target->y != NULL) {
@@ -16,15 +15,17 @@ static supine_target target_after(const supine_target *target, size_t count) {
 }
 
 /* Vertices begin <= i < end, all in one tile: the tile is evaluated aside and the part copied. */
-static void deform_part(const supine_basis *basis, const float *folded, size_t begin, size_t end,
+static void deform_part(const supine_kernels *kernels, const supine_tiles *tiles,
+                        const float *folded, size_t begin, size_t end,
                         const supine_target *target) {
   float aside[TILE_NUMBERS];
   const bool joined = target->y == NULL;
   const supine_target whole = {.x = aside,
                                .y = joined ? NULL : aside + TILE,
                                .z = joined ? NULL : aside + (size_t)2 * TILE,
-                               .rest = target->rest};
-  basis->kernels->deform(&basis->tiles, folded, begin / TILE, 1, &whole);
+                               .rest = target->rest,
+                               .unit = target->unit};
+  kernels->deform(tiles, folded, begin / TILE, 1, &whole);
   const size_t first = begin % TILE;
   const size_t count = end - begin;
   if (joined) {
@@ -36,20 +37,20 @@ static void deform_part(const supine_basis *basis, const float *folded, size_t b
   }
 }
 
-/* Vertices begin <= i < end of one lung. */
-static void deform_lung(const supine_basis *basis, const float *folded, size_t begin, size_t end,
+void supine_deform_lung(const supine_kernels *kernels, const supine_tiles *tiles,
+                        const float *folded, size_t begin, size_t end,
                         const supine_target *target) {
   size_t at = begin;
   while (at < end) {
-    const supine_target here = target_after(target, at - begin);
+    const supine_target here = supine_target_after(target, at - begin);
     const size_t whole = at % TILE == 0 ? (end - at) / TILE : 0;
     if (whole > 0) {
-      basis->kernels->deform(&basis->tiles, folded, at / TILE, whole, &here);
+      kernels->deform(tiles, folded, at / TILE, whole, &here);
       at += whole * TILE;
     } else {
       const size_t next = (at / TILE + 1) * TILE;
       const size_t last = next < end ? next : end;
-      deform_part(basis, folded, at, last, &here);
+      deform_part(kernels, tiles, folded, at, last, &here);
       at = last;
     }
   }
@@ -62,9 +63,9 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
-      const supine_target here = target_after(target, first - begin);
+      const supine_target here = supine_target_after(target, first - begin);
       supine_fold(basis, weights, scales[lung], folded);
-      deform_lung(basis, folded, first, last, &here);
+      supine_deform_lung(basis->kernels, &basis->tiles, folded, first, last, &here);
     }
   }
   supine_stream_fence(target->stream);

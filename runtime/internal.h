@@ -26,6 +26,7 @@ struct supine_basis {
   const char *name_of[SUPINE_LUNGS_MAX];
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
+  supine_tiles lit; /**< the normals' modes: three axes, no rest; bytes NULL where there are none */
   supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
   const supine_kernels *kernels;
   bool stream; /**< positions outgrow the cache: store past it */
@@ -41,6 +42,20 @@ struct supine_basis {
 /** Packs the tensors into tiles of that storage (not AUTO), in place of those before.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
+
+/** Packs the normals' modes into tiles.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_basis_pack_normals(supine_basis *basis);
+
+/** Zeroed memory for tiles, aligned to lines, in huge pages where it fills some. */
+unsigned char *supine_tiles_allocate(size_t bytes);
+
+/** Evaluates vertices begin <= i < end, all of one lung, into a target for them. */
+void supine_deform_lung(const supine_kernels *kernels, const supine_tiles *tiles,
+                        const float *folded, size_t begin, size_t end, const supine_target *target);
+
+/** A target `count` vertices further on. */
+supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** supine_basis_info.storage_error of the tiles as they are. */
 double supine_basis_storage_error(const supine_basis *basis);

@@ -292,7 +292,7 @@ static void measure(supine_basis *basis, const source *was, const source *is) {
   }
 }
 
-static unsigned char *tiles_allocate(size_t bytes) {
+unsigned char *supine_tiles_allocate(size_t bytes) {
   const size_t alignment = bytes >= 2 * (size_t)HUGE_PAGE ? HUGE_PAGE : 64;
   const size_t rounded = (bytes + alignment - 1) / alignment * alignment;
   unsigned char *memory = aligned_alloc(alignment, rounded);
@@ -316,7 +316,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   units *u = calloc(1, sizeof *u);
   free(tiles->bytes);
   supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
-  tiles->bytes = tiles_allocate(count * tiles->stride);
+  tiles->bytes = supine_tiles_allocate(count * tiles->stride);
   if (was == NULL || is == NULL || u == NULL || tiles->bytes == NULL) {
     goto cleanup;
   }

@@ -19,6 +19,7 @@ supine_test(volume runtime_fixture)
 supine_test(runtime_basis runtime_fixture)
 supine_test(deform runtime_fixture)
 supine_test(deform_lung runtime_fixture)
+supine_test(deform_lit runtime_fixture)
 
 # The library as others have it: installed, through CMake and pkg-config.
 add_executable(make_basis example/make_basis.c)

@@ -158,14 +158,31 @@ void fixture_destroy(fixture *f) {
   free(f->linear);
   free(f->quadratic);
   free(f->cubic);
+  free(f->normal);
+  free(f->normal_weight);
   free(f);
+}
+
+void fixture_add_normals(fixture *f, size_t modes, uint64_t seed) {
+  uint64_t state = seed;
+  const size_t terms = (f->modes + 1) * (f->modes + 2) / 2;
+  f->normals = modes;
+  f->normal = calloc(3 * f->vertices * modes, sizeof *f->normal);
+  f->normal_weight = calloc(f->lungs * modes * terms, sizeof *f->normal_weight);
+  assert_true(f->normal && f->normal_weight);
+  for (size_t i = 0; i < 3 * f->vertices * modes; ++i) {
+    f->normal[i] = (int16_t)(32767 * fixture_random(&state));
+  }
+  for (size_t i = 0; i < f->lungs * modes * terms; ++i) {
+    f->normal_weight[i] = 1e-5 * fixture_random(&state);
+  }
 }
 
 void fixture_write(const fixture *f, const char *path) {
   const size_t n = f->vertices;
   const size_t k = f->modes;
   const size_t g = f->lungs;
-  supine_tensor tensors[9] = {
+  supine_tensor tensors[11] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, f->vertex},
       {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
       {"coefficients", SUPINE_F32, 2, {n, k}, f->coefficient},
@@ -182,6 +199,11 @@ void fixture_write(const fixture *f, const char *path) {
     tensors[count++] = (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, f->linear};
     tensors[count++] = (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, f->quadratic};
     tensors[count++] = (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, f->cubic};
+  }
+  if (f->normals > 0) {
+    tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, f->normals}, f->normal};
+    tensors[count++] = (supine_tensor){
+        "normal_weights", SUPINE_F64, 3, {g, f->normals, (k + 1) * (k + 2) / 2}, f->normal_weight};
   }
   const supine_metadata metadata[] = {
       {"format", "supine-basis"},

@@ -19,6 +19,9 @@ typedef struct fixture {
   double *mode;        /* [K, (L+1)^2] */
   unsigned char *lung; /* [N] */
   double *linear, *quadratic, *cubic;
+  size_t normals;        /* Q; 0 but for fixture_add_normals */
+  int16_t *normal;       /* [N, 3, Q] */
+  double *normal_weight; /* [G, Q, (K + 1)(K + 2) / 2] */
 } fixture;
 
 /* Zeroed memory, never NULL: ends the program where there is none. */
@@ -32,6 +35,9 @@ double fixture_random(uint64_t *state);
 fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
+
+/* Gives it normals of random modes: no surface's, but numbers to compare with. */
+void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
 /* Writes the basis file; asserts that it was. */
 void fixture_write(const fixture *f, const char *path);

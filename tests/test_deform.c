@@ -35,7 +35,7 @@ static void drop(opened *o) {
 
 /* NULL where this processor lacks the code. */
 static supine_basis *open_as(const opened *o, supine_storage storage, supine_simd simd) {
-  const supine_basis_options options = {sizeof options, storage, simd};
+  const supine_basis_options options = {sizeof options, .storage = storage, .simd = simd};
   supine_basis *basis = NULL;
   supine_error error = {0};
   const supine_status status =
@@ -240,10 +240,10 @@ static void test_storage_auto_exact_where_int16_errs(void **state) {
 static void test_open_bad_options_refused(void **state) {
   (void)state;
   opened o = made(fixture_create(5, 1, 0, 1, false, false, 1, 1));
-  const supine_basis_options bad[] = {{sizeof *bad, SUPINE_STORAGE_COUNT, SUPINE_SIMD_AUTO},
-                                      {sizeof *bad, SUPINE_STORAGE_AUTO, SUPINE_SIMD_COUNT},
-                                      {sizeof *bad, (supine_storage)-1, SUPINE_SIMD_AUTO},
-                                      {0, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO}};
+  const supine_basis_options bad[] = {{sizeof *bad, .storage = SUPINE_STORAGE_COUNT},
+                                      {sizeof *bad, .simd = SUPINE_SIMD_COUNT},
+                                      {sizeof *bad, .storage = (supine_storage)-1},
+                                      {.size = 0}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_basis *basis = NULL;
     assert_int_equal(supine_basis_open_memory_with(o.bytes, o.size, &bad[i], &basis, NULL),

@@ -149,8 +149,8 @@ static void test_deform_real_lung_every_path_within_stated_error(void **state) {
   double worst[SUPINE_STORAGE_COUNT] = {0};
   for (int storage = 0; storage < SUPINE_STORAGE_COUNT; ++storage) {
     for (int simd = 0; simd < SUPINE_SIMD_COUNT; ++simd) {
-      const supine_basis_options options = {sizeof options, (supine_storage)storage,
-                                            (supine_simd)simd};
+      const supine_basis_options options = {sizeof options, .storage = (supine_storage)storage,
+                                            .simd = (supine_simd)simd};
       const supine_status status =
           supine_basis_open_memory_with(bytes, size, &options, &bases[storage][simd], NULL);
       assert_true(status == SUPINE_OK || status == SUPINE_ERROR_UNSUPPORTED);

@@ -217,7 +217,7 @@ static void check_glsl(EGLenum api, const char *version) {
     fixture *f = fixture_create(VERTICES, modes[m], 3, 1, false, false, 9, 21);
     size_t size = 0;
     unsigned char *bytes = fixture_bytes(f, &size);
-    const supine_basis_options exact = {sizeof exact, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO};
+    const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
     supine_basis *basis = NULL;
     assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
     float *attributes = fixture_allocate(VERTICES * SUPINE_GL_FLOATS, sizeof *attributes);

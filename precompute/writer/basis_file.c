@@ -9,6 +9,7 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "precompute/normals/normals.h"
 #include "precompute/tissue/disease.h"
 #include "precompute/writer/basis_file.h"
 #include "precompute/writer/safetensors_write.h"
@@ -144,6 +145,39 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
+/* Normals of the surface as the file will have it. */
+static supine_status find_normals(const supine_basis_content *content, const float *vertices,
+                                  const float *directions, supine_normals_modes *normals,
+                                  supine_error *error) {
+  const supine_compression *field = content->compression;
+  const supine_volume_forms *forms = content->forms;
+  const supine_normals_surface surface = {.vertex_count = content->lungs->mesh.vertex_count,
+                                          .triangle_count = content->lungs->mesh.triangle_count,
+                                          .lung_count = content->lungs->lung_count,
+                                          .mode_count = field->mode_count,
+                                          .band = field->band,
+                                          .lung_begin = content->lungs->lung_begin,
+                                          .vertices = vertices,
+                                          .triangles = content->lungs->mesh.triangles,
+                                          .directions = directions,
+                                          .coefficients = field->coefficients,
+                                          .modes = field->modes,
+                                          .linear = forms != NULL ? forms->linear : NULL,
+                                          .quadratic = forms != NULL ? forms->quadratic : NULL,
+                                          .cubic = forms != NULL ? forms->cubic : NULL,
+                                          .resting = NULL};
+  return supine_normals_modes_create(&surface, normals, error);
+}
+
+static void add_normals(entries *list, const supine_normals_modes *normals, bool closed) {
+  if (normals->count > 0) {
+    add(list, closed ? "normals_range_ml" : "normals_range_mm", "%.0f..%.0f", normals->range[0],
+        normals->range[1]);
+    add(list, "normals_mean_degrees", "%.2g", normals->mean);
+    add(list, "normals_p999_degrees", "%.2g", normals->p999);
+  }
+}
+
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;
@@ -153,6 +187,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   const size_t g = lungs->lung_count;
   supine_status status = SUPINE_OK;
   entries list = {0};
+  supine_normals_modes normals = {0};
   const bool vector = content->directions == NULL;
   static const double healthy[2] = {1.0, 1.0};
   const double *share = content->model != NULL ? content->model->share : healthy;
@@ -201,12 +236,17 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     add(&list, "patient_law", "%s", content->patient);
     add(&list, "patient", "%s", content->patient_summary);
   }
+  status = find_normals(content, vertices, directions, &normals, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  add_normals(&list, &normals, content->forms != NULL);
   add(&list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
   if (list.failed) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
     goto cleanup;
   }
-  supine_tensor tensors[11] = {
+  supine_tensor tensors[13] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
@@ -235,9 +275,16 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     tensors[count++] =
         (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
   }
+  if (normals.count > 0) {
+    const size_t q = normals.count;
+    tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes};
+    tensors[count++] = (supine_tensor){
+        "normal_weights", SUPINE_F64, 3, {g, q, (k + 1) * (k + 2) / 2}, normals.weights};
+  }
   status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:
   entries_free(&list);
+  supine_normals_modes_free(&normals);
   free(rest);
   free(vertices);
   free(directions);

@@ -286,8 +286,7 @@ static supine_status bench_open(bench *work, size_t vertices, const supine_basis
     return status;
   }
   for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
-    const supine_basis_options options = {sizeof options, (supine_storage)storage,
-                                          SUPINE_SIMD_AUTO};
+    const supine_basis_options options = {sizeof options, .storage = (supine_storage)storage};
     status = supine_basis_open_memory_with(work->image.bytes, work->image.size, &options,
                                            &work->bases[storage], error);
     if (status != SUPINE_OK) {

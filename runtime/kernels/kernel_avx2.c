@@ -7,6 +7,8 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
+enum { NORMAL_MODES = 8 }; /* the usual number */
+
 /* Coefficient 2 pair, or the one after it, of vertices 8 half to 8 half + 7. */
 INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
                           supine_storage storage) {
@@ -155,14 +157,36 @@ INLINE void put(float *to, __m256 v, bool stream) {
   }
 }
 
+/* x y z over their length: the estimate of the inverse root has 12 bits, Newton's step doubles
+ * them. The smallest normal number keeps 0 from becoming NaN. */
+INLINE void normalise(halves *x, halves *y, halves *z) {
+  for (size_t half = 0; half < 2; ++half) {
+    const __m256 square =
+        _mm256_max_ps(_mm256_fmadd_ps(x->v[half], x->v[half],
+                                      _mm256_fmadd_ps(y->v[half], y->v[half],
+                                                      _mm256_mul_ps(z->v[half], z->v[half]))),
+                      _mm256_set1_ps(0x1p-126F));
+    const __m256 guess = _mm256_rsqrt_ps(square);
+    const __m256 error = _mm256_fnmadd_ps(_mm256_mul_ps(square, guess), guess, _mm256_set1_ps(1));
+    const __m256 inverse =
+        _mm256_fmadd_ps(_mm256_mul_ps(guess, error), _mm256_set1_ps(0.5F), guess);
+    x->v[half] = _mm256_mul_ps(x->v[half], inverse);
+    y->v[half] = _mm256_mul_ps(y->v[half], inverse);
+    z->v[half] = _mm256_mul_ps(z->v[half], inverse);
+  }
+}
+
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                           bool with_rest, supine_storage storage, bool vector) {
+                           bool with_rest, bool unit, supine_storage storage, bool vector) {
   const bool compact = supine_tiles_compact(storage);
   triples result;
   if (vector) {
-    const halves x = dot(tile, w, tiles->modes, storage);
-    const halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
-    const halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
+    halves x = dot(tile, w, tiles->modes, storage);
+    halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
+    halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
+    if (unit) {
+      normalise(&x, &y, &z);
+    }
     interleave8(x.v[0], y.v[0], z.v[0], result.v);
     interleave8(x.v[1], y.v[1], z.v[1], result.v + 3);
     if (with_rest) {
@@ -202,11 +226,12 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
 }
 
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                       const supine_target *target, supine_storage storage, bool vector) {
+                       const supine_target *target, bool unit, supine_storage storage,
+                       bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
+    const triples xyz = deform_tile(tiles, tile, weights, target->rest, unit, storage, vector);
     if (target->y != NULL) {
       put_separate(&xyz, target, t * TILE);
       continue;
@@ -220,14 +245,24 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
 INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
                            size_t count, const supine_target *target, supine_storage storage) {
   if (tiles->axes == 3) {
-    deform_all(tiles, weights, first, count, target, storage, true);
+    deform_all(tiles, weights, first, count, target, false, storage, true);
   } else {
-    deform_all(tiles, weights, first, count, target, storage, false);
+    deform_all(tiles, weights, first, count, target, false, storage, false);
   }
 }
 
 static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                    const supine_target *target) {
+  if (target->unit) {
+    supine_tiles same = *tiles;
+    if (tiles->modes == NORMAL_MODES) { /* known to the compiler */
+      supine_tiles_layout_lit(&same, NORMAL_MODES, tiles->count);
+      deform_all(&same, weights, first, count, target, true, SUPINE_STORAGE_INT16, true);
+    } else {
+      deform_all(tiles, weights, first, count, target, true, SUPINE_STORAGE_INT16, true);
+    }
+    return;
+  }
   switch (tiles->storage) {
   case SUPINE_STORAGE_EXACT:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);

@@ -13,7 +13,7 @@
 #define UNROLL _Pragma("GCC unroll 16")
 #endif
 
-enum { COMMON_MODES = 16 }; /* whose weights stay in registers */
+enum { COMMON_MODES = 16, NORMAL_MODES = 8 }; /* whose weights stay in registers */
 
 /* Weight k in every lane: from a register where the number of modes is the common one. */
 typedef struct weights16 {
@@ -191,15 +191,34 @@ INLINE void writer_close(const writer *w, const supine_target *target) {
   }
 }
 
+/* x y z over their length: the estimate of the inverse root has 14 bits, Newton's step doubles
+ * them. The smallest normal number keeps 0 from becoming NaN. */
+INLINE void normalise(__m512 *x, __m512 *y, __m512 *z) {
+  const __m512 square =
+      _mm512_max_ps(_mm512_fmadd_ps(*x, *x, _mm512_fmadd_ps(*y, *y, _mm512_mul_ps(*z, *z))),
+                    _mm512_set1_ps(0x1p-126F));
+  const __m512 guess = _mm512_rsqrt14_ps(square);
+  const __m512 error = _mm512_fnmadd_ps(_mm512_mul_ps(square, guess), guess, _mm512_set1_ps(1));
+  const __m512 inverse = _mm512_fmadd_ps(_mm512_mul_ps(guess, error), _mm512_set1_ps(0.5F), guess);
+  *x = _mm512_mul_ps(*x, inverse);
+  *y = _mm512_mul_ps(*y, inverse);
+  *z = _mm512_mul_ps(*z, inverse);
+}
+
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
-                           bool with_rest, bool common, supine_storage storage, bool vector) {
-  const size_t modes = common ? COMMON_MODES : tiles->modes;
+                           bool with_rest, bool unit, size_t known, supine_storage storage,
+                           bool vector) {
+  const size_t modes = known > 0 ? known : tiles->modes;
+  const bool common = known > 0;
   const bool compact = supine_tiles_compact(storage);
   triples result;
   if (vector) {
-    const __m512 x = dot(tile, w, modes, common, storage);
-    const __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
-    const __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
+    __m512 x = dot(tile, w, modes, common, storage);
+    __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
+    __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
+    if (unit) {
+      normalise(&x, &y, &z);
+    }
     result = interleave(x, y, z);
     if (with_rest) {
       const triples rest = rest_positions(tiles, tile, compact);
@@ -227,29 +246,31 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
 /* What a caller's constants make of one loop. */
 typedef struct form {
   supine_storage storage;
-  bool vector, rest, joined;
-  bool common; /* 16 modes */
+  bool vector, rest, unit, joined;
+  size_t modes; /* where the compiler knows how many; else 0 */
 } form;
 
 INLINE void deform_all(const supine_tiles *any, const float *weights, size_t first, size_t count,
                        const supine_target *target, form f) {
   supine_tiles same = *any;
-  if (f.common) { /* known to the compiler */
-    supine_tiles_layout(&same, f.storage, COMMON_MODES, f.vector, any->count);
+  if (f.modes > 0 && f.unit) {
+    supine_tiles_layout_lit(&same, f.modes, any->count);
+  } else if (f.modes > 0) {
+    supine_tiles_layout(&same, f.storage, f.modes, f.vector, any->count);
   }
   const supine_tiles *tiles = &same;
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
                    writer_open(target->z, target)}; /* joined: the first alone */
   weights16 w = {.at = weights};
-  if (f.common) {
-    UNROLL for (size_t k = 0; k < COMMON_MODES; ++k) {
+  if (f.modes > 0) {
+    UNROLL for (size_t k = 0; k < f.modes; ++k) {
       w.v[k] = _mm512_set1_ps(weights[k]);
     }
   }
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.common, f.storage, f.vector);
+    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.unit, f.modes, f.storage, f.vector);
     if (f.joined) {
       writer_put(&out[0], xyz.v[0]);
       writer_put(&out[0], xyz.v[1]);
@@ -272,10 +293,10 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t 
   const bool joined = target->y == NULL;
   if (target->rest && joined && tiles->modes == COMMON_MODES) {
     deform_all(tiles, weights, first, count, target,
-               (form){storage, vector, .rest = true, .joined = true, .common = true});
+               (form){storage, vector, .rest = true, .joined = true, .modes = COMMON_MODES});
   } else {
     deform_all(tiles, weights, first, count, target,
-               (form){storage, vector, .rest = target->rest, .joined = joined, .common = false});
+               (form){storage, vector, .rest = target->rest, .joined = joined});
   }
 }
 
@@ -290,6 +311,17 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size
 
 static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                    const supine_target *target) {
+  if (target->unit && tiles->modes == NORMAL_MODES) {
+    deform_all(tiles, weights, first, count, target,
+               (form){SUPINE_STORAGE_INT16, .vector = true, .unit = true, .joined = true,
+                      .modes = NORMAL_MODES});
+    return;
+  }
+  if (target->unit) {
+    deform_all(tiles, weights, first, count, target,
+               (form){SUPINE_STORAGE_INT16, .vector = true, .unit = true, .joined = true});
+    return;
+  }
   switch (tiles->storage) {
   case SUPINE_STORAGE_EXACT:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);

@@ -69,8 +69,19 @@ static void widen_rest(const supine_tiles *tiles, const unsigned char *tile, flo
   }
 }
 
+/* x y z of 16 vertices, each over its length. */
+static void normalise(float v[3][TILE]) {
+  for (size_t i = 0; i < TILE; ++i) {
+    const float square = v[0][i] * v[0][i] + v[1][i] * v[1][i] + v[2][i] * v[2][i];
+    const float inverse = square > 0 ? 1 / sqrtf(square) : 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      v[axis][i] *= inverse;
+    }
+  }
+}
+
 static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                        bool rest, float *xyz) {
+                        bool rest, bool unit, float *xyz) {
   float amount[3][TILE] = {{0}};
   float p[TILE_NUMBERS] = {0};
   for (size_t axis = 0; axis < tiles->axes; ++axis) {
@@ -78,6 +89,9 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
   }
   if (rest) {
     widen_rest(tiles, tile, p);
+  }
+  if (unit) {
+    normalise(amount);
   }
   if (tiles->axes == 3) {
     for (size_t v = 0; v < TILE; ++v) {
@@ -101,10 +115,10 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   for (size_t t = 0; t < count; ++t) {
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
     if (target->y == NULL) {
-      deform_tile(tiles, tile, weights, target->rest, target->x + t * TILE_NUMBERS);
+      deform_tile(tiles, tile, weights, target->rest, target->unit, target->x + t * TILE_NUMBERS);
     } else {
       float xyz[TILE_NUMBERS];
-      deform_tile(tiles, tile, weights, target->rest, xyz);
+      deform_tile(tiles, tile, weights, target->rest, target->unit, xyz);
       for (size_t v = 0; v < TILE; ++v) {
         target->x[t * TILE + v] = xyz[3 * v];
         target->y[t * TILE + v] = xyz[3 * v + 1];

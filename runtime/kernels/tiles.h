@@ -79,6 +79,12 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->count = count;
 }
 
+/** The layout of tiles of normals: INT16 modes along three axes, and nothing else. */
+static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
+  supine_tiles_layout(tiles, SUPINE_STORAGE_INT16, modes, true, count);
+  tiles->stride = tiles->rest_begin;
+}
+
 /** How to ask for tiles that come from memory ahead of their use. */
 typedef enum supine_prefetch {
   SUPINE_PREFETCH_NONE, /**< they are in the cache */
@@ -105,6 +111,7 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 typedef struct supine_target {
   float *x, *y, *z;
   bool rest;   /**< positions; otherwise displacements alone */
+  bool unit;   /**< vectors of length 1, of tiles laid out for normals; without rest, one array */
   bool stream; /**< store past the cache */
   supine_prefetch prefetch;
   /** [16] or NULL. Where one array is written in several runs, what one run leaves to the next, so

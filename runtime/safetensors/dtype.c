@@ -6,10 +6,8 @@ static const struct {
   const char *name;
   size_t size;
 } dtypes[SUPINE_DTYPE_COUNT] = {
-    [SUPINE_U8] = {"U8", 1},
-    [SUPINE_U32] = {"U32", 4},
-    [SUPINE_F32] = {"F32", 4},
-    [SUPINE_F64] = {"F64", 8},
+    [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4}, [SUPINE_F32] = {"F32", 4},
+    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2},
 };
 
 const char *supine_safetensors_dtype_name(supine_dtype dtype) {

@@ -103,7 +103,7 @@ static supine_status parse_tensor(supine_safetensors *file, json_cursor *cursor,
       const char *dtype = supine_safetensors_json_string(cursor);
       good = has_dtype = dtype != NULL;
       if (good && !parse_dtype(dtype, &item->tensor.dtype)) {
-        return FORMAT_ERROR(file, "tensor '%.64s': dtype '%.16s' is none of U8, U32, F32, F64",
+        return FORMAT_ERROR(file, "tensor '%.64s': dtype '%.16s' is none of U8, I16, U32, F32, F64",
                             name, dtype);
       }
     } else if (good && !has_shape && strcmp(key, "shape") == 0) {

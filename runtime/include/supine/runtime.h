@@ -31,6 +31,8 @@ extern "C" {
 enum { SUPINE_MODES_MAX = 256 };
 /** Most lungs in one file. */
 enum { SUPINE_LUNGS_MAX = 16 };
+/** Most modes of the normals. */
+enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
 typedef struct supine_basis supine_basis;
 
@@ -60,6 +62,7 @@ typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
+  bool without_normals; /**< as if the file had none: saves 6 bytes a vertex and normal mode */
 } supine_basis_options;
 
 /** What a basis holds, owned by it and as in the file: nothing is copied. */
@@ -97,6 +100,10 @@ typedef struct supine_basis_info {
       *resting_volume; /**< [9] see supine_basis_resting_volume; NULL where none is known */
   double scan_volume;  /**< mL that the scan held beyond the file's surface, negative where it held
                             less; 0 where they are one */
+  /** Q, modes of the normals (supine_deform_lit); 0 where the file has none. */
+  size_t normal_count;
+  const int16_t *normals;       /**< [N, 3, Q] n */
+  const double *normal_weights; /**< [G, Q, (K + 1)(K + 2) / 2] V */
 } supine_basis_info;
 
 /** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
@@ -231,8 +238,44 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const double *w
  * supine_deform. */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Unit normals of a deformed surface at its vertices: the mean of the triangles' normals, weighted
- * by their areas.
+/** Weights v [G, Q] of the normals' modes, a quadratic form in q = scale x weights, for each lung:
+ *
+ *     v_j = sum over 0 <= k <= l <= K of V_j,kl q_k q_l        q_0 = 1, k l = 00, 01, ... 0K, 11,
+ * ...
+ *
+ * Cost: G Q K^2 / 2 multiplications, once a frame. */
+SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const double *weights,
+                                            const double *scales, double *normal_weights);
+
+/** Deformed positions, as supine_deform gives them, and unit normals, without a look at triangles:
+ *
+ *     n_i = sum over j of v_j n_ij, normalised
+ *
+ * How far these are from supine_normals' the file says, over postures and volumes that took no part
+ * in making them: metadata "normals_mean_degrees" and "normals_p999_degrees", volumes
+ * "normals_range_ml". Beyond those volumes they are farther.
+ *
+ * @param xyz      [N, 3], written; NULL: the normals alone
+ * @param normals  [N, 3], written; 0 where a vertex has no triangle
+ * Cost per vertex beside the position's: 3 Q + 8 multiplications, and as many additions.
+ * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
+SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const double *weights,
+                                           const double *scales, float *xyz, float *normals);
+
+/** supine_deform_lit of vertices begin <= i < end into arrays [end - begin, 3]: a thread's share.
+ */
+SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, const double *weights,
+                                                 const double *scales, size_t begin, size_t end,
+                                                 float *xyz, float *normals);
+
+/** supine_deform_batch with normals [count, end - begin, 3]. */
+SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
+                                                 const double *weights, const double *scales,
+                                                 size_t begin, size_t end, float *xyz,
+                                                 float *normals);
+
+/** Unit normals of a deformed surface at its vertices, exactly: the mean of the triangles' normals,
+ * weighted by their areas.
  *
  * @param xyz      [N, 3] positions of every vertex
  * @param normals  [N, 3], written; 0 where a vertex has no triangle of positive area

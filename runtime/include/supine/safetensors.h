@@ -26,6 +26,7 @@ typedef enum supine_dtype {
   SUPINE_U32,
   SUPINE_F32,
   SUPINE_F64,
+  SUPINE_I16,
   SUPINE_DTYPE_COUNT
 } supine_dtype;
 

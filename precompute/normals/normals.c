@@ -1,0 +1,358 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The best few modes of the normals. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/normals/polynomial.h"
+#include "precompute/normals/states.h"
+#include "precompute/projection/compression.h"
+#include "sh/base/parallel.h"
+
+/* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
+ * errors change in the second digit. */
+enum { ROWS = 4096, STATES = 192, HELD_OUT = 64, STEP = 4 };
+
+static const double mean_wanted = 0.1; /* degrees */
+static const double p999_wanted = 1.0;
+static const double degrees = 57.29577951308232;
+
+/* One lung's modes before they are rounded. */
+typedef struct fit {
+  double *mix;     /* [MOST, terms] T: n_j = sum of T_j,kl A_kl */
+  double *weights; /* [MOST, terms] V */
+} fit;
+
+/* gram [terms, terms] = A^T A. */
+static void find_gram(const supine_normals_rows *rows, size_t terms, double *gram) {
+  memset(gram, 0, terms * terms * sizeof *gram);
+  for (size_t r = 0; r < 3 * rows->count; ++r) {
+    const double *row = rows->terms + r * terms;
+    for (size_t a = 0; a < terms; ++a) {
+      for (size_t b = 0; b < terms; ++b) {
+        gram[a * terms + b] += row[a] * row[b];
+      }
+    }
+  }
+}
+
+static double dot(const double *a, const double *b, size_t count) {
+  double sum = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += a[i] * b[i];
+  }
+  return sum;
+}
+
+/* The states' products P^T G P, each state scaled to length 1 in G; `image` [S, terms] is G P. */
+static void find_products(const double *gram, size_t terms, const supine_normals_states *states,
+                          double *unit, double *image, double *product) {
+  const size_t s = states->count;
+  for (size_t i = 0; i < s; ++i) {
+    const double *phi = states->phi + i * terms;
+    for (size_t a = 0; a < terms; ++a) {
+      image[i * terms + a] = dot(gram + a * terms, phi, terms);
+    }
+    const double square = dot(phi, image + i * terms, terms);
+    const double length = square > 0.0 ? sqrt(square) : 1.0;
+    for (size_t a = 0; a < terms; ++a) {
+      unit[i * terms + a] = phi[a] / length;
+      image[i * terms + a] /= length;
+    }
+  }
+  for (size_t i = 0; i < s; ++i) {
+    for (size_t j = 0; j < s; ++j) {
+      product[i * s + j] = dot(unit + i * terms, image + j * terms, terms);
+    }
+  }
+}
+
+/* The SVD of the states' normals by their products: modes orthonormal over the rows. */
+static supine_status find_fit(const supine_normals_rows *rows, size_t terms,
+                              const supine_normals_states *states, size_t count, fit *made) {
+  const size_t s = states->count;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  double *gram = malloc(terms * terms * sizeof *gram);
+  double *unit = malloc(s * terms * sizeof *unit);
+  double *image = malloc(s * terms * sizeof *image);
+  double *product = malloc(s * s * sizeof *product);
+  double *vectors = malloc(count * s * sizeof *vectors);
+  double values[STATES]; /* the routine wants room for all */
+  if (gram == NULL || unit == NULL || image == NULL || product == NULL || vectors == NULL) {
+    goto cleanup;
+  }
+  find_gram(rows, terms, gram);
+  find_products(gram, terms, states, unit, image, product);
+  status = supine_projection_leading_eigenpairs(s, product, count, values, vectors);
+  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+    /* What rounding alone leaves is no mode. */
+    const double length = values[j] > 1e-14 * values[0] ? 1.0 / sqrt(values[j]) : 0.0;
+    for (size_t a = 0; a < terms; ++a) {
+      double mix = 0.0;
+      double weight = 0.0;
+      for (size_t i = 0; i < s; ++i) {
+        mix += vectors[j * s + i] * unit[i * terms + a];
+        weight += vectors[j * s + i] * image[i * terms + a];
+      }
+      made->mix[j * terms + a] = length * mix;
+      made->weights[j * terms + a] = length * weight; /* T^T G */
+    }
+  }
+cleanup:
+  free(gram);
+  free(unit);
+  free(image);
+  free(product);
+  free(vectors);
+  return status;
+}
+
+static int compare_doubles(const void *left, const void *right) {
+  const double a = *(const double *)left;
+  const double b = *(const double *)right;
+  return a < b ? -1 : a > b;
+}
+
+/* Angle between two vectors, degrees. */
+static double angle_between(const double *a, const double *b) {
+  const double x = a[1] * b[2] - a[2] * b[1];
+  const double y = a[2] * b[0] - a[0] * b[2];
+  const double z = a[0] * b[1] - a[1] * b[0];
+  return degrees * atan2(sqrt(x * x + y * y + z * z), dot(a, b, 3));
+}
+
+/* Angles off of each row in each state, added at `angles`; returns how many. `modes` are those that
+ * the file will hold, `weights` theirs. */
+static size_t measure(const supine_normals_rows *rows, size_t terms,
+                      const supine_normals_states *states, size_t count, const int16_t *modes,
+                      const double *weights, double *angles) {
+  size_t found = 0;
+  for (size_t i = 0; i < states->count; ++i) {
+    const double *phi = states->phi + i * terms;
+    double v[SUPINE_NORMALS_MOST];
+    for (size_t j = 0; j < count; ++j) {
+      v[j] = dot(weights + j * terms, phi, terms);
+    }
+    for (size_t r = 0; r < rows->count; ++r) {
+      double exact[3];
+      double made[3] = {0.0, 0.0, 0.0};
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const int16_t *n = modes + (3 * (size_t)rows->vertex[r] + axis) * count;
+        exact[axis] = dot(rows->terms + (3 * r + axis) * terms, phi, terms);
+        for (size_t j = 0; j < count; ++j) {
+          made[axis] += v[j] * (double)n[j];
+        }
+      }
+      angles[found++] = angle_between(exact, made);
+    }
+  }
+  return found;
+}
+
+/* Planes of modes for every vertex; each is one thread's, so that sums do not depend on threads. */
+typedef struct planes_work {
+  const supine_normals_surface *surface;
+  const fit *fits; /* [G] */
+  size_t terms;
+  float *planes; /* [count, N, 3] */
+} planes_work;
+
+static void planes_range(void *context, size_t begin, size_t end, size_t thread) {
+  const planes_work *work = context;
+  const size_t n = work->surface->vertex_count;
+  (void)thread;
+  for (size_t j = begin; j < end; ++j) {
+    for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+      supine_normals_mix(work->surface, lung, work->fits[lung].mix + j * work->terms,
+                         work->planes + 3 * n * j);
+    }
+  }
+}
+
+/* Rounds planes to 16 bits, vertices scaled to a normal of length 1 at rest, [N, 3, count]; the
+ * unit of each mode goes to the weights. `rest` [N] lengths at rest. */
+static void round_modes(const supine_normals_surface *s, const float *planes, const float *rest,
+                        size_t count, size_t terms, double *weights, int16_t *modes) {
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    for (size_t j = 0; j < count; ++j) {
+      const float *plane = planes + 3 * s->vertex_count * j;
+      float top = 0;
+      for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
+        const float size = rest[i / 3] > 0 ? fabsf(plane[i]) / rest[i / 3] : 0;
+        top = size > top ? size : top;
+      }
+      const double unit = top > 0 ? (double)top / INT16_MAX : 1.0;
+      for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
+        const double value = rest[i / 3] > 0 ? (double)plane[i] / (double)rest[i / 3] : 0.0;
+        modes[i * count + j] = (int16_t)lrint(value / unit);
+      }
+      for (size_t a = 0; a < terms; ++a) {
+        weights[(lung * count + j) * terms + a] *= unit;
+      }
+    }
+  }
+}
+
+/* Lengths of the normals at rest, [N]. */
+static supine_status find_rest(const supine_normals_surface *s, size_t terms, float *rest) {
+  float *plane = calloc(3 * s->vertex_count + 1, sizeof *plane);
+  double *one = calloc(terms, sizeof *one);
+  if (plane == NULL || one == NULL) {
+    free(plane);
+    free(one);
+    return SUPINE_ERROR_MEMORY;
+  }
+  one[0] = 1.0;
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    supine_normals_mix(s, lung, one, plane);
+  }
+  for (size_t i = 0; i < s->vertex_count; ++i) {
+    const float *n = plane + 3 * i;
+    rest[i] = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  }
+  free(plane);
+  free(one);
+  return SUPINE_OK;
+}
+
+/* The modes for `count` of them, in place of what was made with fewer. */
+static supine_status make(const supine_normals_surface *s, const fit *fits, size_t count,
+                          const float *rest, supine_normals_modes *made) {
+  const size_t terms = supine_normals_terms(s->mode_count);
+  free(made->modes);
+  free(made->weights);
+  made->count = count;
+  made->modes = malloc(3 * s->vertex_count * count * sizeof *made->modes);
+  made->weights = malloc(s->lung_count * count * terms * sizeof *made->weights);
+  float *planes = calloc(3 * s->vertex_count * count, sizeof *planes);
+  if (made->modes == NULL || made->weights == NULL || planes == NULL) {
+    free(planes);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    memcpy(made->weights + lung * count * terms, fits[lung].weights,
+           count * terms * sizeof *made->weights);
+  }
+  planes_work work = {s, fits, terms, planes};
+  supine_parallel_for(count, 1, supine_thread_count(), planes_range, &work);
+  round_modes(s, planes, rest, count, terms, made->weights, made->modes);
+  free(planes);
+  return SUPINE_OK;
+}
+
+static size_t stride_of(const supine_normals_surface *s, size_t lung) {
+  return 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
+}
+
+/* Errors on states and, where the lungs have more vertices than took part, vertices of their own.
+ */
+static supine_status measure_all(const supine_normals_surface *s,
+                                 const supine_normals_states *states, supine_normals_modes *made) {
+  const size_t terms = supine_normals_terms(s->mode_count);
+  supine_status status = SUPINE_OK;
+  double *angles = malloc(s->lung_count * (2 * ROWS + 1) * (states->count + 1) * sizeof *angles);
+  size_t found = 0;
+  if (angles == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
+    supine_normals_rows rows;
+    const size_t stride = stride_of(s, lung);
+    status = supine_normals_rows_create(s, lung, stride / 2, stride, &rows);
+    if (status == SUPINE_OK) {
+      found += measure(&rows, terms, states, made->count, made->modes,
+                       made->weights + lung * made->count * terms, angles + found);
+      supine_normals_rows_free(&rows);
+    }
+  }
+  if (status == SUPINE_OK && found > 0) {
+    double sum = 0.0;
+    for (size_t i = 0; i < found; ++i) {
+      sum += angles[i];
+    }
+    qsort(angles, found, sizeof *angles, compare_doubles);
+    made->mean = sum / (double)found;
+    made->p999 = angles[(size_t)(0.999 * (double)(found - 1))];
+  }
+  free(angles);
+  return status;
+}
+
+/* Fits of every lung. */
+static supine_status find_fits(const supine_normals_surface *s, const supine_normals_states *states,
+                               size_t count, fit *fits) {
+  const size_t terms = supine_normals_terms(s->mode_count);
+  supine_status status = SUPINE_OK;
+  for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
+    supine_normals_rows rows = {0};
+    fits[lung].mix = calloc(count * terms, sizeof *fits[lung].mix);
+    fits[lung].weights = calloc(count * terms, sizeof *fits[lung].weights);
+    status = fits[lung].mix == NULL || fits[lung].weights == NULL
+                 ? SUPINE_ERROR_MEMORY
+                 : supine_normals_rows_create(s, lung, 0, stride_of(s, lung), &rows);
+    if (status == SUPINE_OK) {
+      status = find_fit(&rows, terms, states, count, &fits[lung]);
+    }
+    supine_normals_rows_free(&rows);
+  }
+  return status;
+}
+
+supine_status supine_normals_modes_create(const supine_normals_surface *surface,
+                                          supine_normals_modes *made, supine_error *error) {
+  fit fits[SUPINE_LUNGS_MAX] = {{0}};
+  supine_normals_states states = {0};
+  supine_normals_states held_out = {0};
+  float *rest = NULL;
+  *made = (supine_normals_modes){0};
+  if (surface->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+    return SUPINE_OK;
+  }
+  const size_t terms = supine_normals_terms(surface->mode_count);
+  supine_status status = supine_normals_states_create(surface, STATES, 0.0, &states);
+  if (status == SUPINE_OK) {
+    status = supine_normals_states_create(surface, HELD_OUT, 0.37, &held_out);
+  }
+  if (status != SUPINE_OK || states.count == 0 || held_out.count == 0) {
+    goto cleanup;
+  }
+  size_t most = SUPINE_NORMALS_MOST < states.count ? SUPINE_NORMALS_MOST : states.count;
+  most = terms < most ? terms : most;
+  rest = malloc(surface->vertex_count * sizeof *rest);
+  status = rest == NULL ? SUPINE_ERROR_MEMORY : find_rest(surface, terms, rest);
+  if (status == SUPINE_OK) {
+    status = find_fits(surface, &states, most, fits);
+  }
+  for (size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
+       status == SUPINE_OK && count <= most; count += STEP) {
+    status = make(surface, fits, count, rest, made);
+    if (status == SUPINE_OK) {
+      status = measure_all(surface, &held_out, made);
+    }
+    if (made->mean <= mean_wanted && made->p999 <= p999_wanted) {
+      break;
+    }
+  }
+  memcpy(made->range, states.range, sizeof made->range);
+
+cleanup:
+  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+    free(fits[lung].mix);
+    free(fits[lung].weights);
+  }
+  supine_normals_states_free(&states);
+  supine_normals_states_free(&held_out);
+  free(rest);
+  if (status != SUPINE_OK) {
+    supine_normals_modes_free(made);
+    return supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,
+                            supine_status_string(status));
+  }
+  return SUPINE_OK;
+}
+
+void supine_normals_modes_free(supine_normals_modes *modes) {
+  free(modes->modes);
+  free(modes->weights);
+  *modes = (supine_normals_modes){0};
+}

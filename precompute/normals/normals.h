@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Normals of every deformed surface as a few functions of posture and volume.
+ *
+ * The triangles' area vectors around a vertex sum to a quadratic polynomial of q = scale x weights,
+ *
+ *     N_i(q) = sum over 0 <= k <= l <= K of A_i,kl q_k q_l        q_0 = 1
+ *
+ * so that over all postures and volumes it lies in a space of at most (K + 1)(K + 2) / 2
+ * dimensions, and nearly in far fewer. For each lung the Q best are found,
+ *
+ *     N_i(q) ~ |N_i(0)| sum over j of n_ij v_j(q)        v_j(q) = sum over kl of V_j,kl q_k q_l
+ *
+ * best for angles: vertices count alike whatever their area, and so do postures and volumes. */
+#ifndef SUPINE_NORMALS_H
+#define SUPINE_NORMALS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <supine/runtime.h>
+
+/** What a basis file is about to hold. */
+typedef struct supine_normals_surface {
+  size_t vertex_count, triangle_count, lung_count, mode_count, band;
+  const size_t *lung_begin;  /**< [G + 1] */
+  const float *vertices;     /**< [N, 3] */
+  const uint32_t *triangles; /**< [M, 3] */
+  const float *directions;   /**< [N, 3]; NULL: a vector field */
+  const float *coefficients; /**< [N, K] or [N, 3, K] */
+  const double *modes;       /**< [K, (band + 1)^2] */
+  const double *linear;      /**< [G, K] the volume's forms; NULL: an open surface; likewise: */
+  const double *quadratic;   /**< [G, K, K] */
+  const double *cubic;       /**< [G, K, K, K] */
+  const double *resting;     /**< [9] or NULL, see supine_basis_resting_volume */
+} supine_normals_surface;
+
+/** Normals in few numbers. */
+typedef struct supine_normals_modes {
+  size_t count;    /**< Q; 0: none were made */
+  int16_t *modes;  /**< [N, 3, Q] n, in units that `weights` have taken up */
+  double *weights; /**< [G, Q, (K + 1)(K + 2) / 2] V; columns 00, 01, ... 0K, 11, 12, ... KK */
+  double range[2]; /**< mL that it was made for, over postures: from their resting volume, where
+                      one is known, to that of the file's surface; scales, on an open surface */
+  double mean;     /**< degrees off, over vertices, postures and volumes that took no part */
+  double p999;     /**< the 99.9th percentile of that */
+} supine_normals_modes;
+
+/** Finds them: the fewest modes of SUPINE_NORMALS_FEW, 4 more, ... SUPINE_NORMALS_MOST that err by
+ * at most 0.1 degrees in the mean and 1 in the 99.9th percentile, or the most. More than
+ * SUPINE_NORMALS_FIELD_MAX modes of the field are too many: then none are made.
+ * Cost: Q (K + 1)^2 operations a triangle. Uses all cores.
+ * @retval SUPINE_ERROR_NUMERICAL  the SVD failed
+ * @retval SUPINE_ERROR_MEMORY */
+enum { SUPINE_NORMALS_FEW = 8, SUPINE_NORMALS_MOST = 24, SUPINE_NORMALS_FIELD_MAX = 24 };
+supine_status supine_normals_modes_create(const supine_normals_surface *surface,
+                                          supine_normals_modes *made, supine_error *error);
+
+void supine_normals_modes_free(supine_normals_modes *modes);
+
+#endif

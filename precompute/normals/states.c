@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Postures along a golden spiral, volumes along multiples of another irrational: even in both. */
+#include <math.h>
+#include <stdlib.h>
+
+#include <supine/sh.h>
+#include <supine/volume.h>
+
+#include "precompute/normals/polynomial.h"
+#include "precompute/normals/states.h"
+
+/* Where no rest is known: of the surface's volume. */
+static const double lowest_share = -0.1;
+static const double highest_share = 0.6;
+/* Of an open surface: mm of the largest displacement. */
+static const double lowest_mm = -10.0;
+static const double highest_mm = 40.0;
+
+/* Volume enclosed by the file's surface, mL. */
+static double enclosed(const supine_normals_surface *s) {
+  double sum = 0.0;
+  for (size_t t = 0; t < s->triangle_count; ++t) {
+    const float *p[3];
+    for (size_t v = 0; v < 3; ++v) {
+      p[v] = s->vertices + 3 * (size_t)s->triangles[3 * t + v];
+    }
+    const double x = (double)p[1][1] * (double)p[2][2] - (double)p[1][2] * (double)p[2][1];
+    const double y = (double)p[1][2] * (double)p[2][0] - (double)p[1][0] * (double)p[2][2];
+    const double z = (double)p[1][0] * (double)p[2][1] - (double)p[1][1] * (double)p[2][0];
+    sum += ((double)p[0][0] * x + (double)p[0][1] * y + (double)p[0][2] * z) / 6000.0;
+  }
+  return fabs(sum);
+}
+
+/* Largest displacement at weights w and scale 1, mm, over some of the vertices. */
+static double largest(const supine_normals_surface *s, const double *w) {
+  enum { SOME = 4096 };
+  const size_t modes = s->mode_count;
+  const size_t axes = s->directions == NULL ? 3 : 1;
+  double top = 0.0;
+  for (size_t i = 0; i < s->vertex_count; i += 1 + s->vertex_count / SOME) {
+    double square = 0.0;
+    for (size_t axis = 0; axis < axes; ++axis) {
+      double amount = 0.0;
+      for (size_t k = 0; k < modes; ++k) {
+        amount += w[k] * (double)s->coefficients[(axes * i + axis) * modes + k];
+      }
+      square += amount * amount;
+    }
+    if (axes == 1) {
+      const float *d = s->directions + 3 * i;
+      square *=
+          (double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2];
+    }
+    top = fmax(top, square);
+  }
+  return sqrt(top);
+}
+
+/* The scale at a share, 0 to 1, of the range of a posture. */
+static bool scale_of(const supine_normals_surface *s, const double *y, const double *w,
+                     double whole, double share, double *scale, double *amount) {
+  if (s->linear == NULL) {
+    const double size = largest(s, w);
+    *amount = lowest_mm + share * (highest_mm - lowest_mm);
+    *scale = size > 0.0 ? *amount / size : 0.0;
+    return size > 0.0;
+  }
+  double low = lowest_share * whole;
+  double high = highest_share * whole;
+  if (s->resting != NULL) {
+    low = 0.0;
+    high = 0.0;
+    for (size_t i = 0; i < 9; ++i) {
+      low += s->resting[i] * y[i];
+    }
+  }
+  double cubic[3] = {0.0, 0.0, 0.0};
+  const size_t k = s->mode_count;
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    supine_volume_add(k, s->linear + lung * k, s->quadratic + lung * k * k,
+                      s->cubic + lung * k * k * k, w, cubic);
+  }
+  *amount = low + share * (high - low);
+  return supine_volume_scale(cubic, *amount, scale, NULL) == SUPINE_OK;
+}
+
+supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
+                                           double shift, supine_normals_states *states) {
+  static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
+  static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1: apart from the angle */
+  const size_t terms = supine_normals_terms(surface->mode_count);
+  const size_t harmonics = supine_sh_count(surface->band);
+  const double whole = surface->linear == NULL ? 0.0 : enclosed(surface);
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
+  double low[9];
+  double w[SUPINE_MODES_MAX];
+  *states = (supine_normals_states){.range = {INFINITY, -INFINITY}};
+  states->phi = malloc(count * terms * sizeof *states->phi);
+  if (states->phi == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const double at = (double)i + shift;
+    const double z = 1.0 - (2.0 * at + 0.5) / (double)(count + 1);
+    const double r = sqrt(fmax(0.0, 1.0 - z * z));
+    const double g[3] = {r * cos(golden_angle * at), r * sin(golden_angle * at), z};
+    double scale = 0.0;
+    double amount = 0.0;
+    (void)supine_sh_evaluate(surface->band, g, y);
+    (void)supine_sh_evaluate(2, g, low);
+    for (size_t k = 0; k < surface->mode_count; ++k) {
+      w[k] = 0.0;
+      for (size_t h = 0; h < harmonics; ++h) {
+        w[k] += surface->modes[k * harmonics + h] * y[h];
+      }
+    }
+    if (scale_of(surface, low, w, whole, fmod(at * volume_share, 1.0), &scale, &amount)) {
+      supine_normals_monomials(surface->mode_count, w, scale, states->phi + states->count * terms);
+      states->range[0] = fmin(states->range[0], amount);
+      states->range[1] = fmax(states->range[1], amount);
+      ++states->count;
+    }
+  }
+  return SUPINE_OK;
+}
+
+void supine_normals_states_free(supine_normals_states *states) {
+  free(states->phi);
+  *states = (supine_normals_states){0};
+}

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+/* Normals by the reduced product: a few modes of the normal field, weighted by a quadratic form. */
+#include <string.h>
+
+#include "runtime/internal.h"
+#include "runtime/kernels/compact.h"
+
+/* What one unit of a packed mode stands for: its 16 bits are the upper ones of a word. */
+static const double packed_unit = 0x1p-16;
+
+enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
+
+/* Words of 16 vertices' modes j and j + 1 along one axis. */
+static void pack_pair(const supine_basis *basis, size_t tile, size_t axis, size_t j,
+                      unsigned char *at) {
+  const size_t count = basis->info.normal_count;
+  const size_t last = basis->info.vertex_count - 1;
+  uint32_t words[TILE];
+  for (size_t v = 0; v < TILE; ++v) {
+    const size_t i = tile * TILE + v < last ? tile * TILE + v : last;
+    const int16_t *n = basis->info.normals + (3 * i + axis) * count + j;
+    words[v] = pair_narrow(n[0] / packed_unit, j + 1 < count ? n[1] / packed_unit : 0);
+  }
+  memcpy(at, words, sizeof words);
+}
+
+supine_status supine_basis_pack_normals(supine_basis *basis) {
+  supine_tiles *tiles = &basis->lit;
+  const size_t tile_count = (basis->info.vertex_count + TILE - 1) / TILE;
+  supine_tiles_layout_lit(tiles, basis->info.normal_count, tile_count);
+  tiles->bytes = supine_tiles_allocate(tile_count * tiles->stride);
+  if (tiles->bytes == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t t = 0; t < tile_count; ++t) {
+    unsigned char *tile = tiles->bytes + t * tiles->stride;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t j = 0; j < tiles->modes; j += 2) {
+        pack_pair(basis, t, axis, j,
+                  tile + axis * tiles->axis_bytes + supine_tiles_words_begin(tiles->modes, j));
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+static void lung_weights(const supine_basis *basis, size_t lung, const double *weights,
+                         double scale, double *v) {
+  const size_t modes = basis->info.mode_count;
+  const size_t count = basis->info.normal_count;
+  const double *form = basis->info.normal_weights + lung * count * (modes + 1) * (modes + 2) / 2;
+  for (size_t j = 0; j < count; ++j) {
+    double sum = 0;
+    for (size_t k = 0; k <= modes; ++k) { /* q_k sum over l >= k of V_kl q_l */
+      double row = 0;
+      for (size_t l = k; l <= modes; ++l) {
+        row += *form++ * (l == 0 ? 1 : scale * weights[l - 1]);
+      }
+      sum += row * (k == 0 ? 1 : scale * weights[k - 1]);
+    }
+    v[j] = sum;
+  }
+}
+
+void supine_basis_normal_weights(const supine_basis *basis, const double *weights,
+                                 const double *scales, double *normal_weights) {
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    lung_weights(basis, lung, weights, scales[lung],
+                 normal_weights + lung * basis->info.normal_count);
+  }
+}
+
+/* What the kernels multiply by, of one lung. */
+static void fold(const supine_basis *basis, size_t lung, const double *weights, double scale,
+                 float *folded) {
+  double v[SUPINE_NORMAL_MODES_MAX];
+  lung_weights(basis, lung, weights, scale, v);
+  for (size_t j = 0; j < basis->info.normal_count; ++j) {
+    folded[j] = (float)(packed_unit * v[j]);
+  }
+}
+
+/* Normals of vertices begin <= i < end, which may be of several lungs. */
+static void light(const supine_basis *basis, const double *weights, const double *scales,
+                  size_t begin, size_t end, bool stream, float *normals) {
+  const supine_target target = {.x = normals,
+                                .unit = true,
+                                .stream = stream,
+                                .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
+  float folded[SUPINE_NORMAL_MODES_MAX];
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
+    const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
+    if (first < last) {
+      const supine_target here = supine_target_after(&target, first - begin);
+      fold(basis, lung, weights, scales[lung], folded);
+      supine_deform_lung(basis->kernels, &basis->lit, folded, first, last, &here);
+    }
+  }
+  supine_stream_fence(stream);
+}
+
+supine_status supine_deform_lit_range(const supine_basis *basis, const double *weights,
+                                      const double *scales, size_t begin, size_t end, float *xyz,
+                                      float *normals) {
+  if (basis->info.normal_count == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  if (xyz != NULL) {
+    supine_deform_range(basis, weights, scales, begin, end, xyz);
+  }
+  light(basis, weights, scales, begin, end, basis->stream, normals);
+  return SUPINE_OK;
+}
+
+supine_status supine_deform_lit(const supine_basis *basis, const double *weights,
+                                const double *scales, float *xyz, float *normals) {
+  return supine_deform_lit_range(basis, weights, scales, 0, basis->info.vertex_count, xyz, normals);
+}
+
+supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
+                                      const double *weights, const double *scales, size_t begin,
+                                      size_t end, float *xyz, float *normals) {
+  if (basis->info.normal_count == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  if (xyz != NULL) {
+    supine_deform_batch(basis, count, weights, scales, begin, end, xyz);
+  }
+  const bool stream =
+      3.0 * (double)(end - begin) * (double)count * sizeof *normals > STREAM_BATCH_BYTES;
+  const size_t fit = BATCH_BYTES / basis->lit.stride;
+  const size_t step = TILE * (fit > 0 ? fit : 1);
+  for (size_t at = begin; at < end;) { /* a block of tiles after the other, for every orientation */
+    const size_t next = (at / step + 1) * step;
+    const size_t last = next < end ? next : end;
+    for (size_t j = 0; j < count; ++j) {
+      light(basis, weights + j * basis->info.mode_count, scales + j * basis->info.lung_count, at,
+            last, stream, normals + 3 * (j * (end - begin) + at - begin));
+    }
+    at = last;
+  }
+  return SUPINE_OK;
+}

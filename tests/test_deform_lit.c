@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Normals by the reduced product, against their formula in double precision. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/runtime.h>
+
+#include "runtime_fixture.h"
+
+enum { VERTICES = 211, MODES = 5, BATCH = 3 };
+
+/* A sum of Q products rounds to about Q 2^-24; the second mode of a pair is half a unit off, of
+ * 32767, for each mode: 2^-16 of the modes' length. */
+static const double near = 4e-4;
+
+typedef struct opened {
+  fixture *f;
+  unsigned char *bytes;
+  supine_basis *basis;
+  double weights[BATCH * MODES];
+  double scales[BATCH * 2];
+} opened;
+
+static opened open_lit(size_t normals, supine_simd simd) {
+  opened o = {.f = fixture_create(VERTICES, MODES, 2, 2, false, true, 9, 31)};
+  size_t size = 0;
+  uint64_t random = 17;
+  if (normals > 0) {
+    fixture_add_normals(o.f, normals, 5);
+    /* A vertex without triangles. */
+    memset(o.f->normal + 3 * normals * 40, 0, 3 * normals * sizeof *o.f->normal);
+  }
+  o.bytes = fixture_bytes(o.f, &size);
+  const supine_basis_options options = {sizeof options, .simd = simd};
+  const supine_status status =
+      supine_basis_open_memory_with(o.bytes, size, &options, &o.basis, NULL);
+  assert_true(status == SUPINE_OK || status == SUPINE_ERROR_UNSUPPORTED);
+  for (size_t i = 0; i < BATCH * MODES; ++i) {
+    o.weights[i] = fixture_random(&random);
+  }
+  for (size_t i = 0; i < BATCH * 2; ++i) {
+    o.scales[i] = 1 + 0.5 * fixture_random(&random);
+  }
+  return o;
+}
+
+static void drop(opened *o) {
+  supine_basis_close(o->basis);
+  free(o->bytes);
+  fixture_destroy(o->f);
+}
+
+/* v of a lung, term by term. */
+static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
+  const size_t terms = (MODES + 1) * (MODES + 2) / 2;
+  for (size_t j = 0; j < f->normals; ++j) {
+    const double *form = f->normal_weight + (lung * f->normals + j) * terms;
+    double q[MODES + 1] = {1};
+    size_t at = 0;
+    for (size_t k = 0; k < MODES; ++k) {
+      q[k + 1] = s * w[k];
+    }
+    v[j] = 0;
+    for (size_t k = 0; k <= MODES; ++k) {
+      for (size_t l = k; l <= MODES; ++l) {
+        v[j] += form[at++] * q[k] * q[l];
+      }
+    }
+  }
+}
+
+static void expected_normal(const fixture *f, size_t i, const double *w, const double *s,
+                            double *n) {
+  double v[SUPINE_NORMAL_MODES_MAX];
+  expected_weights(f, f->lung[i], w, s[f->lung[i]], v);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    n[axis] = 0;
+    for (size_t j = 0; j < f->normals; ++j) {
+      n[axis] += v[j] * f->normal[(3 * i + axis) * f->normals + j];
+    }
+  }
+  const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    n[axis] = length > 0 ? n[axis] / length : 0;
+  }
+}
+
+static void check_formula(size_t normals, supine_simd simd) {
+  opened o = open_lit(normals, simd);
+  if (o.basis != NULL) {
+    float xyz[3 * VERTICES];
+    float lit[3 * VERTICES];
+    float plain[3 * VERTICES];
+    double v[2 * SUPINE_NORMAL_MODES_MAX];
+    assert_int_equal(supine_basis_get_info(o.basis)->normal_count, normals);
+    assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, xyz, lit), SUPINE_OK);
+    supine_deform(o.basis, o.weights, o.scales, plain);
+    assert_memory_equal(xyz, plain, sizeof xyz);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      double n[3];
+      expected_normal(o.f, i, o.weights, o.scales, n);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        assert_true(fabs((double)lit[3 * i + axis] - n[axis]) <= near);
+      }
+    }
+    supine_basis_normal_weights(o.basis, o.weights, o.scales, v);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      double want[SUPINE_NORMAL_MODES_MAX];
+      expected_weights(o.f, lung, o.weights, o.scales[lung], want);
+      for (size_t j = 0; j < normals; ++j) {
+        assert_true(fabs(v[lung * normals + j] - want[j]) <= 1e-18 + 1e-12 * fabs(want[j]));
+      }
+    }
+  }
+  drop(&o);
+}
+
+static void test_lit_every_code_agrees_with_formula(void **state) {
+  (void)state;
+  static const size_t numbers[] = {1, 2, 5, 8, 20, 64};
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
+    for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
+      check_formula(numbers[i], (supine_simd)simd);
+    }
+  }
+}
+
+static void test_lit_ranges_are_parts_of_the_whole(void **state) {
+  (void)state;
+  for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
+    opened o = open_lit(8, (supine_simd)simd);
+    float whole[3 * VERTICES];
+    for (size_t begin = 0; o.basis != NULL && begin < VERTICES; begin += 13) {
+      assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, NULL, whole), SUPINE_OK);
+      for (size_t end = begin; end <= VERTICES; end += 11) {
+        float part[3 * VERTICES + 1];
+        part[3 * (end - begin)] = 12345;
+        assert_int_equal(
+            supine_deform_lit_range(o.basis, o.weights, o.scales, begin, end, NULL, part),
+            SUPINE_OK);
+        assert_memory_equal(part, whole + 3 * begin, 3 * (end - begin) * sizeof *part);
+        assert_true(part[3 * (end - begin)] == 12345); /* nothing beyond */
+      }
+    }
+    drop(&o);
+  }
+}
+
+static void test_lit_batch_is_one_after_the_other(void **state) {
+  (void)state;
+  opened o = open_lit(6, SUPINE_SIMD_AUTO);
+  enum { BEGIN = 7, END = VERTICES - 5, COUNT = END - BEGIN };
+  float *xyz = fixture_allocate(3 * BATCH * COUNT, sizeof *xyz);
+  float *lit = fixture_allocate(3 * BATCH * COUNT, sizeof *lit);
+  float *positions = fixture_allocate(3 * BATCH * COUNT, sizeof *positions);
+  float one[3 * COUNT];
+  assert_int_equal(
+      supine_deform_lit_batch(o.basis, BATCH, o.weights, o.scales, BEGIN, END, xyz, lit),
+      SUPINE_OK);
+  supine_deform_batch(o.basis, BATCH, o.weights, o.scales, BEGIN, END, positions);
+  assert_memory_equal(xyz, positions, 3 * BATCH * COUNT * sizeof *xyz);
+  for (size_t j = 0; j < BATCH; ++j) {
+    assert_int_equal(supine_deform_lit_range(o.basis, o.weights + j * MODES, o.scales + 2 * j,
+                                             BEGIN, END, NULL, one),
+                     SUPINE_OK);
+    assert_memory_equal(lit + 3 * j * COUNT, one, sizeof one);
+  }
+  free(xyz);
+  free(lit);
+  free(positions);
+  drop(&o);
+}
+
+static void test_lit_without_normals_refused(void **state) {
+  (void)state;
+  float xyz[3 * VERTICES];
+  opened o = open_lit(0, SUPINE_SIMD_AUTO);
+  assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, xyz, xyz),
+                   SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_deform_lit_batch(o.basis, 1, o.weights, o.scales, 0, VERTICES, xyz, xyz),
+                   SUPINE_ERROR_UNSUPPORTED);
+  drop(&o);
+  o = open_lit(8, SUPINE_SIMD_AUTO);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(o.f, &size);
+  supine_basis *basis = NULL;
+  supine_basis_options options = {sizeof options, .without_normals = true};
+  assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_get_info(basis)->normal_count, 0);
+  assert_int_equal(supine_deform_lit(basis, o.weights, o.scales, xyz, xyz),
+                   SUPINE_ERROR_UNSUPPORTED);
+  supine_basis_close(basis);
+  /* A program from before that option: what lies beyond its options is not read. */
+  options.size = offsetof(supine_basis_options, without_normals);
+  assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_get_info(basis)->normal_count, 8);
+  supine_basis_close(basis);
+  free(bytes);
+  drop(&o);
+}
+
+/* Opens the fixture as it is; the status. */
+static supine_status open_status(const fixture *f) {
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  const supine_status status = supine_basis_open_memory(bytes, size, &basis, NULL);
+  supine_basis_close(basis);
+  free(bytes);
+  return status;
+}
+
+static void test_open_bad_normals_refused(void **state) {
+  (void)state;
+  fixture *f = fixture_create(20, 2, 1, 1, false, false, 1, 3);
+  fixture_add_normals(f, 4, 1);
+  assert_int_equal(open_status(f), SUPINE_OK);
+  f->normal_weight[5] = (double)NAN;
+  assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
+  f->normal_weight[5] = 0;
+  f->normals = 3; /* of another shape, in the same room */
+  assert_int_equal(open_status(f), SUPINE_OK);
+  free(f->normal);
+  free(f->normal_weight);
+  fixture_add_normals(f, SUPINE_NORMAL_MODES_MAX + 1, 1);
+  assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
+  fixture_destroy(f);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_lit_every_code_agrees_with_formula),
+      cmocka_unit_test(test_lit_ranges_are_parts_of_the_whole),
+      cmocka_unit_test(test_lit_batch_is_one_after_the_other),
+      cmocka_unit_test(test_lit_without_normals_refused),
+      cmocka_unit_test(test_open_bad_normals_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
