@@ -67,3 +67,24 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area) {
     }
   }
 }
+
+double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices) {
+  size_t turned = 0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    double normal[2][3];
+    for (int state = 0; state < 2; ++state) {
+      const double *from = state == 0 ? mesh->vertices : vertices;
+      double side[2][3];
+      for (size_t k = 0; k < 6; ++k) {
+        side[k / 3][k % 3] =
+            from[3 * (size_t)corner[1 + k / 3] + k % 3] - from[3 * (size_t)corner[0] + k % 3];
+      }
+      cross(side[0], side[1], normal[state]);
+    }
+    turned +=
+        normal[0][0] * normal[1][0] + normal[0][1] * normal[1][1] + normal[0][2] * normal[1][2] <
+        0.0;
+  }
+  return mesh->triangle_count == 0 ? 0.0 : (double)turned / (double)mesh->triangle_count;
+}

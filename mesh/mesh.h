@@ -127,6 +127,11 @@ void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[
 /** One third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
+/** Share, 0 to 1, of the triangles whose normal turns by more than a right angle where the vertices
+ * move to `vertices` [vertex_count, 3]: more than a few in a thousand, and the surface looks torn.
+ */
+double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
+
 /** What goes into a file beside the surface itself. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< of the file; AUTO: LPS. Written as its SPACE tag */

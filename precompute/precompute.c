@@ -3,10 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <supine/sh.h>
+
 #include "precompute/precompute.h"
 
 #include "precompute/accuracy/held_out.h"
+#include "precompute/physics/solve.h"
 #include "precompute/projection/compression.h"
+#include "precompute/rest.h"
 #include "precompute/writer/basis_file.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
@@ -18,15 +22,19 @@ enum {
   HELD_OUT_WORK = 20000000
 };
 
-static const double reference_volume = 500.0; /* mL, that errors in mm are stated at */
+static const double breath_volume =
+    500.0; /* mL, that errors in mm are stated at where rest is unknown */
 
 /* Fewer modes are kept where the error stays within this factor of what the most would have. */
 static const double same_error = 1.01;
 
 /* Everything between the lungs and the file. */
 typedef struct pipeline {
-  const supine_lungs *lungs;
+  const supine_lungs *given;
+  const supine_lungs *lungs; /* the same, or anchored */
   const supine_precompute_options *options;
+  supine_lungs anchored; /* the lungs with vertices of their own, where a scan is to be met */
+  supine_reference reference;
   bool linear;
   double *directions; /* [N, 3] */
   double *weight;     /* [N] |d|^2: modes then minimise the error of displacement itself, 0.34 % RMS
@@ -41,10 +49,13 @@ typedef struct pipeline {
   supine_held_out held_out;
   supine_accuracy accuracy;
   double turned_over;
+  double resting[9];  /* mL from the reference at rest, harmonics; where that is known */
+  supine_state state; /* that errors in mm are stated at */
   supine_error_table table;
 } pipeline;
 
 static void pipeline_free(pipeline *p) {
+  free(p->anchored.mesh.vertices);
   free(p->directions);
   free(p->weight);
   supine_projection_free(&p->projection);
@@ -108,6 +119,57 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
+/* A scan that was not full is where the compressed field must lead, to the last bit: its own error
+ * at the scan's gravity is taken off the full surface, which is none the worse for it.
+ *
+ *     p + s F d = scan = p' + s F' d,   p' = p + s (F - F') d */
+static supine_status anchor(pipeline *p, supine_error *error) {
+  const supine_lungs *lungs = p->given;
+  const supine_model *model = &p->options->model;
+  const supine_scan *scan = &p->reference.scan;
+  const supine_compression *field = &p->compression;
+  const size_t n = lungs->mesh.vertex_count;
+  supine_solution truth = {0};
+  double weights[SUPINE_MODES_MADE_MAX];
+  if (!(p->reference.known && p->reference.scan_volume < 0.0)) {
+    return SUPINE_OK;
+  }
+  double *y = malloc(supine_sh_count(field->band) * sizeof *y);
+  if (p->anchored.mesh.vertices == NULL) {
+    p->anchored = *lungs;
+    p->anchored.mesh.vertices = malloc(3 * n * sizeof(double));
+  }
+  if (y == NULL || p->anchored.mesh.vertices == NULL) {
+    free(y);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  supine_status status = supine_physics_solve(lungs, model, scan->gravity, &truth, error);
+  if (status == SUPINE_OK) {
+    (void)supine_sh_evaluate(field->band, scan->gravity, y); /* of unit length */
+    supine_projection_compression_weights(field, y, weights);
+    for (size_t i = 0; i < n; ++i) {
+      double miss = truth.catch_[i];
+      for (size_t k = 0; k < field->mode_count; ++k) {
+        miss -= weights[k] * (double)field->coefficients[i * field->mode_count + k];
+      }
+      for (size_t k = 0; k < 3; ++k) {
+        p->anchored.mesh.vertices[3 * i + k] =
+            lungs->mesh.vertices[3 * i + k] +
+            p->reference.scan_scale * miss * p->directions[3 * i + k];
+      }
+    }
+    const double gained =
+        1e-3 * (supine_mesh_volume(&p->anchored.mesh) - supine_mesh_volume(&lungs->mesh));
+    p->reference.full_volume = p->options->reference->full_volume + gained;
+    p->reference.scan_volume = p->options->reference->scan_volume - gained;
+    p->lungs = &p->anchored;
+    supine_physics_volume_forms_free(&p->column_forms);
+  }
+  supine_physics_solution_free(&truth);
+  free(y);
+  return status;
+}
+
 /* Volume forms of the coefficients: of the linear route's few columns, carried along; else
  * directly. */
 static supine_status find_forms(pipeline *p, supine_error *error) {
@@ -132,6 +194,18 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
                                                     p->directions, &p->forms, error);
 }
 
+/* Errors are stated at rest where it is known. */
+static supine_status find_rest(pipeline *p, supine_error *error) {
+  const supine_precompute_options *options = p->options;
+  p->state = (supine_state){.volume = breath_volume};
+  if (!p->reference.known) {
+    return SUPINE_OK;
+  }
+  p->state.resting = p->resting;
+  return supine_precompute_rest(p->lungs, &options->model, &p->reference, &p->compression,
+                                &p->forms, p->resting, error);
+}
+
 static size_t held_out_default(const pipeline *p) {
   const size_t most = p->linear ? HELD_OUT_MAX : HELD_OUT_SAMPLED_MAX;
   const size_t count = HELD_OUT_WORK / p->lungs->mesh.vertex_count;
@@ -151,7 +225,7 @@ static supine_status hold_out(pipeline *p, supine_error *error) {
 
 static supine_status measure(pipeline *p, supine_error *error) {
   return supine_accuracy_measure(&p->held_out.truth, &p->compression, p->directions,
-                                 p->forms.linear != NULL ? &p->forms : NULL, reference_volume,
+                                 p->forms.linear != NULL ? &p->forms : NULL, &p->state,
                                  &p->accuracy, error);
 }
 
@@ -188,7 +262,9 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
   }
   supine_projection_compression_truncate(&p->compression, p->projection.rank, needed);
   supine_physics_volume_forms_free(&p->forms);
-  const supine_status status = find_forms(p, error);
+  supine_status status = anchor(p, error);
+  status = status == SUPINE_OK ? find_forms(p, error) : status;
+  status = status == SUPINE_OK ? find_rest(p, error) : status;
   return status == SUPINE_OK ? measure(p, error) : status;
 }
 
@@ -197,7 +273,7 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
       p->forms.linear == NULL
           ? SUPINE_OK
           : supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms,
-                                        p->accuracy.volume, &p->turned_over);
+                                        &p->state, &p->turned_over);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to look for folds");
 }
@@ -212,11 +288,15 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .turned_over =
                                             p->forms.linear != NULL ? &p->turned_over : NULL,
                                         .table = &p->table,
+                                        .reference = p->reference.known ? &p->reference : NULL,
+                                        .resting = p->state.resting,
                                         .route = p->linear ? "linear" : "sampled",
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,
-                                        .made_by = p->options->made_by};
+                                        .made_by = p->options->made_by,
+                                        .assumed = p->options->assumed,
+                                        .frame = p->options->frame};
   stage part = {p->options, 0.9, 1.0};
   if (!stage_progress(&part, 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
@@ -227,10 +307,13 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error) {
-  pipeline p = {.lungs = lungs, .options = options};
+  pipeline p = {.given = lungs, .lungs = lungs, .options = options};
+  if (options->reference != NULL) {
+    p.reference = *options->reference;
+  }
   supine_status (*const steps[])(pipeline *, supine_error *) = {
-      find_directions, project,  compress,   find_forms,      hold_out,
-      measure,         tabulate, drop_modes, find_turned_over};
+      find_directions, project, compress, anchor,     find_forms,      find_rest,
+      hold_out,        measure, tabulate, drop_modes, find_turned_over};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
     status = steps[i](&p, error);

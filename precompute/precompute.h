@@ -8,6 +8,7 @@
 #include "precompute/fields/fields.h"
 #include "precompute/physics/model.h"
 #include "precompute/projection/projection.h"
+#include "precompute/reference/reference.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -23,6 +24,7 @@ typedef enum supine_route {
 /** What a basis is made of. */
 typedef struct supine_precompute_options {
   supine_model model;
+  const supine_reference *reference; /**< of the lungs; NULL: volumes count from their surface */
   supine_route route;
   size_t band;                 /**< L */
   size_t modes;                /**< most modes; 0: the (band + 1)^2 harmonics themselves */
@@ -30,6 +32,8 @@ typedef struct supine_precompute_options {
   const char *made_by;         /**< how it was made, for the file's metadata; optional */
   const char *patient;         /**< a person's own law (JSON), for the same; optional */
   const char *patient_summary; /**< whose, and how well it held out; with the former */
+  const char *assumed;         /**< what was assumed of the scan, likewise */
+  supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
   void *progress_context;
 } supine_precompute_options;
@@ -42,7 +46,7 @@ typedef struct supine_precompute_report {
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
-  /** At accuracy.volume, see supine_accuracy_turned_over; 0 where the surface is open. */
+  /** At the accuracy's state, see supine_accuracy_turned_over; 0 where the surface is open. */
   double turned_over;
 } supine_precompute_report;
 

@@ -36,7 +36,7 @@ static double left_share = 1.0; /* of the bases made from here on */
 
 static supine_status make_basis(const supine_lungs *lungs, const char *path) {
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 5, .modes = 16, .held_out = 5};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 5, .modes = 16, .held_out = 5};
   options.model.share[0] = left_share;
   supine_precompute_report report;
   return supine_precompute(lungs, &options, path, &report, NULL);

@@ -269,16 +269,19 @@ static void test_scale_each_inflation_reaches_it(void **state) {
   double scale = 0;
   assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
   supine_inflation inflation = {SUPINE_INFLATION_RMS, 3.7};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
+                   SUPINE_OK);
   const double scales[2] = {scale, scale};
   assert_near(supine_compare_rms(m.compare, weights, scales, NULL, NULL), 3.7, 1e-12);
   inflation = (supine_inflation){SUPINE_INFLATION_SCALE, 0.37};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
+                   SUPINE_OK);
   assert_true(scale == 0.37);
   const double volume = supine_basis_lung_volume(m.basis, 0, weights, 0.11) +
                         supine_basis_lung_volume(m.basis, 1, weights, 0.11);
   inflation = (supine_inflation){SUPINE_INFLATION_VOLUME, volume};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, weights, &scale, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
+                   SUPINE_OK);
   assert_near(scale, 0.11, 1e-9);
   unmake(&m);
 }
@@ -290,10 +293,10 @@ static void test_scale_open_or_still_is_refused(void **state) {
   double scale = 0;
   supine_error error;
   supine_inflation inflation = {SUPINE_INFLATION_VOLUME, 100};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, &scale, &error),
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, still, &scale, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
   inflation.kind = SUPINE_INFLATION_RMS;
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, &scale, &error),
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, still, &scale, &error),
                    SUPINE_ERROR_NUMERICAL);
   unmake(&m);
 }
@@ -324,8 +327,9 @@ static double rms_of_directions(const made *m, const supine_inflation *inflation
   for (int side = 0; side < 2; ++side) {
     double scale = 0;
     assert_int_equal(supine_basis_weights(m->basis, g[side], weights[side]), SUPINE_OK);
-    assert_int_equal(supine_compare_scale(m->compare, inflation, weights[side], &scale, NULL),
-                     SUPINE_OK);
+    assert_int_equal(
+        supine_compare_scale(m->compare, inflation, g[side], weights[side], &scale, NULL),
+        SUPINE_OK);
     scales[side][0] = scales[side][1] = scales[side][2] = scale;
   }
   return supine_compare_rms(m->compare, weights[0], scales[0], weights[1], scales[1]);
@@ -430,7 +434,8 @@ static void test_slabs_at_rest_hold_the_volume_of_the_lung(void **state) {
     supine_slab slabs[2 * SLABS];
     double g[3];
     random_direction(&random, g);
-    assert_int_equal(supine_compare_slabs(m.basis, g, m.f->vertex, SLABS, slabs, NULL), SUPINE_OK);
+    assert_int_equal(supine_compare_slabs(m.basis, g, NULL, m.f->vertex, SLABS, slabs, NULL),
+                     SUPINE_OK);
     for (size_t lung = 0; lung < 2; ++lung) {
       double volume = 0;
       for (size_t s = 0; s < SLABS; ++s) {
@@ -462,7 +467,7 @@ static void test_slabs_of_bipyramid_follow_the_cube(void **state) {
   assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
   const double g[3] = {0, 0, -2.5};
   supine_slab slabs[SLABS];
-  assert_int_equal(supine_compare_slabs(basis, g, f->vertex, SLABS, slabs, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_slabs(basis, g, NULL, f->vertex, SLABS, slabs, NULL), SUPINE_OK);
   double whole = 0;
   for (size_t s = 0; s < SLABS; ++s) {
     whole += slabs[s].volume;
@@ -488,7 +493,7 @@ static void check_linear(const double matrix[3][3], const double shift[3], doubl
     supine_slab slabs[2 * SLABS];
     double g[3];
     random_direction(&random, g);
-    assert_int_equal(supine_compare_slabs(m.basis, g, xyz, SLABS, slabs, NULL), SUPINE_OK);
+    assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
     for (size_t s = 0; s < 2 * SLABS; ++s) {
       assert_near(slabs[s].gain, trace * slabs[s].volume, tolerance);
     }
@@ -529,7 +534,7 @@ static void test_slabs_of_any_state_sum_to_the_exact_volume(void **state) {
     random_direction(&random, g);
     assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
     supine_deform(m.basis, weights, scales, xyz);
-    assert_int_equal(supine_compare_slabs(m.basis, g, xyz, SLABS, slabs, NULL), SUPINE_OK);
+    assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
     for (size_t lung = 0; lung < 2; ++lung) {
       double gain = 0;
       for (size_t s = 0; s < SLABS; ++s) {
@@ -552,17 +557,19 @@ static void test_slabs_bad_arguments_are_refused(void **state) {
   const double infinite[3] = {INFINITY, 0, 0};
   supine_slab slabs[SUPINE_SLABS_MAX];
   supine_error error;
-  assert_int_equal(supine_compare_slabs(open.basis, g, open.f->vertex, 10, slabs, &error),
+  assert_int_equal(supine_compare_slabs(open.basis, g, NULL, open.f->vertex, 10, slabs, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
-  assert_int_equal(supine_compare_slabs(closed.basis, none, closed.f->vertex, 10, slabs, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_slabs(closed.basis, infinite, closed.f->vertex, 10, slabs, NULL),
-                   SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_slabs(closed.basis, g, closed.f->vertex, 0, slabs, &error),
-                   SUPINE_ERROR_ARGUMENT);
   assert_int_equal(
-      supine_compare_slabs(closed.basis, g, closed.f->vertex, SUPINE_SLABS_MAX + 1, slabs, &error),
+      supine_compare_slabs(closed.basis, none, NULL, closed.f->vertex, 10, slabs, &error),
       SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(
+      supine_compare_slabs(closed.basis, infinite, NULL, closed.f->vertex, 10, slabs, NULL),
+      SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_slabs(closed.basis, g, NULL, closed.f->vertex, 0, slabs, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_slabs(closed.basis, g, NULL, closed.f->vertex,
+                                        SUPINE_SLABS_MAX + 1, slabs, &error),
+                   SUPINE_ERROR_ARGUMENT);
   unmake(&open);
   unmake(&closed);
 }

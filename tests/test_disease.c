@@ -25,7 +25,7 @@ static supine_model model; /* of the test that runs */
 
 static int healthy(void **state) {
   (void)state;
-  model = supine_physics_model_default();
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   return 0;
 }
 

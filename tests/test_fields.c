@@ -59,7 +59,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
                                     double soften) {
   const size_t n = of->mesh.vertex_count;
   supine_fields fields = {.direction_count = count, .vertex_count = n};
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.force.soften = soften;
   fields.directions = malloc(3 * count * sizeof(double));
   fields.displacement = malloc(3 * count * n * sizeof(double));

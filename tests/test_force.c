@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "precompute/physics/force.h"
+#include "precompute/physics/model.h"
 
 #include "lungs_helpers.h"
 
@@ -45,7 +45,7 @@ static void test_height_range_random_directions_equals_brute_force(void **state)
   for (size_t d = 0; d < COUNT; ++d) {
     random_direction(&seed, g + 3 * d);
   }
-  assert_int_equal(supine_physics_height_range(&lungs->mesh, COUNT, g, minimum, maximum),
+  assert_int_equal(supine_physics_height_range(lungs, false, COUNT, g, minimum, maximum),
                    SUPINE_OK);
   for (size_t d = 0; d < COUNT; ++d) {
     double low = INFINITY;
@@ -62,14 +62,14 @@ static void test_height_range_random_directions_equals_brute_force(void **state)
 static void test_force_default_law_is_height_zero_to_one(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  const supine_force_law law = supine_physics_force_law_default();
+  const supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
   double *down = malloc(n * sizeof *down);
   double *up = malloc(n * sizeof *up);
   const double g[3] = {0.36, -0.48, 0.8};
   const double opposite[3] = {-0.36, 0.48, -0.8};
   double low;
   double high;
-  assert_int_equal(supine_physics_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+  assert_int_equal(supine_physics_height_range(lungs, false, 1, g, &low, &high), SUPINE_OK);
   supine_physics_force(lungs, &law, g, low, high, down);
   supine_physics_force(lungs, &law, opposite, -high, -low, up);
   double least = INFINITY;
@@ -100,7 +100,7 @@ static void check_factors(const supine_lungs *lungs, const supine_force_law *law
     double low;
     double high;
     random_direction(&seed, g);
-    assert_int_equal(supine_physics_height_range(&lungs->mesh, 1, g, &low, &high), SUPINE_OK);
+    assert_int_equal(supine_physics_height_range(lungs, false, 1, g, &low, &high), SUPINE_OK);
     supine_physics_force(lungs, law, g, low, high, force);
     supine_physics_force_functions(lungs, law, g, low, high, functions);
     for (size_t i = 0; i < n; ++i) {
@@ -116,7 +116,7 @@ static void check_factors(const supine_lungs *lungs, const supine_force_law *law
 }
 
 static void test_force_factors_reproduce_law(void **state) {
-  supine_force_law law = supine_physics_force_law_default();
+  supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
   check_factors(*state, &law, 4);
   law = (supine_force_law){.base = 0.3, .gain = 1.7, .box = {0.2, -0.4, 1.1}};
   check_factors(*state, &law, 5);
@@ -139,7 +139,7 @@ static void test_force_box_part_uses_box_coordinates(void **state) {
 static void test_stiffness_soften_follows_height(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  supine_force_law law = supine_physics_force_law_default();
+  supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
   law.soften = 1.3;
   const double g[3] = {0.0, 1.0, 0.0};
   double *e = malloc(n * sizeof *e);
@@ -159,7 +159,7 @@ static void test_directions_box_model_literal_values(void **state) {
   uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
   const supine_mesh mesh = {5, vertices, 6, triangles};
   supine_lungs lungs = {0};
-  const supine_direction_law law = supine_physics_direction_law_default();
+  const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   double d[15];
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   assert_close(lungs.midline, 10.0, 0.0);
@@ -183,7 +183,7 @@ static void test_directions_box_model_literal_values(void **state) {
 static void test_directions_two_lungs_move_outwards(void **state) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
-  const supine_direction_law law = supine_physics_direction_law_default();
+  const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   double *d = malloc(3 * n * sizeof *d);
   assert_int_equal(supine_physics_directions(lungs, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n; ++i) {
@@ -219,11 +219,11 @@ static void test_directions_normal_and_radial_are_outward_units(void **state) {
 static void test_directions_bad_constants_refused(void **state) {
   double d[3];
   supine_error error;
-  supine_direction_law law = supine_physics_direction_law_default();
+  supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[3] = 0.0;
   assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "c4"));
-  law = supine_physics_direction_law_default();
+  law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[4] = NAN;
   assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "c5"));

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "precompute/phantom/phantom.h"
-#include "precompute/physics/force.h"
+#include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 
 #include "lungs_helpers.h"
@@ -294,7 +294,7 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   double *d = malloc(3 * n * sizeof *d);
   double mix[COLUMNS * MIXED];
   uint64_t seed = 44;
-  const supine_direction_law law = supine_physics_direction_law_default();
+  const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);

@@ -64,7 +64,7 @@ static double reach; /* of the bases made from here on; 0: the paper's */
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = band, .modes = modes, .held_out = held_out};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = band, .modes = modes, .held_out = held_out};
   options.model.force.soften = soften;
   options.model.reach = reach;
   supine_precompute_report report;
@@ -110,7 +110,7 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
     double high = -INFINITY;
     supine_sh_grid_direction(grid, d / (2 * LATITUDES), d % (2 * LATITUDES), g);
     assert_int_equal(supine_sh_evaluate(BAND, g, y), SUPINE_OK);
-    assert_int_equal(supine_physics_height_range(&lungs.mesh, 1, g, &low, &high), SUPINE_OK);
+    assert_int_equal(supine_physics_height_range(&lungs, false, 1, g, &low, &high), SUPINE_OK);
     const double weight = grid->weight[d / (2 * LATITUDES)] * M_PI / LATITUDES;
     for (size_t t = 0; t < TERMS; ++t) {
       moments[t][0] -= weight * y[t] * low / (high - low);
@@ -231,7 +231,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   enum { HELD_OUT = 40 };
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, HELD_OUT);
   supine_basis *basis = open_basis();
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double g[3 * HELD_OUT];
   double error2[HELD_OUT];
   double field2[HELD_OUT];
@@ -258,7 +258,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
   const supine_accuracy *stated = &report.accuracy;
   supine_basis *basis = open_basis();
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double g[3 * CHECKED];
   double error2[CHECKED];
   double field2[CHECKED];
@@ -496,7 +496,7 @@ static void test_precompute_turned_over_is_what_the_run_time_turns(void **state)
   (void)state;
   supine_lungs lungs = phantom(3000);
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 7, .modes = 4, .held_out = 20};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 3;
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
@@ -538,7 +538,7 @@ static void test_precompute_interrupted_or_unwritable_leaves_old_file(void **sta
   supine_lungs lungs = phantom(500);
   (void)make_basis(&lungs, 3, 0, 0.0, 0);
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 7, .modes = 16, .progress = stop_halfway};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 16, .progress = stop_halfway};
   supine_error error;
   options.model.force.soften = 0.5;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error),
@@ -559,7 +559,7 @@ static void test_precompute_bad_options_refused(void **state) {
   (void)state;
   supine_lungs lungs = phantom(500);
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 65, .modes = 16};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 65, .modes = 16};
   supine_error error;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.band = 8;

@@ -61,7 +61,7 @@ static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
   const size_t terms = supine_sh_count(BAND);
   supine_projection linear;
   supine_projection sampled;
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.force = (supine_force_law){.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
   double *stiffness = malloc(n * sizeof *stiffness);
   for (size_t i = 0; i < n; ++i) {
@@ -157,7 +157,7 @@ static void test_modes_equal_dense_decomposition(void **state) {
   for (size_t i = 0; i < n; ++i) {
     weight[i] = 1.0 + fabs(lungs->mesh.vertices[3 * i]);
   }
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection;
   assert_int_equal(supine_projection_linear(lungs, &model, 5, &projection, NULL), SUPINE_OK);
   check_modes(&projection, weight, 3);
@@ -180,7 +180,7 @@ static void test_modes_beat_harmonics_of_the_same_number(void **state) {
   for (size_t s = 0; s < 2; ++s) {
     double error[2];
     for (int k = 0; k < 2; ++k) {
-      supine_precompute_options options = {.model = supine_physics_model_default(),
+      supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
                                            .band = k == 0 ? 3 : 15,
                                            .modes = k == 0 ? 0 : 16};
       supine_precompute_report report;

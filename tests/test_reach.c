@@ -46,7 +46,7 @@ static supine_lungs lungs_of(supine_mesh mesh, double reach) {
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
-  model = supine_physics_model_default();
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = reach;
   return lungs;
 }

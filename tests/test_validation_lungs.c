@@ -37,7 +37,7 @@ static void test_displacement_is_linear_in_volume_along_one_direction(void **sta
   assert_true(file >= 0);
   (void)close(file);
   const supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 7, .modes = 16, .held_out = 5};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 16, .held_out = 5};
   supine_precompute_report report;
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   supine_basis *basis = NULL;

@@ -265,7 +265,7 @@ typedef struct ventilation {
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_solution solution = {0};
   double low;
   double high;
@@ -280,7 +280,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     status = supine_volume_scale(solution.cubic, volume, &scale, NULL);
   }
   if (status == SUPINE_OK) {
-    status = supine_physics_height_range(&lungs->mesh, 1, g, &low, &high);
+    status = supine_physics_height_range(lungs, false, 1, g, &low, &high);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
@@ -434,7 +434,7 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
 /* Displacements of a breath [N, 3], mm. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_solution solution = {0};
   double scale = 0.0;
   model.reach = reach;
@@ -457,7 +457,7 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
   supine_equilibrium *equilibrium = NULL;
   double *area = calloc(n + 1, sizeof *area);
   double *column = calloc(n, sizeof *column);
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = reach;
   supine_status status = supine_physics_model_network(lungs, &model, &network);
   if (status == SUPINE_OK) {

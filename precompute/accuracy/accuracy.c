@@ -133,10 +133,12 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Breath scales at which both sides gain `volume`; false where some direction does not reach it. */
+/* Breath scales at which both sides gain a part of their volumes [D]; false where some direction
+ * does not reach it. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
-                        const double *weights, double volume, double *scales) {
+                        const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
+    const double volume = part * volumes[d];
     double cubic[3];
     supine_physics_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
     if (supine_volume_scale(truth->cubic + 3 * d, volume, &scales[2 * d], NULL) != SUPINE_OK ||
@@ -147,17 +149,28 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
   return true;
 }
 
-/* Weights of the modes at every direction: [D, K] = Y [D, P] modes^T. */
+double supine_accuracy_state_volume(const supine_state *state, const double *y) {
+  double volume = state->resting == NULL ? state->volume : 0.0;
+  for (size_t t = 0; state->resting != NULL && t < supine_sh_count(2); ++t) {
+    volume += state->resting[t] * y[t];
+  }
+  return volume;
+}
+
+/* Weights of the modes at every direction, [D, K] = Y [D, P] modes^T, and the state's volumes [D].
+ */
 static supine_status find_weights(const supine_truth *truth, const supine_compression *compression,
-                                  double *weights) {
-  double *y = malloc(supine_sh_count(compression->band) * sizeof *y);
+                                  const supine_state *state, double *weights, double *volumes) {
+  const size_t band = compression->band < 2 ? 2 : compression->band;
+  double *y = malloc(supine_sh_count(band) * sizeof *y);
   if (y == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_status status = SUPINE_OK;
   for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
-    status = supine_sh_evaluate(compression->band, truth->directions + 3 * d, y);
+    status = supine_sh_evaluate(band, truth->directions + 3 * d, y);
     if (status == SUPINE_OK) {
+      volumes[d] = supine_accuracy_state_volume(state, y);
       supine_projection_compression_weights(compression, y, weights + d * compression->mode_count);
     }
   }
@@ -168,14 +181,14 @@ static supine_status find_weights(const supine_truth *truth, const supine_compre
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
-                                      double volume, supine_accuracy *accuracy,
+                                      const supine_state *state, supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
   const size_t n = compression->vertex_count;
   const size_t threads = supine_thread_count();
   const bool closed = forms != NULL && truth->cubic != NULL;
   double *weights = malloc(count * compression->mode_count * sizeof *weights);
-  double *scales = malloc(2 * count * sizeof *scales);
+  double *scales = malloc(3 * count * sizeof *scales);
   tally *tallies = calloc(PARTS, sizeof *tallies);
   turned_block *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
@@ -192,22 +205,24 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
   }
-  status = find_weights(truth, compression, weights);
+  double *volumes = scales == NULL ? NULL : scales + 2 * count;
+  status = find_weights(truth, compression, state, weights, volumes);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "held-out directions: %s", supine_status_string(status));
     goto cleanup;
   }
   if (closed) {
-    made.volume = volume;
-    for (int i = 0; !find_scales(truth, forms, weights, made.volume, scales); ++i) {
+    double part = 1.0;
+    for (int i = 0; !find_scales(truth, forms, weights, volumes, part, scales); ++i) {
       if (i == VOLUME_HALVINGS) {
         status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                   "the lungs do not reach even %g mL before the surface folds",
-                                  made.volume);
+                                  part * volumes[0]);
         goto cleanup;
       }
-      made.volume *= 0.5;
+      part *= 0.5;
     }
+    made.volume = state->resting != NULL ? part : part * state->volume;
   }
   accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
                         tallies, blocks};

@@ -53,7 +53,8 @@ supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs, const s
     status = SUPINE_ERROR_MEMORY;
     goto cleanup;
   }
-  status = supine_physics_height_range(&lungs->mesh, count, made.directions, range, range + count);
+  status = supine_physics_height_range(lungs, model->force.pair, count, made.directions, range,
+                                       range + count);
   for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
     double *row = made.functions + d * projection->rank;
     supine_physics_force_functions(lungs, &model->force, made.directions + 3 * d, range[d],

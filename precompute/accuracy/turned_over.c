@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How much of the surface a breath turns inside out. */
+/* How much of the surface a state turns inside out. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -66,11 +66,11 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
 
 /* Weights for gravity along axis g / 2, forwards or backwards. */
 static supine_status find_posture(search *s, size_t g, const supine_volume_forms *forms,
-                                  double volume, double *harmonics) {
+                                  const supine_state *state, size_t band, double *harmonics) {
   const supine_compression *field = s->field;
   double gravity[3] = {0.0, 0.0, 0.0};
   gravity[g / 2] = g % 2 == 0 ? 1.0 : -1.0;
-  const supine_status status = supine_sh_evaluate(field->band, gravity, harmonics);
+  const supine_status status = supine_sh_evaluate(band, gravity, harmonics);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -79,7 +79,8 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
   double cubic[3];
   double scale = 0.0;
   supine_physics_volume_forms_contract(forms, w, cubic);
-  s->reached[g] = supine_volume_scale(cubic, volume, &scale, NULL) == SUPINE_OK;
+  s->reached[g] = supine_volume_scale(cubic, supine_accuracy_state_volume(state, harmonics), &scale,
+                                      NULL) == SUPINE_OK;
   for (size_t k = 0; k < field->mode_count; ++k) {
     w[k] *= scale;
   }
@@ -88,8 +89,9 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
 
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
-                                          const supine_volume_forms *forms, double volume,
-                                          double *share) {
+                                          const supine_volume_forms *forms,
+                                          const supine_state *state, double *share) {
+  const size_t band = compression->band < 2 ? 2 : compression->band;
   if (compression->mode_count > SUPINE_MODES_MADE_MAX) {
     return SUPINE_ERROR_ARGUMENT;
   }
@@ -99,7 +101,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
   const size_t samples = (mesh->triangle_count + stride - 1) / stride;
   search *s = calloc(1, sizeof *s);
   size_t(*turned)[POSTURES] = calloc(threads, sizeof *turned);
-  double *harmonics = malloc(supine_sh_count(compression->band) * sizeof *harmonics);
+  double *harmonics = malloc(supine_sh_count(band) * sizeof *harmonics);
   supine_status status =
       s == NULL || turned == NULL || harmonics == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
@@ -110,7 +112,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     s->stride = stride;
   }
   for (size_t g = 0; g < POSTURES && status == SUPINE_OK; ++g) {
-    status = find_posture(s, g, forms, volume, harmonics);
+    status = find_posture(s, g, forms, state, band, harmonics);
   }
   if (status == SUPINE_OK) {
     supine_parallel_for(samples, 256, threads, search_range, s);

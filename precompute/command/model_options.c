@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The options that choose the lungs and the model. */
+#include <math.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -7,9 +9,96 @@
 #include "sh/base/parallel.h"
 
 #include "precompute/command/model_options.h"
+#include "runtime/options/posture_list.h"
 
 void supine_command_model_options_begin(supine_model_options *options) {
-  options->model = supine_physics_model_default();
+  options->model = supine_physics_model(SUPINE_LAW_PAPER);
+  options->law_choice = SUPINE_LAW_COUNT;
+  options->resting = supine_reference_resting_default();
+  options->model.reach = options->model.force.base = options->model.force.gain = NAN;
+  options->model.force.box[0] = options->model.direction.c[0] = NAN;
+}
+
+/* The law, under the options of one's own. Full inflation is deep below rest's lungs, a scan at
+ * rest breathes quietly, and a scan that is nothing in particular is the paper's. */
+static void choose_law(supine_model_options *options) {
+  static const supine_law by_scan[] = {[SUPINE_SCAN_NONE] = SUPINE_LAW_PAPER,
+                                       [SUPINE_SCAN_FULL] = SUPINE_LAW_DEEP,
+                                       [SUPINE_SCAN_REST] = SUPINE_LAW_TIDAL,
+                                       [SUPINE_SCAN_VOLUME] = SUPINE_LAW_DEEP};
+  if (!options->has_scan && options->law_choice != SUPINE_LAW_PAPER) {
+    options->scan.kind = SUPINE_SCAN_FULL;
+  }
+  if (options->law_choice == SUPINE_LAW_COUNT) {
+    options->law_choice = by_scan[options->scan.kind];
+  }
+  const supine_model law = supine_physics_model((supine_law)options->law_choice);
+  supine_model *model = &options->model;
+  model->law = law.law;
+  model->force.pair = law.force.pair;
+  model->reach = isnan(model->reach) ? law.reach : model->reach;
+  model->force.base = isnan(model->force.base) ? law.force.base : model->force.base;
+  model->force.gain = isnan(model->force.gain) ? law.force.gain : model->force.gain;
+  if (isnan(model->force.box[0])) {
+    memcpy(model->force.box, law.force.box, sizeof law.force.box);
+  }
+  if (isnan(model->direction.c[0])) {
+    memcpy(model->direction.c, law.direction.c, sizeof law.direction.c);
+  }
+}
+
+/* "supine:rest", "prone:-3000", "full", "none" */
+static int read_scan(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  supine_scan *scan = &options->scan;
+  const char *colon = strrchr(text, ':');
+  const char *state = colon == NULL ? text : colon + 1;
+  options->has_scan = true;
+  if (colon != NULL) {
+    char posture[SUPINE_POSTURE_NAME_MAX];
+    supine_posture_list one;
+    (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
+    const int result = supine_options_posture_list_parse(command, posture, &one);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+    memcpy(scan->gravity, one.item[0].gravity, sizeof scan->gravity);
+  }
+  scan->kind = strcmp(state, "none") == 0   ? SUPINE_SCAN_NONE
+               : strcmp(state, "full") == 0 ? SUPINE_SCAN_FULL
+               : strcmp(state, "rest") == 0 ? SUPINE_SCAN_REST
+                                            : SUPINE_SCAN_VOLUME;
+  if (scan->kind == SUPINE_SCAN_VOLUME &&
+      !(supine_options_parse_number(state, &scan->volume) && scan->volume <= 0.0)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  /* only what is not full needs to say in which posture */
+  return supine_options_fits(colon != NULL || scan->kind <= SUPINE_SCAN_FULL);
+}
+
+/* "supine=0.43,prone=0.47"; anything without an equals sign names a file. */
+static int read_resting(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  supine_error error;
+  char copy[256];
+  (void)snprintf(copy, sizeof copy, "%s", text);
+  if (strchr(text, '=') == NULL) {
+    return supine_reference_resting_load(text, &options->resting, &error) == SUPINE_OK
+               ? SUPINE_EXIT_OK
+               : supine_options_fail(command, &error);
+  }
+  for (char *rest = copy, *piece; (piece = strsep(&rest, ",")) != NULL;) {
+    char *value = strchr(piece, '=');
+    double share = 0.0;
+    if (value == NULL || !supine_options_parse_number(value + 1, &share)) {
+      return SUPINE_OPTION_MISFIT;
+    }
+    *value = '\0';
+    if (supine_reference_resting_set(&options->resting, piece, share, &error) != SUPINE_OK) {
+      return supine_options_usage(command, "--resting: %s", error.message);
+    }
+  }
+  return SUPINE_EXIT_OK;
 }
 
 static int read_units(const char *command, const char *text, void *field) {
@@ -107,7 +196,8 @@ static int read_lung(const char *command, const char *text, void *field) {
   return SUPINE_EXIT_OK;
 }
 
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL};     /* as supine_axes */
+static const char *const laws[] = {"deep", "tidal", "paper", NULL}; /* as supine_law */
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -122,16 +212,39 @@ const supine_option supine_command_model_options[] = {
      "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
      "the inner face of a single lung's",
      FILLS(midline), SUPINE_SAYS_GIVEN(supine_model_options, has_midline), .wants = "an x in mm"},
+    {.help = "The scan and the law:"},
+    {"scanned", 0, "POSTURE:STATE",
+     "what the surfaces show: full (a breath-hold at full inflation, the default; then the posture "
+     "does not matter), POSTURE:rest (the end of a quiet expiration), POSTURE:ML (mL relative to "
+     "full, as supine:-3000), or none (nothing is known: breaths are added to the scan, and "
+     "turning "
+     "alone moves nothing). Lungs have one shape at full inflation in every posture, and all that "
+     "gravity does is below it; from a scan in another state that shape is found first",
+     .read = read_scan,
+     .wants = "full, none, POSTURE:rest or POSTURE:ML with ML at most 0, as supine:-3000"},
+    {"law", 0, "LAW",
+     "deep: how lungs go from full inflation to rest and back (default where the scan is full or "
+     "some mL below); tidal: quiet breaths, mostly the diaphragm's (default for a scan at rest); "
+     "paper: Santhanam 2008 as published, breaths from the scan's own state (implies --scanned "
+     "none). The options below change single constants of it",
+     FILLS(law_choice), .choices = laws},
+    {"resting", 0, "LIST|FILE",
+     "volume at rest as a share of the full one, by posture; default "
+     "left=0.47,right=0.47,supine=0.43,prone=0.47,inverted=0.43,upright=0.53. Name those that "
+     "differ, or a CSV file with the columns posture,share",
+     .read = read_resting, .file = SUPINE_FILE_NONE,
+     .wants = "POSTURE=SHARE,... or a CSV file with the columns posture,share"},
     {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along "
              "gravity (0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the "
              "midline outwards, from the back, from the apex; 0 to 1):"},
-    {"base", 0, "B", "default 0", FILLS(model.force.base)},
-    {"gain", 0, "G", "default 1", FILLS(model.force.gain)},
-    {"box-force", 0, "X,Y,Z", "cx, cy, cz: fixed to the body; default 0,0,0",
+    {"base", 0, "B", "default by the law: deep 0.9, tidal 1.1, paper 0", FILLS(model.force.base)},
+    {"gain", 0, "G", "default: deep and tidal 0.4, paper 1", FILLS(model.force.gain)},
+    {"box-force", 0, "X,Y,Z",
+     "cx, cy, cz: fixed to the body; default: deep 0,-0.2,0, tidal 0,-0.6,0, paper 0,0,0",
      FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ"},
     {"soften", 0, "S",
-     "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. Only then does prone differ "
-     "from supine by more than a change of sign",
+     "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. It hardly tells prone from "
+     "supine: at 1 the even bands carry 0.004 % of the energy",
      FILLS(model.force.soften)},
     {.help = "Direction of displacement:"},
     {"direction", 0, "WHAT",
@@ -141,9 +254,12 @@ const supine_option supine_command_model_options[] = {
      .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
      .file = SUPINE_FILE_IN},
     {"constants", 0, "C1,...,C6",
-     "of the box model; default 2,1.5,1.5,1,16,1.4: rounded from a fit to the 4-D CT landmarks of "
-     "ten patients (DIR-Lab), where the law explains 61 to 87 % of the squared displacement. (The "
-     "paper's own are lost.)",
+     "of the box model; default: deep 6,2.6,15,1,16,1.3, tidal 3,2.5,2.5,2,16,1.2, paper "
+     "2,1.5,1.5,1,16,1.4. Fits to landmarks of ten 4-D CTs (DIR-Lab; of the squared displacement "
+     "of "
+     "a quiet breath tidal explains 62 to 88 %) and of ten full breaths (DIR-Lab COPDgene; deep "
+     "-35 "
+     "to 58 %, median 39). The paper's own are lost",
      FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6"},
     {.help = "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only "
              "ratios count: a = 2 beside a = 1 is twice as expandable, doubling all of them "
@@ -173,8 +289,8 @@ const supine_option supine_command_model_options[] = {
      .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {"reach", 0, "MM",
      "forces spread over this length along the surface, whatever the mesh (about exp(-r/MM)); "
-     "default: over a few links, as in the paper, so that a finer mesh spreads less and may look "
-     "torn: then try 10",
+     "default: deep and tidal 10; paper: over a few links, so that a finer mesh spreads less and "
+     "may look torn",
      FILLS(model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {.name = NULL}};
 
@@ -343,8 +459,69 @@ void supine_command_model_options_free(supine_model_options *options) {
   options->model.lesions = NULL;
 }
 
+/* Adds to a sentence; what does not fit is left out. */
+SUPINE_PRINTF(3, 4)
+static void put(char *text, size_t size, const char *format, ...) {
+  const size_t used = strlen(text);
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(text + used, size - used, format, arguments);
+  va_end(arguments);
+}
+
+/* The frame that all files share. */
+static supine_scan_frame frame_of(const supine_model_options *options,
+                                  const supine_mesh_report *reports, size_t count) {
+  for (size_t i = 1; i < count; ++i) {
+    if (reports[i].axes != reports[0].axes) {
+      return (supine_scan_frame){0};
+    }
+  }
+  const double unit = options->load.millimetres_per_unit;
+  return (supine_scan_frame){reports[0].axes, unit == 0.0 ? 1.0 : unit};
+}
+
+/* What was assumed of the scan, in one line that the user can check. */
+static void say_assumed(supine_model_options *options, const supine_lungs *lungs,
+                        const supine_mesh_report *report) {
+  const supine_reference *reference = &options->reference;
+  const size_t size = sizeof options->assumed;
+  char *text = options->assumed;
+  text[0] = '\0';
+  put(text, size, "%s axes (%s), %g mm a unit", report->axes == SUPINE_AXES_RAS ? "RAS" : "LPS",
+      options->load.axes != SUPINE_AXES_AUTO ? "as told"
+      : report->axes_from_tag                ? "the file's tag"
+                                             : "assumed",
+      options->load.millimetres_per_unit == 0.0 ? 1.0 : options->load.millimetres_per_unit);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    double low = INFINITY;
+    double high = -INFINITY;
+    for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
+      low = fmin(low, lungs->mesh.vertices[3 * i]);
+      high = fmax(high, lungs->mesh.vertices[3 * i]);
+    }
+    put(text, size, "; %s lung at x %.0f to %.0f mm", supine_lungs_name(lungs, lung), low, high);
+  }
+  put(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
+  if (!reference->known) {
+    put(text, size, "taken as the reference of every posture");
+    return;
+  }
+  if (reference->scan.kind == SUPINE_SCAN_FULL) {
+    put(text, size, "at full inflation, %.0f mL", reference->full_volume);
+  } else {
+    const double *g = reference->scan.gravity;
+    put(text, size, "%s%.0f mL below full (%.0f mL), gravity along %.3g,%.3g,%.3g",
+        reference->scan.kind == SUPINE_SCAN_REST ? "at rest, " : "", -reference->scan_volume,
+        reference->full_volume, g[0], g[1], g[2]);
+  }
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const double share = supine_reference_along_axes(reference->resting.share, supine);
+  put(text, size, "; rest supine %.0f mL", share * reference->full_volume);
+}
+
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
-                              size_t count, supine_lungs *lungs) {
+                              size_t count, bool keep, supine_lungs *lungs) {
   int result = SUPINE_EXIT_OK;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   load_work work = {&options->load, paths, calloc(count, sizeof(supine_mesh)),
@@ -379,12 +556,21 @@ int supine_command_model_load(supine_model_options *options, const char *command
                        lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
                        lungs->topology.inconsistent_edges);
   }
+  choose_law(options);
+  if (keep) {
+    options->scan.kind = SUPINE_SCAN_NONE;
+  }
   if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||
-      set_shares(options, lungs, &error) != SUPINE_OK) {
+      set_shares(options, lungs, &error) != SUPINE_OK ||
+      supine_reference_find(lungs, &options->model, &options->scan, &options->resting,
+                            &options->reference, &error) != SUPINE_OK) {
     result = supine_options_fail(command, &error);
+    goto cleanup;
   }
+  options->frame = frame_of(options, work.reports, count);
+  say_assumed(options, lungs, &work.reports[0]);
 cleanup:
   for (size_t i = 0; work.meshes != NULL && i < count; ++i) {
     supine_mesh_free(&work.meshes[i]);

@@ -20,7 +20,14 @@ typedef struct supine_model_options {
   supine_mesh_load_options load;
   bool has_midline;
   double midline;
-  supine_model model;
+  int law_choice;     /* as supine_law, or SUPINE_LAW_COUNT: by the scan's state */
+  supine_model model; /* until loading, NAN where no option of its own says what */
+  supine_scan scan;
+  bool has_scan;
+  supine_resting resting;
+  supine_reference reference; /* what loading found */
+  char assumed[512];          /* likewise, in a sentence */
+  supine_scan_frame frame;
   const char *expandability; /* a file, or NULL: the law */
   supine_expandability_law law;
   size_t lesion_count;
@@ -36,9 +43,10 @@ typedef struct supine_model_options {
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Loads the surfaces (all at once), says on stderr what was found that the user should know, joins
- * them, and sets the model's stiffness and the lungs' diseases; an exit code. */
+ * them, sets the model's law, stiffness and diseases, and takes the lungs to full inflation; an
+ * exit code. `keep`: the surface is the reference as it stands, whatever the options say. */
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
-                              size_t count, supine_lungs *lungs);
+                              size_t count, bool keep, supine_lungs *lungs);
 
 /* Releases what supine_command_model_load allocated. */
 void supine_command_model_options_free(supine_model_options *options);

@@ -17,8 +17,8 @@ static const supine_option table[] = {
      .required = true, .file = SUPINE_FILE_OUT, .endings = ".ply, .obj, .stl or .vtp"},
     {"vertices", 0, "N", "about so many in all, up to 20 million", SUPINE_FILLS(request, vertices),
      .standard = "20000"},
-    {"volume", 0, "ML", "volume of both lungs together, a supine adult's at rest",
-     SUPINE_FILLS(request, volume), .standard = "2500", .wants = "millilitres"},
+    {"volume", 0, "ML", "volume of both lungs together, an adult's at full inflation",
+     SUPINE_FILLS(request, volume), .standard = "6000", .wants = "millilitres"},
     {.name = NULL}};
 
 static int run(void *chosen, const supine_arguments *given) {

@@ -77,26 +77,34 @@ static void report_result(const char *path, const supine_lungs *lungs,
                           const supine_precompute_options *options,
                           const supine_precompute_report *report) {
   const supine_accuracy *accuracy = &report->accuracy;
+  char state[48];
+  if (!options->reference->known) {
+    (void)snprintf(state, sizeof state, "%g mL", accuracy->volume);
+  } else if (accuracy->volume == 1.0) {
+    (void)snprintf(state, sizeof state, "rest");
+  } else {
+    (void)snprintf(state, sizeof state, "%g of the way to rest", accuracy->volume);
+  }
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s\n", path,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
                options->band, report->mode_count, options->modes == 0 ? "harmonics" : "modes");
+  (void)printf("assumed: %s\n", options->assumed);
   (void)printf("error against the full solve, on %zu directions that no grid used:\n"
                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, 100.0 * accuracy->relative_rms,
                100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
   if (accuracy->volume > 0.0) {
-    (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %g mL\n",
-                 accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, accuracy->volume);
+    (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %s\n",
+                 accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
   }
   if (report->turned_over > turned_over_limit) {
-    (void)printf(
-        "the surface looks torn: %.3g %% of its triangles turn over at %g mL in the worst of "
-        "six\npostures. %s\n",
-        100.0 * report->turned_over, accuracy->volume,
-        options->model.reach == 0.0
-            ? "The paper's forces spread over a few links, however short they are;\n"
-              "--reach 10 spreads them over 10 mm and leaves next to none"
-            : "A longer --reach spreads forces further");
+    (void)printf("the surface looks torn: %.3g %% of its triangles turn over at %s in the worst of "
+                 "six\npostures. %s\n",
+                 100.0 * report->turned_over, state,
+                 options->model.reach == 0.0
+                     ? "The paper's forces spread over a few links, however short they are;\n"
+                       "--reach 10 spreads them over 10 mm and leaves next to none"
+                     : "A longer --reach spreads forces further");
   }
 }
 
@@ -176,7 +184,10 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   supine_precompute_report report;
   supine_error error;
   wanted->basis.model = wanted->model.model;
+  wanted->basis.reference = &wanted->model.reference;
   wanted->basis.made_by = made_by;
+  wanted->basis.assumed = wanted->model.assumed;
+  wanted->basis.frame = wanted->model.frame;
   wanted->basis.progress = supine_options_progress_step;
   wanted->basis.progress_context = &progress;
   supine_options_signals_catch(true);
@@ -241,7 +252,8 @@ static int run(void *chosen, const supine_arguments *given) {
   }
   int result = wanted->fields != NULL ? check_fields(wanted->fields, wanted->path) : SUPINE_EXIT_OK;
   if (result == SUPINE_EXIT_OK) {
-    result = supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
+                                       wanted->fields != NULL, &lungs);
   }
   if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
       take_patient(&lungs, wanted, &text, &error) != SUPINE_OK) {

@@ -10,6 +10,7 @@
 
 #include "precompute/command/model_options.h"
 #include "runtime/options/orientation.h"
+#include "runtime/options/volume.h"
 
 static const char name[] = "solve";
 
@@ -17,20 +18,22 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  bool has_volume, has_scale, has_vertex;
-  double volume, scale;
+  const char *volume; /* as given, or NULL */
+  bool has_scale, has_vertex;
+  double scale;
   size_t vertex;
 } request;
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
-    {"volume", 0, "ML", "air above the resting volume, both lungs together; may be negative",
-     SUPINE_FILLS(request, volume), SUPINE_SAYS_GIVEN(request, has_volume), .wants = "millilitres",
-     .rivals = "breath"},
+    {"volume", 0, "VOLUME",
+     "rest (default: the end of a quiet expiration in that posture), full, rest+500, rest-200, or "
+     "a number: mL relative to the scan, all lungs together",
+     SUPINE_FILLS(request, volume), .rivals = "breath"},
     {"scale", 0, "MM",
-     "largest displacement instead, mm; negative: the other way. Default: F d as it is, F what a "
-     "vertex catches of the force, d in mm",
+     "largest displacement instead, mm; negative: the other way. Default where no rest is known: F "
+     "d as it is, F what a vertex catches of the force, d in mm",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
     {"unit-force", 0, "VERTEX",
@@ -79,6 +82,67 @@ cleanup:
   return status;
 }
 
+/* The breath scale at which lungs rest: that of the pair, healthy (see precompute/rest.h). */
+static supine_status resting_scale(const supine_lungs *lungs, const request *wanted,
+                                   const double g[3], double *scale, supine_error *error) {
+  const supine_reference *reference = &wanted->model.reference;
+  const bool alone = lungs->lung_count == 1;
+  supine_model healthy = wanted->model.model;
+  double cubic[3] = {0.0, 0.0, 0.0};
+  supine_status status = SUPINE_OK;
+  healthy.share[0] = healthy.share[1] = 1.0;
+  for (int image = 0; image < (alone ? 2 : 1) && status == SUPINE_OK; ++image) {
+    const double seen[3] = {image == 0 ? g[0] : -g[0], g[1], g[2]};
+    supine_solution solution = {0};
+    status = supine_physics_solve(lungs, &healthy, seen, &solution, error);
+    for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
+      cubic[i] += solution.cubic[i];
+    }
+    supine_physics_solution_free(&solution);
+  }
+  const double share = supine_reference_along_axes(reference->resting.share, g);
+  return status == SUPINE_OK
+             ? supine_volume_scale(cubic,
+                                   (share - 1.0) * (alone ? 2.0 : 1.0) * reference->full_volume,
+                                   scale, error)
+             : status;
+}
+
+/* The breath scale that was asked for, or 1. */
+static supine_status find_scale(const supine_lungs *lungs, const request *wanted, const double g[3],
+                                const supine_solution *solution, double *scale,
+                                supine_error *error) {
+  const supine_reference *reference = &wanted->model.reference;
+  supine_volume volume = {SUPINE_VOLUME_REST, 0.0};
+  *scale = 1.0;
+  if (wanted->has_scale) {
+    const double largest = supine_physics_solution_largest(solution);
+    *scale = wanted->scale / largest;
+    return largest > 0.0
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
+  }
+  if (wanted->volume == NULL && !reference->known) {
+    return SUPINE_OK;
+  }
+  if (!solution->has_volume) {
+    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                            "--volume needs a closed surface: close it, or give --scale");
+  }
+  if (wanted->volume != NULL) {
+    (void)supine_options_volume_parse(wanted->volume, &volume);
+  }
+  double state = volume.from == SUPINE_VOLUME_SCAN ? reference->scan_volume : 0.0;
+  if (volume.from == SUPINE_VOLUME_REST && reference->known) {
+    const supine_status status = resting_scale(lungs, wanted, g, scale, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    state = supine_volume_at(solution->cubic, *scale);
+  }
+  return supine_volume_scale(solution->cubic, state + volume.offset, scale, error);
+}
+
 static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
                                     const double g[3], supine_error *error) {
   supine_solution solution = {0};
@@ -91,23 +155,10 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  if (wanted->has_volume) {
-    if (!solution.has_volume) {
-      status = supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "--volume needs a closed surface: close it, or give --scale");
-      goto cleanup;
-    }
-    status = supine_volume_scale(solution.cubic, wanted->volume, &scale, error);
-    if (status != SUPINE_OK) {
-      goto cleanup;
-    }
-  }
-  const double largest = supine_physics_solution_largest(&solution);
-  if (wanted->has_scale && !(largest > 0.0)) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
+  status = find_scale(lungs, wanted, g, &solution, &scale, error);
+  if (status != SUPINE_OK) {
     goto cleanup;
   }
-  scale = wanted->has_scale ? wanted->scale / largest : scale;
   deformed.vertices = malloc(3 * deformed.vertex_count * sizeof(double));
   rest.vertices = malloc(3 * rest.vertex_count * sizeof(double));
   if (deformed.vertices == NULL || rest.vertices == NULL) {
@@ -121,7 +172,8 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
-                 wanted->path, g[0], g[1], g[2], scale, fabs(scale) * largest);
+                 wanted->path, g[0], g[1], g[2], scale,
+                 fabs(scale) * supine_physics_solution_largest(&solution));
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",
                    1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
@@ -149,11 +201,18 @@ static int run(void *chosen, const supine_arguments *given) {
     return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
                                 wanted->path);
   }
+  supine_volume volume;
+  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
+    return supine_options_usage(
+        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
+        wanted->volume);
+  }
   if (!wanted->has_vertex) {
     result = supine_options_orientation_finish(&wanted->orientation, name, g);
   }
   if (result == SUPINE_EXIT_OK) {
-    result = supine_command_model_load(&wanted->model, name, given->operand, given->count, &lungs);
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
+                                       wanted->has_vertex, &lungs);
   }
   if (result == SUPINE_EXIT_OK) {
     supine_error error;

@@ -5,10 +5,6 @@
 
 #include "precompute/physics/force.h"
 
-supine_direction_law supine_physics_direction_law_default(void) {
-  return (supine_direction_law){SUPINE_DIRECTION_BOX, {2.0, 1.5, 1.5, 1.0, 16.0, 1.4}, NULL};
-}
-
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
   double box[3];
   supine_lungs_box_coordinates(lungs, vertex, box);

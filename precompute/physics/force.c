@@ -7,10 +7,6 @@
 
 #include "precompute/physics/network.h"
 
-supine_force_law supine_physics_force_law_default(void) {
-  return (supine_force_law){.gain = 1.0};
-}
-
 static bool has_fixed_part(const supine_force_law *law) {
   return law->box[0] != 0.0 || law->box[1] != 0.0 || law->box[2] != 0.0;
 }

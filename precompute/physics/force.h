@@ -17,21 +17,21 @@
 extern "C" {
 #endif
 
-/** Constants of the law. The default is base 0, gain 1, the rest 0: (18) with its supine c8 turning
- * with gravity. */
+/** Constants of the law. */
 typedef struct supine_force_law {
   double base;
-  double gain;
+  double gain;   /**< the part that turns with gravity */
   double box[3]; /**< cx, cy, cz: fixed to the body */
   double soften; /**< how much softer dependent tissue is; not 0 breaks the linear route */
+  bool pair;     /**< a lung alone has the heights of the pair that it and its mirror image in the
+                      midline make, so that it moves as beside its fellow; false: its own */
 } supine_force_law;
-
-supine_force_law supine_physics_force_law_default(void);
 
 /** min and max over the vertices of g.p for `count` directions [count, 3] into minimum [count] and
  * maximum [count], mm. Uses all cores.
+ * @param pair  of a lung alone, those of the pair (supine_force_law)
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
+supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
                                           const double *directions, double *minimum,
                                           double *maximum);
 
@@ -69,18 +69,12 @@ typedef enum supine_direction_model {
   SUPINE_DIRECTION_VECTORS  /**< whatever the caller says, mm */
 } supine_direction_model;
 
-/** The model and the constants c1 to c6 of the box model.
- *
- * The paper's Table I, which held its constants, is lost. The defaults
- * (2.0, 1.5, 1.5, 1.0, 16.0, 1.4) are rounded from a fit of this law to the public 4-D CT landmarks
- * of ten patients (DIR-Lab), where it explains 61 to 87 % of the squared displacement. */
+/** The model and the constants c1 to c6 of the box model (model.h has three sets of them). */
 typedef struct supine_direction_law {
   supine_direction_model model;
   double c[6];
   const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; the caller's */
 } supine_direction_law;
-
-supine_direction_law supine_physics_direction_law_default(void);
 
 /** Reads vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each of
  * `count` vertices in the model's order, into vectors [count, 3].

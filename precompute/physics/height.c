@@ -114,9 +114,8 @@ static void sort_vertices(const supine_mesh *mesh, size_t *begin, double *sorted
   }
 }
 
-supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
-                                          const double *directions, double *minimum,
-                                          double *maximum) {
+static supine_status range_of(const supine_mesh *mesh, size_t count, const double *directions,
+                              double *minimum, double *maximum) {
   const size_t box_count = (mesh->vertex_count + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
   double *sorted = malloc((3 * mesh->vertex_count + 1) * sizeof *sorted);
@@ -135,4 +134,36 @@ supine_status supine_physics_height_range(const supine_mesh *mesh, size_t count,
   free(sorted);
   free(begin);
   return status;
+}
+
+/* With the mirror image too: that of p in the plane x = m has the height g'.p + 2 m g_x, where g'
+ * is the mirror image of g. */
+static supine_status pair_range(const supine_lungs *lungs, size_t count, const double *directions,
+                                double *minimum, double *maximum) {
+  double *mirrored = malloc(5 * count * sizeof *mirrored);
+  if (mirrored == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  double *low = mirrored + 3 * count;
+  double *high = mirrored + 4 * count;
+  for (size_t i = 0; i < 3 * count; ++i) {
+    mirrored[i] = i % 3 == 0 ? -directions[i] : directions[i];
+  }
+  const supine_status status = range_of(&lungs->mesh, count, mirrored, low, high);
+  for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
+    const double shift = 2.0 * lungs->midline * directions[3 * d];
+    minimum[d] = fmin(minimum[d], low[d] + shift);
+    maximum[d] = fmax(maximum[d], high[d] + shift);
+  }
+  free(mirrored);
+  return status;
+}
+
+supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
+                                          const double *directions, double *minimum,
+                                          double *maximum) {
+  const supine_status status = range_of(&lungs->mesh, count, directions, minimum, maximum);
+  return status == SUPINE_OK && pair && lungs->lung_count == 1
+             ? pair_range(lungs, count, directions, minimum, maximum)
+             : status;
 }

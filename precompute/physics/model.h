@@ -11,9 +11,31 @@
 extern "C" {
 #endif
 
+/** Laws by name: a set of constants each (DESIGN tables what of measured motion they explain).
+ *
+ *     law    base  gain  cx,cy,cz   c1..c6                    reach  moves
+ *     deep   0.9   0.4   0,-0.2,0   6, 2.6, 15, 1, 16, 1.3    10 mm  all three ways, as a breath
+ * from rest to full inflation does tidal  1.1   0.4   0,-0.6,0   3, 2.5, 2.5, 2, 16, 1.2   10 mm
+ * with the diaphragm, as a quiet breath does paper  0     1     0,0,0      2, 1.5, 1.5, 1, 16, 1.4
+ * links  [Santhanam2008]: (18) alone, its c8 turning with gravity
+ *
+ * The paper's own constants (Table I) are lost: c1..c6 of `paper` and `tidal` are fits to the 4-D
+ * CT landmarks of ten patients (DIR-Lab), those of `deep` to full breaths of ten more (DIR-Lab
+ * COPDgene). In the posture of those scans, supine, h = 1 - Y: base, cy and gain cannot be told
+ * apart there. What of the gradient turns with gravity, 0.4 of a mean of 1, is Milic-Emili's (J
+ * Appl Physiol 1966): at rest the lowest lung lies about 1.5 times as far below its full size as
+ * the uppermost. */
+typedef enum supine_law {
+  SUPINE_LAW_DEEP,
+  SUPINE_LAW_TIDAL,
+  SUPINE_LAW_PAPER,
+  SUPINE_LAW_COUNT
+} supine_law;
+
 /** The physical model of one basis or one solve: all that is not geometry. Arrays are the caller's.
  */
 typedef struct supine_model {
+  supine_law law; /**< that the constants were taken from */
   supine_force_law force;
   supine_direction_law direction;
   const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
@@ -24,7 +46,11 @@ typedef struct supine_model {
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
 } supine_model;
 
-supine_model supine_physics_model_default(void);
+/** The model of healthy lungs of even stiffness under a law. */
+supine_model supine_physics_model(supine_law law);
+
+/** "deep", "tidal", "paper". */
+const char *supine_physics_law_name(supine_law law);
 
 /** The network of lungs with the model's lesions and reach: what solves are set up with.
  * @retval SUPINE_ERROR_MEMORY */

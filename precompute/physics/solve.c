@@ -7,12 +7,6 @@
 #include "precompute/physics/volume_forms.h"
 #include "precompute/tissue/disease.h"
 
-supine_model supine_physics_model_default(void) {
-  return (supine_model){.force = supine_physics_force_law_default(),
-                        .direction = supine_physics_direction_law_default(),
-                        .share = {1.0, 1.0}};
-}
-
 void supine_physics_solution_free(supine_solution *solution) {
   free(solution->catch_);
   free(solution->directions);
@@ -36,7 +30,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
       supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
       supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
-      supine_physics_height_range(&lungs->mesh, 1, g, &minimum, &maximum) != SUPINE_OK) {
+      supine_physics_height_range(lungs, model->force.pair, 1, g, &minimum, &maximum) !=
+          SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }

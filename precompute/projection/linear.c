@@ -39,7 +39,7 @@ static supine_status project_functions(const supine_lungs *lungs, const supine_f
   for (size_t d = 0; d < count; ++d) {
     supine_sh_grid_direction(grid, d / grid->longitudes, d % grid->longitudes, directions + 3 * d);
   }
-  status = supine_physics_height_range(&lungs->mesh, count, directions, minimum, maximum);
+  status = supine_physics_height_range(lungs, law->pair, count, directions, minimum, maximum);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

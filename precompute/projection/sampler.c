@@ -220,8 +220,9 @@ supine_status supine_projection_sampler_solve(supine_sampler *sampler, size_t co
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there is no sampler");
   }
   double *range = malloc((2 * count + 1) * sizeof *range);
-  if (range == NULL || supine_physics_height_range(&sampler->lungs->mesh, count, directions, range,
-                                                   range + count) != SUPINE_OK) {
+  if (range == NULL ||
+      supine_physics_height_range(sampler->lungs, sampler->model->force.pair, count, directions,
+                                  range, range + count) != SUPINE_OK) {
     free(range);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu directions", count);
   }

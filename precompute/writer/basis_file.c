@@ -52,13 +52,13 @@ static void entries_free(entries *list) {
   free(list->metadata);
 }
 
-static void add_accuracy(entries *list, const supine_accuracy *accuracy) {
+static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at_rest) {
   add(list, "error_directions", "%zu", accuracy->direction_count);
   add(list, "error_rms_percent", "%.6g", 100.0 * accuracy->relative_rms);
   add(list, "error_p95_percent", "%.6g", 100.0 * accuracy->relative_p95);
   add(list, "error_max_percent", "%.6g", 100.0 * accuracy->relative_max);
   if (accuracy->volume > 0.0) {
-    add(list, "error_volume_ml", "%.6g", accuracy->volume);
+    add(list, at_rest ? "error_rest_part" : "error_volume_ml", "%.6g", accuracy->volume);
   }
   if (accuracy->rms_mm > 0.0) {
     add(list, "error_rms_mm", "%.6g", accuracy->rms_mm);
@@ -84,6 +84,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
   const double *c = model->direction.c;
+  add(list, "law", "%s", supine_physics_law_name(model->law));
   add(list, "midline_mm", "%.9g", lungs->midline);
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);
@@ -99,6 +100,21 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   if (model->reach > 0.0) {
     add(list, "reach_mm", "%.9g", model->reach);
   }
+}
+
+/* Where volumes count from, and what was assumed of the scan. */
+static void add_reference(entries *list, const supine_reference *reference) {
+  static const char *const kinds[] = {"none", "full", "rest", "volume"};
+  const double *g = reference->scan.gravity;
+  const double *share = reference->resting.share;
+  add(list, "scanned", "%s", kinds[reference->scan.kind]);
+  if (reference->scan.kind > SUPINE_SCAN_FULL) {
+    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  }
+  add(list, "scan_volume_ml", "%.9g", reference->scan_volume);
+  add(list, "full_volume_ml", "%.9g", reference->full_volume);
+  add(list, "resting_shares", "left=%g,right=%g,supine=%g,prone=%g,inverted=%g,upright=%g",
+      share[0], share[1], share[2], share[3], share[4], share[5]);
 }
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
@@ -125,7 +141,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
       used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
                        1e-3 * share[lung] * supine_mesh_volume(&part));
     }
-    add(list, "rest_volume_ml", "%s", text);
+    add(list, "reference_volume_ml", "%s", text);
   }
   if (share[0] != 1.0 || share[1] != 1.0) {
     if (lungs->lung_count == 2) {
@@ -165,7 +181,7 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                           .linear = forms != NULL ? forms->linear : NULL,
                                           .quadratic = forms != NULL ? forms->quadratic : NULL,
                                           .cubic = forms != NULL ? forms->cubic : NULL,
-                                          .resting = NULL};
+                                          .resting = content->resting};
   return supine_normals_modes_create(&surface, normals, error);
 }
 
@@ -225,16 +241,26 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (content->model != NULL) {
     add_model(&list, lungs, content->model);
   }
+  if (content->reference != NULL) {
+    add_reference(&list, content->reference);
+  }
   if (content->fit != NULL) {
     add_fit(&list, content->fit);
   }
-  add_accuracy(&list, content->accuracy);
+  add_accuracy(&list, content->accuracy, content->reference != NULL);
   if (content->turned_over != NULL) {
     add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
   if (content->patient != NULL) {
     add(&list, "patient_law", "%s", content->patient);
     add(&list, "patient", "%s", content->patient_summary);
+  }
+  if (content->assumed != NULL) {
+    add(&list, "assumed", "%s", content->assumed);
+  }
+  if (content->frame.millimetres_per_unit > 0.0) {
+    add(&list, "scan_axes", "%s", content->frame.axes == SUPINE_AXES_RAS ? "RAS" : "LPS");
+    add(&list, "scan_unit_mm", "%.17g", content->frame.millimetres_per_unit);
   }
   status = find_normals(content, vertices, directions, &normals, error);
   if (status != SUPINE_OK) {
@@ -246,7 +272,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
     goto cleanup;
   }
-  supine_tensor tensors[13] = {
+  supine_tensor tensors[14] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
@@ -267,6 +293,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
         (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, content->forms->quadratic};
     tensors[count++] =
         (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
+  }
+  if (content->resting != NULL) {
+    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, content->resting};
   }
   if (content->table != NULL) {
     const supine_error_table *table = content->table;

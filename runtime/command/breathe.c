@@ -60,10 +60,10 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
     {"turn", 0, "FROM:TO:SECONDS",
      "turns gravity from one posture to another at constant speed, as supine:left:10s; to the "
-     "opposite posture over the left side",
+     "opposite posture over the left side. Rest turns with it",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
-    {"tidal", 0, "ML", "air of a breath above rest, both lungs together; default 500",
+    {"tidal", 0, "ML", "air of a breath above the posture's rest, both lungs together; default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
@@ -129,13 +129,14 @@ static int compare(const void *a, const void *b) {
 
 /* What the frames' own surfaces enclose, against what was asked. */
 typedef struct gauge {
-  supine_mesh mesh; /* shares the rest surface's triangles */
-  double rest;      /* mL */
-  double peak, worst;
+  supine_mesh mesh;          /* shares the rest surface's triangles */
+  double rest;               /* mL */
+  double least, peak, worst; /* mL beyond the file's surface */
 } gauge;
 
 static supine_status gauge_begin(const supine_mesh *rest, gauge *g) {
-  *g = (gauge){.mesh = *rest, .rest = 1e-3 * supine_mesh_volume(rest)};
+  *g = (gauge){
+      .mesh = *rest, .rest = 1e-3 * supine_mesh_volume(rest), .least = INFINITY, .peak = -INFINITY};
   g->mesh.vertices = malloc(3 * rest->vertex_count * sizeof *g->mesh.vertices);
   return g->mesh.vertices != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
@@ -146,6 +147,7 @@ static void gauge_frame(gauge *g, const float *xyz, double wanted) {
   }
   const double gained = 1e-3 * supine_mesh_volume(&g->mesh) - g->rest;
   g->peak = fmax(g->peak, gained);
+  g->least = fmin(g->least, gained);
   g->worst = fmax(g->worst, fabs(gained - wanted));
 }
 
@@ -154,10 +156,10 @@ static void report(const request *wanted, const breath_course *course, const bre
   qsort(seconds, course->count, sizeof *seconds, compare);
   const double median = seconds[course->count / 2];
   const double most = seconds[course->count - 1];
-  (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces grow by up to %.2f mL, each "
+  (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces hold %.2f to %.2f mL, each "
                "within %.2g mL of its volume\n",
                wanted->path, course->count, course->time[course->count - 1], wanted->fps,
-               measured->peak, measured->worst);
+               measured->rest + measured->least, measured->rest + measured->peak, measured->worst);
   if (course->fixed) {
     (void)printf("one posture: %zu of the frames by three additions a vertex\n",
                  supine_breath_frames_stepped(frames));
@@ -207,6 +209,12 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   if (status == SUPINE_OK) {
     status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
                                          info->lung_count, &course, error);
+  }
+  for (size_t t = 0; status == SUPINE_OK && t < count;
+       ++t) { /* a breath begins at its posture's rest */
+    double at_rest = 0.0;
+    (void)supine_basis_resting_volume(basis, course.gravity + 3 * t, &at_rest);
+    course.volume[t] += at_rest;
   }
   if (status == SUPINE_OK) {
     status = supine_breath_frames_create(basis, &course, &frames, error);

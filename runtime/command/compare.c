@@ -5,7 +5,7 @@
 #include "sh/base/output.h"
 
 #include "runtime/command/compare_content.h"
-#include "runtime/options/basis_input.h"
+#include "runtime/options/volume.h"
 #include "runtime/report/comparison.h"
 
 static const char name[] = "compare";
@@ -32,15 +32,20 @@ typedef struct request {
   const char *html;
   bool json;
   bool by_rms;
-  double volume; /* mL */
-  double rms;    /* mm */
+  const char *volume; /* as given, or NULL */
+  double breath;      /* mL */
+  double rms;         /* mm */
 } request;
 
 static const supine_option table[] = {
     {"postures", 0, "LIST", "which to compare", SUPINE_FILLS(request, postures),
      .standard = "supine,prone,left,right"},
-    {"volume", 0, "ML", "air above the resting volume, the same in every posture",
-     SUPINE_FILLS(request, volume), .standard = "500", .wants = "millilitres", .rivals = "breath"},
+    {"volume", 0, "VOLUME", "in every posture: " SUPINE_VOLUME_HELP, SUPINE_FILLS(request, volume),
+     .rivals = "breath"},
+    {"breath", 0, "ML",
+     "air added to that volume, to see which heights ventilate (where rest is known; elsewhere the "
+     "breath is --volume itself)",
+     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
     {"rms", 0, "MM",
      "root-mean-square displacement in every posture instead: for open surfaces, which have no "
      "volume",
@@ -55,12 +60,24 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 static int compare(const char *path, const supine_basis *basis, const request *wanted) {
-  supine_comparison comparison = {
-      .path = path,
-      .basis = basis,
-      .inflation = {wanted->by_rms ? SUPINE_INFLATION_RMS : SUPINE_INFLATION_VOLUME,
-                    wanted->by_rms ? wanted->rms : wanted->volume}};
+  supine_comparison comparison = {.path = path,
+                                  .basis = basis,
+                                  .inflation = {SUPINE_INFLATION_RMS, wanted->rms},
+                                  .breath = wanted->breath};
+  supine_volume volume = supine_options_volume_default(basis);
   supine_error error;
+  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
+    return supine_options_usage(
+        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
+        wanted->volume);
+  }
+  if (!wanted->by_rms && volume.from == SUPINE_VOLUME_REST) {
+    comparison.inflation = (supine_inflation){SUPINE_INFLATION_REST, volume.offset};
+  } else if (!wanted->by_rms) {
+    static const double anywhere[3] = {0.0, 1.0, 0.0}; /* full and the scan do not turn */
+    comparison.inflation = (supine_inflation){SUPINE_INFLATION_VOLUME,
+                                              supine_options_volume_of(basis, &volume, anywhere)};
+  }
   int result = supine_options_posture_list_parse(name, wanted->postures, &comparison.postures);
   if (result != SUPINE_EXIT_OK) {
     return result;
@@ -77,8 +94,8 @@ static int compare(const char *path, const supine_basis *basis, const request *w
       return supine_options_usage(name,
                                   "what is inside has no surface: -o and --rms are for lungs");
     }
-    return supine_command_compare_content(name, basis, &comparison.postures, wanted->volume,
-                                          wanted->json, wanted->csv);
+    return supine_command_compare_content(name, basis, &comparison.postures, &volume, wanted->json,
+                                          wanted->csv);
   }
   if (supine_report_find(&comparison, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
@@ -118,16 +135,18 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_compare = {
     name,
     "how far postures differ, and who ventilates where",
-    .usage = "BASIS [--postures LIST] [--volume ML] [-o report.html] [OPTIONS]",
+    .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about =
         "Says how far the lungs move in each posture and between every two, how much each lung "
-        "gains, and which heights ventilate; then searches all directions of gravity for the two "
-        "that differ most and for the one that is farthest from supine. Of what is inside ('supine "
-        "embed') it says how far each named part moves between every two postures, and where to.",
+        "holds, and which heights ventilate in a breath; then searches all directions of gravity "
+        "for the two that differ most and for the one that is farthest from supine. Of what is "
+        "inside ('supine embed') it says how far each named part moves between every two postures, "
+        "and where to.",
     .options = table,
     .notes =
         "Averages are over the surface's area; 95 % of the area moves no farther than the number "
-        "under '95 %'. Ventilation by height: the lungs at rest are cut into ten slabs of equal "
+        "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
+        "equal "
         "thickness across gravity. What the tissue of a slab gains is the volume that its part of "
         "the surface sweeps, plus what crosses its lower cut, less what crosses its upper one; a "
         "cut's motion is the plane fitted to its outline's. The slabs' gains sum to the volume "
@@ -137,7 +156,7 @@ const supine_command supine_command_compare = {
         "\n"
         "Examples:\n"
         "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
-        "  supine compare lungs.safetensors --volume 800 -o report.html",
+        "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

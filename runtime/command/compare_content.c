@@ -143,8 +143,8 @@ static supine_status write_all(const comparison *c, bool json, const char *csv,
 }
 
 int supine_command_compare_content(const char *command, const supine_basis *basis,
-                                   const supine_posture_list *postures, double volume, bool json,
-                                   const char *csv) {
+                                   const supine_posture_list *postures, const supine_volume *volume,
+                                   bool json, const char *csv) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   comparison c = {.postures = postures};
   supine_error error;
@@ -158,8 +158,9 @@ int supine_command_compare_content(const char *command, const supine_basis *basi
     status = supine_error_set(&error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
   }
   for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
-    status = find_moves(basis, postures->item[i].gravity, volume, &c.names, step,
-                        c.moves + 3 * i * c.names.count, &error);
+    status = find_moves(basis, postures->item[i].gravity,
+                        supine_options_volume_of(basis, volume, postures->item[i].gravity),
+                        &c.names, step, c.moves + 3 * i * c.names.count, &error);
   }
   if (status == SUPINE_OK) {
     status = write_all(&c, json, csv, &error);

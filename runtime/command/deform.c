@@ -10,13 +10,14 @@
 #include "runtime/command/deform_content.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
+#include "runtime/options/volume.h"
 
 static const char name[] = "deform";
 
 typedef struct request {
   supine_orientation orientation;
-  const char *volume; /* as given, or NULL */
-  bool has_scale;
+  supine_volume_options volume;
+  bool has_scale, as_scanned;
   double scale;
   supine_deform_content content;
 } request;
@@ -27,13 +28,13 @@ static const supine_option table[] = {
      ".csv, images into .nrrd, .nii or .nii.gz",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
      .endings = ".ply, .obj, .stl, .vtp, .csv, .nrrd, .nii or .nii.gz"},
-    {"volume", 0, "ML",
-     "air above the resting volume, both lungs together: the surface grows by exactly that; may "
-     "be negative; default 500\nleft=ML,right=ML: lung by lung",
-     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
+    {"as-scanned", 0, NULL,
+     "in the axes and units that the scan came in, to lie on top of it; default LPS and mm",
+     SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
@@ -65,11 +66,12 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
 }
 
 /* Breath scales for what was asked: a largest displacement, or volumes. */
-static int find_scales(const supine_basis *basis, const request *wanted, const double *weights,
-                       const supine_mesh *rest, supine_mesh *mesh, double *scales) {
+static int find_scales(const supine_basis *basis, const request *wanted, const double gravity[3],
+                       const double *weights, const supine_mesh *rest, supine_mesh *mesh,
+                       double *scales) {
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   if (!wanted->has_scale) {
-    return supine_options_basis_volume_scales(basis, name, weights, wanted->volume, scales);
+    return supine_options_volume_scales(basis, name, &wanted->volume, gravity, weights, scales);
   }
   for (size_t j = 0; j < lungs; ++j) {
     scales[j] = 1.0;
@@ -90,6 +92,17 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
   return SUPINE_EXIT_OK;
 }
 
+/* The scan's own axes and units, where the file knows them. */
+static bool scan_frame(const supine_basis *basis, supine_axes *axes, double *unit) {
+  const char *named = supine_basis_metadata(basis, "scan_axes");
+  const char *size = supine_basis_metadata(basis, "scan_unit_mm");
+  if (named == NULL || size == NULL || !supine_options_parse_number(size, unit) || !(*unit > 0.0)) {
+    return false;
+  }
+  *axes = strcmp(named, "RAS") == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
+  return true;
+}
+
 static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double weights[SUPINE_MODES_MAX];
@@ -104,7 +117,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  result = find_scales(basis, wanted, weights, &rest, &mesh, scales);
+  result = find_scales(basis, wanted, gravity, weights, &rest, &mesh, scales);
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
@@ -112,16 +125,32 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     result = supine_command_deform_content(&wanted->content, name, basis, weights, scales);
     goto cleanup;
   }
-  const supine_mesh_save_options save = {.rest = rest.vertices};
-  if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK ||
-      supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
+  supine_mesh_save_options save = {.rest = rest.vertices};
+  double unit = 1.0; /* mm */
+  if (wanted->as_scanned && !scan_frame(basis, &save.axes, &unit)) {
+    supine_options_say(name, "the file does not say in which axes and units its scan came");
+    result = SUPINE_EXIT_INPUT;
+    goto cleanup;
+  }
+  if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  const double largest = largest_displacement(&rest, &mesh);
+  const double gained = 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest));
+  for (size_t i = 0; i < 3 * mesh.vertex_count && unit != 1.0; ++i) {
+    mesh.vertices[i] /= unit;
+    rest.vertices[i] /= unit;
+  }
+  if (supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
   (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->content.path,
-               gravity[0], gravity[1], gravity[2], largest_displacement(&rest, &mesh));
+               gravity[0], gravity[1], gravity[2], largest);
   if (info->has_volume && supine_basis_metadata(basis, "content") == NULL) {
-    (void)printf(", %+.2f mL", 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest)));
+    (void)printf(", %+.2f mL%s", gained,
+                 info->resting_volume != NULL ? " from full inflation" : "");
   }
   (void)putchar('\n');
   result = supine_options_finish(name);

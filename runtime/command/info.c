@@ -34,13 +34,15 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-static const char *const shown[] = {
-    "patient",   "route",      "force",          "direction",  "direction_constants",
-    "stiffness", "midline_mm", "rest_volume_ml", "lung_share", "lesions",
-    "reach_mm",  "made_by"};
+static const char *const shown[] = {"assumed",        "patient",    "scanned",
+                                    "resting_shares", "law",        "route",
+                                    "force",          "direction",  "direction_constants",
+                                    "stiffness",      "midline_mm", "reference_volume_ml",
+                                    "lung_share",     "lesions",    "reach_mm",
+                                    "made_by"};
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
-                                     "error_max_percent", "error_volume_ml",   "error_rms_mm",
-                                     "error_p95_mm",      "error_max_mm"};
+                                     "error_max_percent", "error_volume_ml",   "error_rest_part",
+                                     "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
 
 static const char turned_over[] = "turned_over_percent";
 
@@ -49,8 +51,23 @@ static const char *text_of(const supine_basis *basis, const char *key) {
   return value != NULL ? value : "?";
 }
 
+/* The state that errors in mm are stated at, in words. */
+static void state_words(const supine_basis *basis, char *words, size_t size) {
+  const char *part = supine_basis_metadata(basis, "error_rest_part");
+  const char *volume = supine_basis_metadata(basis, "error_volume_ml");
+  if (part != NULL && strcmp(part, "1") != 0) {
+    (void)snprintf(words, size, "at %s of the way to rest", part);
+  } else if (volume != NULL) {
+    (void)snprintf(words, size, "at %s mL", volume);
+  } else {
+    (void)snprintf(words, size, part != NULL ? "at rest" : "of the fields as given");
+  }
+}
+
 static void print_text(const char *path, const supine_basis *basis, const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  char state[64];
+  state_words(basis, state, sizeof state);
   (void)printf("%s: basis of %zu lung%s (%s), %s field\n", path, info->lung_count,
                info->lung_count == 1 ? "" : "s", text_of(basis, "lungs"),
                info->vector ? "vector" : "scalar");
@@ -77,17 +94,13 @@ static void print_text(const char *path, const supine_basis *basis, const double
                  text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
                  text_of(basis, "error_max_percent"));
     if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
-      const char *volume = supine_basis_metadata(basis, "error_volume_ml");
-      (void)printf("  mm  %10s   %15s   %7s   %s%s%s\n", text_of(basis, "error_rms_mm"),
-                   text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"),
-                   volume != NULL ? "at " : "of the fields as given", volume != NULL ? volume : "",
-                   volume != NULL ? " mL" : "");
+      (void)printf("  mm  %10s   %15s   %7s   %s\n", text_of(basis, "error_rms_mm"),
+                   text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"), state);
     }
   }
   if (supine_basis_metadata(basis, turned_over) != NULL) {
-    (void)printf(
-        "\nTriangles that a breath of %s mL turns over, in the worst of six postures: %s %%\n",
-        text_of(basis, "error_volume_ml"), text_of(basis, turned_over));
+    (void)printf("\nTriangles that are turned over %s, in the worst of six postures: %s %%\n",
+                 state, text_of(basis, turned_over));
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;

@@ -9,6 +9,7 @@
 
 #include "runtime/options/basis_input.h"
 #include "runtime/options/posture_list.h"
+#include "runtime/options/volume.h"
 #include "runtime/render/render.h"
 
 static const char name[] = "render";
@@ -16,7 +17,7 @@ static const char name[] = "render";
 typedef struct request {
   const char *output;
   const char *postures;
-  const char *volume;
+  supine_volume_options volume;
   const char *reference; /* posture that colours are the difference from, or NULL */
   const char *title;
   double scale; /* mm, or 0: by volume */
@@ -44,8 +45,8 @@ static int find_state(const supine_basis *basis, const supine_compare *compare,
     return supine_options_fail(name, &error);
   }
   if (wanted->scale == 0.0) {
-    return supine_options_basis_volume_scales(basis, name, found->weights, wanted->volume,
-                                              found->scales);
+    return supine_options_volume_scales(basis, name, &wanted->volume, item->gravity, found->weights,
+                                        found->scales);
   }
   supine_distance_statistics statistics;
   for (size_t lung = 0; lung < lungs; ++lung) {
@@ -80,7 +81,16 @@ static void find_value(const supine_basis *basis, const supine_compare *compare,
     for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
       gain += supine_basis_lung_volume(basis, lung, shown->weights, shown->scales[lung]);
     }
-    used = (size_t)snprintf(shown->subtitle, sizeof shown->subtitle, "%+.0f mL, ", gain);
+    if (supine_basis_get_info(basis)->resting_volume != NULL) { /* what the lungs hold */
+      double held[SUPINE_LUNGS_MAX];
+      supine_options_volume_reference(basis, held);
+      for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+        gain += held[lung];
+      }
+    }
+    used = (size_t)snprintf(
+        shown->subtitle, sizeof shown->subtitle,
+        supine_basis_get_info(basis)->resting_volume != NULL ? "%.0f mL, " : "%+.0f mL, ", gain);
   }
   (void)snprintf(shown->subtitle + used, sizeof shown->subtitle - used, "mean %.1f, max %.1f mm",
                  statistics.mean, statistics.max);
@@ -254,8 +264,7 @@ static const char *const themes[] = {"light", "dark", NULL};
 static const supine_option table[] = {
     {"posture", 0, "LIST", "up to 8; --postures is the same", SUPINE_FILLS(request, postures),
      .alias = "postures"},
-    {"volume", 0, "ML", "air above the resting volume, default 500; or left=ML,right=ML",
-     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement in each posture instead: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .rivals = "breath"},

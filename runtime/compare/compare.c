@@ -154,10 +154,16 @@ double supine_compare_product(const double *gram, const double *q, const double 
 }
 
 supine_status supine_compare_scale(const supine_compare *compare, const supine_inflation *inflation,
-                                   const double *weights, double *scale, supine_error *error) {
+                                   const double gravity[3], const double *weights, double *scale,
+                                   supine_error *error) {
+  double rest = 0;
   switch (inflation->kind) {
+  case SUPINE_INFLATION_REST:
+    if (supine_basis_resting_volume(compare->basis, gravity, &rest) != SUPINE_OK) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+    } /* fall through */
   case SUPINE_INFLATION_VOLUME:
-    return supine_basis_scale(compare->basis, weights, inflation->amount, scale, error);
+    return supine_basis_scale(compare->basis, weights, rest + inflation->amount, scale, error);
   case SUPINE_INFLATION_SCALE:
     *scale = inflation->amount;
     return SUPINE_OK;

@@ -41,7 +41,7 @@ static supine_status state_of(const search *s, const double direction[3], double
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "gravity has no direction");
   }
-  status = supine_compare_scale(s->compare, s->inflation, q, &scale, error);
+  status = supine_compare_scale(s->compare, s->inflation, direction, q, &scale, error);
   for (size_t k = 0; k < s->count; ++k) {
     q[k] *= scale;
   }

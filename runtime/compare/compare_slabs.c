@@ -29,6 +29,7 @@ typedef struct triangle {
 } triangle;
 
 typedef struct cutter {
+  const float *from; /* [N, 3] where the motion begins */
   double axis[3][3]; /* x, y and gravity */
   size_t count;      /* slabs */
   double level[SUPINE_SLABS_MAX + 1];
@@ -81,11 +82,10 @@ static void place(const cutter *c, const float *point, const float *origin, doub
   }
 }
 
-static void read_triangle(const cutter *c, const supine_basis *basis, const float *xyz,
-                          const uint32_t *corner, triangle *t) {
+static void read_triangle(const cutter *c, const float *xyz, const uint32_t *corner, triangle *t) {
   for (int v = 0; v < 3; ++v) {
-    const float *rest = basis->info.vertices + 3 * (size_t)corner[v];
-    place(c, rest, basis->info.vertices, t->at[v]);
+    const float *rest = c->from + 3 * (size_t)corner[v];
+    place(c, rest, c->from, t->at[v]);
     place(c, xyz + 3 * (size_t)corner[v], rest, t->u[v]);
   }
   double e[2][3];
@@ -226,7 +226,7 @@ static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const fl
     const uint32_t *corner = basis->info.triangles + 3 * i;
     if (corner[0] >= basis->lung_begin[lung] && corner[0] < basis->lung_begin[lung + 1]) {
       triangle t;
-      read_triangle(c, basis, xyz, corner, &t);
+      read_triangle(c, xyz, corner, &t);
       add_triangle(c, &t, whole);
     }
   }
@@ -260,9 +260,9 @@ static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const fl
 }
 
 supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],
-                                   const float *xyz, size_t count, supine_slab *slabs,
-                                   supine_error *error) {
-  cutter c = {.count = count};
+                                   const float *from, const float *xyz, size_t count,
+                                   supine_slab *slabs, supine_error *error) {
+  cutter c = {.from = from != NULL ? from : basis->info.vertices, .count = count};
   if (count == 0 || count > SUPINE_SLABS_MAX || !make_axes(gravity, c.axis)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu slabs (1 to %d), or gravity has no direction", count,
@@ -276,7 +276,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   double highest = INFINITY;
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
     double at[3];
-    place(&c, basis->info.vertices + 3 * i, basis->info.vertices, at);
+    place(&c, c.from + 3 * i, c.from, at);
     highest = fmin(highest, at[2]);
     lowest = fmax(lowest, at[2]);
   }

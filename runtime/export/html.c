@@ -51,7 +51,7 @@ static json_t *describe(const page *p) {
                                      "direction",
                                      "direction_constants",
                                      "stiffness",
-                                     "rest_volume_ml",
+                                     "reference_volume_ml",
                                      "scan_volume_ml",
                                      "scanned",
                                      "law",

@@ -3,10 +3,56 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/volume.h>
+
+#include "runtime/options/volume.h"
 #include "runtime/report/comparison.h"
 
+bool supine_report_knows_rest(const supine_comparison *c) {
+  return supine_basis_get_info(c->basis)->resting_volume != NULL;
+}
+
+/* Who ventilates in a breath: from the inflation on where rest is known, else from the file's
+ * surface up to it. */
+static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
+                                 float *xyz[2], supine_compared_posture *posture,
+                                 supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  const bool known = supine_report_knows_rest(c);
+  supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
+  double cubic[3];
+  double after[SUPINE_LUNGS_MAX];
+  double scale = posture->scales[0];
+  supine_status status = SUPINE_OK;
+  if (known) {
+    supine_basis_cubic(c->basis, posture->weights, cubic);
+    status = supine_basis_scale(c->basis, posture->weights,
+                                supine_volume_at(cubic, scale) + c->breath, &scale, error);
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    after[lung] = scale;
+    const double before =
+        known ? supine_basis_lung_volume(c->basis, lung, posture->weights, posture->scales[lung])
+              : 0.0;
+    posture->gain[lung] =
+        supine_basis_lung_volume(c->basis, lung, posture->weights, scale) - before;
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_deform(c->basis, posture->weights, posture->scales, xyz[0]);
+  supine_deform(c->basis, posture->weights, after, xyz[1]);
+  status = supine_compare_slabs(c->basis, item->gravity, known ? xyz[0] : NULL, xyz[1],
+                                SUPINE_COMPARISON_SLABS, slabs, error);
+  for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
+    posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
+    posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
+  }
+  return status;
+}
+
 static supine_status find_posture(const supine_comparison *c, const supine_posture_item *item,
-                                  float *distance, float *xyz, supine_compared_posture *posture,
+                                  float *distance, float *xyz[2], supine_compared_posture *posture,
                                   supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double scale = 0.0;
@@ -14,28 +60,23 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s: gravity has no direction", item->name);
   }
-  status = supine_compare_scale(c->compare, &c->inflation, posture->weights, &scale, error);
+  status = supine_compare_scale(c->compare, &c->inflation, item->gravity, posture->weights, &scale,
+                                error);
   if (status != SUPINE_OK) {
     return status;
   }
+  if (info->has_volume) {
+    supine_options_volume_reference(c->basis, posture->volume);
+  }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->scales[lung] = scale;
-    posture->volume[lung] =
-        info->has_volume ? supine_basis_lung_volume(c->basis, lung, posture->weights, scale) : 0.0;
+    if (info->has_volume) {
+      posture->volume[lung] += supine_basis_lung_volume(c->basis, lung, posture->weights, scale);
+    }
   }
   supine_compare_distances(c->compare, posture->weights, posture->scales, NULL, NULL, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
-  if (info->has_volume) {
-    supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
-    supine_deform(c->basis, posture->weights, posture->scales, xyz);
-    status =
-        supine_compare_slabs(c->basis, item->gravity, xyz, SUPINE_COMPARISON_SLABS, slabs, error);
-    for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
-      posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
-      posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
-    }
-  }
-  return status;
+  return info->has_volume ? find_breath(c, item, xyz, posture, error) : SUPINE_OK;
 }
 
 static supine_status find_energy(supine_comparison *c, supine_error *error) {
@@ -66,10 +107,11 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   const size_t count = c->postures.count;
   supine_status status = SUPINE_ERROR_MEMORY;
   float *distance = malloc(n * sizeof *distance);
-  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *xyz[2] = {malloc(3 * n * sizeof(float)), malloc(3 * n * sizeof(float))};
   c->posture = calloc(count, sizeof *c->posture);
   c->pair = calloc(count * count, sizeof *c->pair);
-  if (distance == NULL || xyz == NULL || c->posture == NULL || c->pair == NULL) {
+  if (distance == NULL || xyz[0] == NULL || xyz[1] == NULL || c->posture == NULL ||
+      c->pair == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
@@ -96,7 +138,8 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   }
 cleanup:
   free(distance);
-  free(xyz);
+  free(xyz[0]);
+  free(xyz[1]);
   return status;
 }
 
@@ -110,14 +153,20 @@ void supine_report_free(supine_comparison *c) {
 }
 
 void supine_report_inflation(const supine_comparison *c, char *text, size_t size) {
-  (void)snprintf(text, size, "%g %s", c->inflation.amount,
+  if (c->inflation.kind == SUPINE_INFLATION_REST) {
+    (void)snprintf(text, size, c->inflation.amount == 0.0 ? "rest" : "rest %+g mL",
+                   c->inflation.amount);
+    return;
+  }
+  (void)snprintf(text, size, supine_report_knows_rest(c) ? "full %+g %s" : "%g %s",
+                 c->inflation.amount,
                  c->inflation.kind == SUPINE_INFLATION_VOLUME ? "mL" : "mm RMS displacement");
 }
 
 double supine_report_gain(const supine_comparison *c, size_t posture) {
   double gain = 0.0;
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    gain += c->posture[posture].volume[lung];
+    gain += c->posture[posture].gain[lung];
   }
   return gain;
 }

@@ -15,8 +15,9 @@ enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
 typedef struct supine_compared_posture {
   double weights[SUPINE_MODES_MAX];
   double scales[SUPINE_LUNGS_MAX];
-  supine_distance_statistics displacement;   /* from rest */
-  double volume[SUPINE_LUNGS_MAX];           /* mL that each lung gains; closed surfaces */
+  supine_distance_statistics displacement;   /* from the file's surface */
+  double volume[SUPINE_LUNGS_MAX];           /* mL that each lung holds, tissue included; closed */
+  double gain[SUPINE_LUNGS_MAX];             /* mL that each takes of the breath; closed */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
 } supine_compared_posture;
 
@@ -24,6 +25,7 @@ typedef struct supine_comparison {
   const char *path; /* of the basis, for showing */
   const supine_basis *basis;
   supine_inflation inflation;
+  double breath; /* mL, on top of the inflation where rest is known; else it is the breath */
   supine_posture_list postures;
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
@@ -36,10 +38,13 @@ typedef struct supine_comparison {
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
 void supine_report_free(supine_comparison *comparison);
 
-/* "500 mL" or "5 mm RMS displacement". */
+/* "rest", "rest +300 mL", "500 mL" or "5 mm RMS displacement". */
 void supine_report_inflation(const supine_comparison *comparison, char *text, size_t size);
 
-/* What a posture gains over all lungs, mL. */
+/* Whether the basis knows what rest is: then the inflation is a state, and breaths begin there. */
+bool supine_report_knows_rest(const supine_comparison *comparison);
+
+/* What all lungs together take of the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* The forms. They leave errors of writing to be found when the file is closed. */

@@ -88,7 +88,8 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
   for (int side = 0; side < 2; ++side) {
     double scale = 0.0;
     if (supine_basis_weights(c->basis, direction[side], weights[side]) != SUPINE_OK ||
-        supine_compare_scale(c->compare, &c->inflation, weights[side], &scale, NULL) != SUPINE_OK) {
+        supine_compare_scale(c->compare, &c->inflation, direction[side], weights[side], &scale,
+                             NULL) != SUPINE_OK) {
       return NAN;
     }
     for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {

@@ -24,24 +24,26 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   row(file, "gravity", name, "", "posterior", g[1] + 0.0, "1");
   row(file, "gravity", name, "", "head", g[2] + 0.0, "1");
   row(file, "scale", name, "", "", posture->scales[0], "1");
-  statistics(file, "displacement", name, "rest", &posture->displacement);
+  const char *surface = supine_report_knows_rest(c) ? "full inflation" : "rest";
+  const char *before = supine_report_knows_rest(c) ? "before the breath" : "rest";
+  statistics(file, "displacement", name, surface, &posture->displacement);
   if (!supine_basis_get_info(c->basis)->has_volume) {
     return;
   }
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    char lung_name[32];
-    supine_options_basis_lung_name(c->basis, lung, lung_name, sizeof lung_name);
-    row(file, "gain", name, "rest", lung_name, posture->volume[lung], "mL");
+    const char *lung_name = supine_basis_get_info(c->basis)->lung_names[lung];
+    row(file, "volume", name, "", lung_name, posture->volume[lung], "mL");
+    row(file, "gain", name, before, lung_name, posture->gain[lung], "mL");
   }
   const double total = supine_report_gain(c, i);
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
     char part[32];
     (void)snprintf(part, sizeof part, "height %zu-%zu %%", 100 - 10 * (s + 1), 100 - 10 * s);
-    row(file, "slab volume", name, "rest", part, posture->slab[s].volume, "mL");
-    row(file, "slab gain", name, "rest", part, posture->slab[s].gain, "mL");
-    row(file, "slab expansion", name, "rest", part,
+    row(file, "slab volume", name, before, part, posture->slab[s].volume, "mL");
+    row(file, "slab gain", name, before, part, posture->slab[s].gain, "mL");
+    row(file, "slab expansion", name, before, part,
         posture->slab[s].volume > 0.0 ? posture->slab[s].gain / posture->slab[s].volume : 0.0, "1");
-    row(file, "slab share", name, "rest", part, total != 0.0 ? posture->slab[s].gain / total : 0.0,
+    row(file, "slab share", name, before, part, total != 0.0 ? posture->slab[s].gain / total : 0.0,
         "1");
   }
 }

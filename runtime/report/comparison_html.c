@@ -43,7 +43,7 @@ static json_t *postures(const supine_comparison *c) {
     json_t *row = named(c, i);
     json_t *gains = json_array();
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-      (void)json_array_append_new(gains, json_sprintf("%+.1f", c->posture[i].volume[lung]));
+      (void)json_array_append_new(gains, json_sprintf("%+.1f", c->posture[i].gain[lung]));
     }
     (void)json_object_set_new(row, "gravity", points(c->postures.item[i].gravity));
     (void)json_object_set_new(row, "gains", gains);

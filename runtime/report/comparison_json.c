@@ -14,12 +14,12 @@ static json_t *direction(const double g[3]) {
   return json_pack("[f, f, f]", g[0], g[1], g[2]);
 }
 
-static json_t *volumes(const supine_comparison *c, size_t posture) {
+/* A number for each lung, by its name. */
+static json_t *by_lung(const supine_comparison *c, const double *values) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_object();
-  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    char name[32];
-    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
-    (void)json_object_set_new(list, name, json_real(c->posture[posture].volume[lung]));
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(list, info->lung_names[lung], json_real(values[lung]));
   }
   return list;
 }
@@ -48,7 +48,8 @@ static json_t *postures(const supine_comparison *c) {
                                 direction(item->gravity), "scale", c->posture[i].scales[0],
                                 "displacement_mm", statistics(&c->posture[i].displacement));
     if (supine_basis_get_info(c->basis)->has_volume) {
-      (void)json_object_set_new(posture, "gain_ml", volumes(c, i));
+      (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
+      (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
       (void)json_object_set_new(posture, "slabs", slabs(c, i));
     }
     (void)json_array_append_new(list, posture);
@@ -70,17 +71,19 @@ static json_t *pairs(const supine_comparison *c) {
 
 bool supine_report_json(const supine_comparison *c, FILE *file) {
   const supine_extremes *e = &c->extremes;
-  const bool volume = c->inflation.kind == SUPINE_INFLATION_VOLUME;
-  json_t *root = json_pack(
-      "{s:s, s:{s:s, s:f}, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
-      "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
-      "file", c->path, "inflation", "kind", volume ? "volume_ml" : "rms_mm", "amount",
-      c->inflation.amount, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
-      "area_mm2", supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
-      "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere", "directions",
-      (json_int_t)e->directions, "differ_most", "a", direction(e->pair[0]), "b",
-      direction(e->pair[1]), "rms_mm", e->pair_rms, "farthest_from_supine", "gravity",
-      direction(e->farthest), "rms_mm", e->farthest_rms);
+  const char *kind = c->inflation.kind == SUPINE_INFLATION_REST     ? "rest_plus_ml"
+                     : c->inflation.kind == SUPINE_INFLATION_VOLUME ? "volume_ml"
+                                                                    : "rms_mm";
+  json_t *root =
+      json_pack("{s:s, s:{s:s, s:f}, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
+                "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
+                "file", c->path, "inflation", "kind", kind, "amount", c->inflation.amount,
+                "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
+                supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
+                "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",
+                "directions", (json_int_t)e->directions, "differ_most", "a", direction(e->pair[0]),
+                "b", direction(e->pair[1]), "rms_mm", e->pair_rms, "farthest_from_supine",
+                "gravity", direction(e->farthest), "rms_mm", e->farthest_rms);
   const bool good =
       root != NULL && json_dumpf(root, file, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
   (void)fputc('\n', file);

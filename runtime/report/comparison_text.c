@@ -21,13 +21,12 @@ static void print_statistics(const supine_distance_statistics *d, FILE *file) {
 
 static void print_postures(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
-  (void)fprintf(file, "\nDisplacement from rest, mm%s\n%-*s %9s %9s %9s %9s",
-                info->has_volume ? ", and gain of each lung, mL" : "", width, "posture", "mean",
+  (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s",
+                supine_report_knows_rest(c) ? "full inflation" : "rest",
+                info->has_volume ? ", and what each lung holds, mL" : "", width, "posture", "mean",
                 "RMS", "95 %", "largest");
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-    char name[32];
-    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
-    (void)fprintf(file, " %9s", name);
+    (void)fprintf(file, " %9s", info->lung_names[lung]);
   }
   (void)fputc('\n', file);
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -53,11 +52,28 @@ static void print_pairs(const supine_comparison *c, int width, FILE *file) {
   }
 }
 
+/* What each lung takes of the breath. */
+static void print_gains(const supine_comparison *c, int width, FILE *file) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
+                supine_report_gain(c, 0), width, "posture");
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)fprintf(file, " %9s", info->lung_names[lung]);
+  }
+  (void)fputc('\n', file);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)fprintf(file, "%-*s", width, c->postures.item[i].name);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      (void)fprintf(file, " %9.2f", c->posture[i].gain[lung]);
+    }
+    (void)fputc('\n', file);
+  }
+}
+
 static void print_slabs(const supine_comparison *c, FILE *file) {
-  (void)fputs(
-      "\nVentilation by height along gravity: regional expansion, % of resting volume, and\n"
-      "share of the volume gained, %\n  height  ",
-      file);
+  (void)fputs("\nVentilation by height along gravity: regional expansion, % of the volume before "
+              "the\nbreath, and share of the breath, %\n  height  ",
+              file);
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)fprintf(file, " %15.15s", c->postures.item[i].name);
   }
@@ -101,6 +117,7 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
     print_pairs(c, width, file);
   }
   if (info->has_volume) {
+    print_gains(c, width, file);
     print_slabs(c, file);
   }
   (void)fprintf(file,

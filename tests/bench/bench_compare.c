@@ -36,7 +36,7 @@ static int time_pairs(const supine_basis *basis, const supine_compare *compare, 
     const double g[3] = {random_number(&state), random_number(&state), 0.1 + random_number(&state)};
     const supine_inflation inflation = {SUPINE_INFLATION_RMS, 5};
     (void)supine_basis_weights(basis, g, weights[i]);
-    (void)supine_compare_scale(compare, &inflation, weights[i], &scales[i][0], NULL);
+    (void)supine_compare_scale(compare, &inflation, g, weights[i], &scales[i][0], NULL);
     for (int lung = 1; lung < SUPINE_LUNGS_MAX; ++lung) {
       scales[i][lung] = scales[i][0];
     }

@@ -76,7 +76,7 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   const double joined = supine_clock_seconds();
   *vertices = lungs.mesh.vertex_count;
   if (status == SUPINE_OK) {
-    const supine_precompute_options options = {.model = supine_physics_model_default(),
+    const supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
                                                .band = 3,
                                                .progress = note_write,
                                                .progress_context = &writing};

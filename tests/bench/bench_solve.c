@@ -36,7 +36,7 @@ static void need(supine_status status, const supine_error *error) {
 static void solve(const supine_lungs *lungs, double length, double seconds[2],
                   supine_solve_report *report) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   const size_t count = supine_physics_force_column_count(&model.force);
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
@@ -66,7 +66,7 @@ static void solve(const supine_lungs *lungs, double length, double seconds[2],
 
 static void sample(const supine_lungs *lungs, double length) {
   enum { BAND = 7 };
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection = {0};
   supine_error error = {0};
   model.force.soften = 1.0;

@@ -216,7 +216,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
 
 /* III-C, IV-B: largest displacement against volume. */
 static void linearity(const supine_lungs *lungs) {
-  const supine_model model = supine_physics_model_default();
+  const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double cubic[4][3];
   double largest[4];
   for (size_t p = 0; p < 4; ++p) {

@@ -17,7 +17,7 @@ struct full_solve {
 full_solve *full_solve_create(size_t vertices) {
   full_solve *made = calloc(1, sizeof *made);
   supine_mesh mesh = {0};
-  const supine_model model = supine_physics_model_default();
+  const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   if (made == NULL || supine_phantom_create(vertices, 2500.0, &mesh, NULL) != SUPINE_OK ||
       supine_lungs_create(&mesh, 1, NULL, &made->lungs, NULL) != SUPINE_OK) {
     supine_mesh_free(&mesh);
@@ -63,11 +63,11 @@ size_t full_solve_vertex_count(const full_solve *solve) {
 void full_solve_run(void *context) {
   full_solve *solve = context;
   static const double g[3] = {0.6, 0.48, -0.64};
-  const supine_force_law law = supine_physics_force_law_default();
+  const supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
   const supine_lungs *lungs = &solve->lungs;
   double low;
   double high;
-  if (supine_physics_height_range(&lungs->mesh, 1, g, &low, &high) != SUPINE_OK) {
+  if (supine_physics_height_range(lungs, false, 1, g, &low, &high) != SUPINE_OK) {
     return;
   }
   supine_physics_force(lungs, &law, g, low, high, solve->force);

@@ -39,9 +39,10 @@ SUPINE_API double supine_compare_area(const supine_compare *compare);
 
 /** How far the lungs breathe, whichever way gravity points. */
 typedef enum supine_inflation_kind {
-  SUPINE_INFLATION_VOLUME = 0, /**< mL that the lungs together gain over rest */
+  SUPINE_INFLATION_VOLUME = 0, /**< mL that the lungs together hold beyond the file's surface */
   SUPINE_INFLATION_RMS,        /**< RMS displacement, mm: for open surfaces */
-  SUPINE_INFLATION_SCALE       /**< one breath scale */
+  SUPINE_INFLATION_SCALE,      /**< one breath scale */
+  SUPINE_INFLATION_REST        /**< mL beyond the posture's resting volume */
 } supine_inflation_kind;
 
 typedef struct supine_inflation {
@@ -50,12 +51,14 @@ typedef struct supine_inflation {
 } supine_inflation;
 
 /** The breath scale, one for all lungs, that inflates by that much. No pass over the vertices.
+ * @param gravity  [3] that the weights are of
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, where rest depends on it
  * @retval SUPINE_ERROR_OPEN_SURFACE  a volume of an open surface
  * @retval SUPINE_ERROR_NUMERICAL     no scale reaches it, or nothing moves */
 SUPINE_API supine_status supine_compare_scale(const supine_compare *compare,
                                               const supine_inflation *inflation,
-                                              const double *weights, double *scale,
-                                              supine_error *error);
+                                              const double gravity[3], const double *weights,
+                                              double *scale, supine_error *error);
 
 /** RMS distance between two states, mm, from the Gram matrices alone:
  *
@@ -124,15 +127,16 @@ SUPINE_API supine_status supine_compare_search(const supine_compare *compare,
 
 /** The tissue of one lung between two heights. */
 typedef struct supine_slab {
-  double volume; /**< at rest, mL */
+  double volume; /**< before the breath, mL */
   double gain;   /**< mL that it gains; over `volume`, its regional expansion */
 } supine_slab;
 
 /** Most slabs. */
 enum { SUPINE_SLABS_MAX = 64 };
 
-/** Ventilation by height: cuts the rest surface into slabs of equal thickness across gravity, the
- * lungs' common lowest and highest points its ends, and finds what the tissue in each gains.
+/** Ventilation by height: cuts the surface before a breath into slabs of equal thickness across
+ * gravity, the lungs' common lowest and highest points its ends, and finds what the tissue in each
+ * gains.
  *
  *     gain = volume that the slab's part of the surface sweeps
  *            + A mean(u.g) of its lower cut - A mean(u.g) of its upper cut
@@ -145,15 +149,16 @@ enum { SUPINE_SLABS_MAX = 64 };
  * share everywhere.
  *
  * @param gravity  [3], any length but 0
- * @param xyz      [N, 3] deformed positions (supine_deform)
+ * @param from     [N, 3] positions before the breath; NULL: the file's surface
+ * @param xyz      [N, 3] positions after it (supine_deform)
  * @param count    1 to SUPINE_SLABS_MAX
  * @param slabs    [G, count], uppermost first, written
  * Cost: one pass over the triangles.
  * @retval SUPINE_ERROR_ARGUMENT      no direction, or a count out of range
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes */
 SUPINE_API supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],
-                                              const float *xyz, size_t count, supine_slab *slabs,
-                                              supine_error *error);
+                                              const float *from, const float *xyz, size_t count,
+                                              supine_slab *slabs, supine_error *error);
 
 #ifdef __cplusplus
 }
