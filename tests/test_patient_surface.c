@@ -24,7 +24,7 @@ static const double supine_gravity[3] = {0.0, 1.0, 0.0};
 
 /* The truth: c1 to c6, and (18) as it is supine. */
 static supine_model truth(void) {
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = 10.0;
   model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
   model.direction =

@@ -136,10 +136,10 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
                                      "--posture upright --tilt -90"};
   static char first[1 << 20];
   static char other[1 << 20];
-  EXPECT(0, "+500.00 mL", "deform lungs.safetensors %s -o way.stl", ways[0]);
+  EXPECT(0, "-3180.00 mL from full inflation", "deform lungs.safetensors %s -o way.stl", ways[0]);
   const size_t length = read_file("way.stl", first, sizeof first);
   for (size_t i = 1; i < sizeof ways / sizeof *ways; ++i) {
-    EXPECT(0, "+500.00 mL", "deform lungs.safetensors %s -o way.stl", ways[i]);
+    EXPECT(0, "-3180.00 mL from full inflation", "deform lungs.safetensors %s -o way.stl", ways[i]);
     assert_int_equal(read_file("way.stl", other, sizeof other), length);
     size_t differing = 0;
     for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
@@ -165,7 +165,58 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(0, "+120.00 mL", "solve lungs.ply --tilt 15 --volume 120 -o a.obj");
   EXPECT(1, "left,right", "deform lungs.safetensors --posture left --volume middle=3 -o b.ply");
   EXPECT(1, "not both", "deform lungs.safetensors --posture left --volume 3 --scale 4 -o b.ply");
-  EXPECT(5, "out of reach", "deform lungs.safetensors --posture inverted --volume -2600 -o b.ply");
+  EXPECT(5, "lungs hold 10 to 120 %",
+         "deform lungs.safetensors --posture left --volume -5700 -o b.ply");
+  EXPECT(5, "lungs hold 10 to 120 %",
+         "deform lungs.safetensors --posture left --volume full+1300 -o b.ply");
+  EXPECT(1, "every lung", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
+  EXPECT(1, "takes rest, full",
+         "deform lungs.safetensors --posture left --volume resting -o b.ply");
+  assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "lungs hold 10 to 120 %",
+         "deform lungs.safetensors --posture left --volume -5500 --allow-folds -o a.ply");
+}
+
+/* Volumes as people mean them, of made lungs of 6000 mL: shares of reference.h. */
+static void test_deform_rest_and_full_by_posture(void **state) {
+  (void)state;
+  EXPECT(0, "-3420.00 mL", "deform lungs.safetensors --posture supine -o a.ply");
+  EXPECT(0, "-3420.00 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
+  EXPECT(0, "-2820.00 mL", "deform lungs.safetensors --posture upright -o a.ply");
+  EXPECT(0, "-2680.00 mL", "deform lungs.safetensors --posture prone --volume rest+500 -o a.ply");
+  EXPECT(0, "-3380.00 mL", "deform lungs.safetensors --posture right --volume rest-200 -o a.ply");
+  EXPECT(0, "displacement 0.000 mm, +0.00 mL",
+         "deform lungs.safetensors --posture right --volume full -o a.ply");
+  EXPECT(0, "-2880.00 mL",
+         "deform lungs.safetensors --posture left --volume left=rest,right=rest+300 -o a.ply");
+  EXPECT(0, "-3180.00 mL", "solve lungs.ply --posture prone -o a.ply");
+  EXPECT(0, "-3080.00 mL", "solve lungs.ply --posture prone --volume rest+100 -o a.ply");
+}
+
+/* A scan's own state and frame come back. */
+static void test_scanned_state_and_frame_come_back(void **state) {
+  (void)state;
+  EXPECT(0, "-2000.00 mL", "deform lungs.safetensors --posture supine --volume -2000 -o low.ply");
+  EXPECT(0, "2000 mL below full (6000 mL)",
+         "precompute low.ply --scanned supine:-2000 --band 7 -o low.safetensors");
+  EXPECT(0, "scan 2000 mL below full", "info low.safetensors");
+  EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume 0 -o low.obj");
+  EXPECT(0, "assumed: RAS axes (as told), 10 mm a unit",
+         "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
+  EXPECT(0, "ras.ply", "deform ras.safetensors --posture prone --volume 0 --as-scanned -o ras.ply");
+  static char text[1 << 20];
+  assert_true(read_file("ras.ply", text, sizeof text) > 0);
+  assert_non_null(strstr(text, "SPACE=RAS"));
+  EXPECT(1, "at most 0", "precompute low.ply --scanned supine:200 -o b.safetensors");
+  EXPECT(1, "POSTURE:rest", "precompute low.ply --scanned rest -o b.safetensors");
+  EXPECT(1, "did you mean", "precompute low.ply --scanned sopine:rest -o b.safetensors");
+  EXPECT(1, "share of the full volume", "precompute low.ply --resting prone=1.2 -o b.safetensors");
+  EXPECT(1, "cannot be", "precompute low.ply --scanned supine:-90000 -o b.safetensors");
+  EXPECT(0, "tidal law; scan at rest",
+         "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
+  EXPECT(0, "paper law; scan taken as the reference",
+         "precompute lungs.ply --law paper --band 3 -o a.safetensors");
+  EXPECT(0, "+500.00 mL", "deform a.safetensors --posture prone -o a.ply");
   assert_int_equal(count_files("b."), 0);
 }
 
@@ -341,6 +392,8 @@ int main(void) {
       cmocka_unit_test(test_help_every_command_teaches),
       cmocka_unit_test(test_deform_each_way_to_say_prone_same_file),
       cmocka_unit_test(test_deform_volumes_and_scale_as_asked),
+      cmocka_unit_test(test_deform_rest_and_full_by_posture),
+      cmocka_unit_test(test_scanned_state_and_frame_come_back),
       cmocka_unit_test(test_orientation_bad_values_refused),
       cmocka_unit_test(test_output_impossible_exit_4_and_nothing_left),
       cmocka_unit_test(test_basis_damaged_or_foreign_refused),

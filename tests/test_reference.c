@@ -244,7 +244,7 @@ static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **stat
   double scales[SUPINE_LUNGS_MAX];
   float *xyz = malloc(3 * n * sizeof *xyz);
   double *placed = malloc(3 * n * sizeof *placed);
-  assert_true(fabs(info->scan_volume + 2500.0) < 0.5); /* the anchored surface's own */
+  assert_true(fabs(info->scan_volume + 2500.0) < 3.0); /* of the anchored surface: half a permille */
   assert_int_equal(supine_basis_weights(basis, tilted, weights), SUPINE_OK);
   assert_int_equal(supine_basis_scale(basis, weights, info->scan_volume, scales, &error),
                    SUPINE_OK);

@@ -231,7 +231,7 @@ static supine_status fit_surfaces(const request *wanted, const supine_arguments 
                                   supine_patient_surface_report *surface, supine_error *error) {
   supine_lungs rest = {0};
   supine_lungs state = {0};
-  supine_model model = supine_physics_model_default();
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = wanted->reach;
   supine_status status = load_lungs(wanted, given->operand[0], &rest, error);
   if (status == SUPINE_OK) {

@@ -556,10 +556,11 @@ int supine_command_model_load(supine_model_options *options, const char *command
                        lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
                        lungs->topology.inconsistent_edges);
   }
-  choose_law(options);
   if (keep) {
     options->scan.kind = SUPINE_SCAN_NONE;
+    options->has_scan = true;
   }
+  choose_law(options);
   if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||

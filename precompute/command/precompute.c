@@ -253,7 +253,7 @@ static int run(void *chosen, const supine_arguments *given) {
   int result = wanted->fields != NULL ? check_fields(wanted->fields, wanted->path) : SUPINE_EXIT_OK;
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->fields != NULL, &lungs);
+                                       wanted->fields != NULL || wanted->patient != NULL, &lungs);
   }
   if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
       take_patient(&lungs, wanted, &text, &error) != SUPINE_OK) {

@@ -103,7 +103,7 @@ supine_status supine_patient_directions(const supine_patient_record *record,
     model->force.box[k] = record->force.box[k];
   }
   supine_model one_way = *model;
-  one_way.direction = supine_physics_direction_law_default();
+  one_way.direction = supine_physics_model(SUPINE_LAW_PAPER).direction;
   status = supine_physics_solve(lungs, &one_way, record->state.gravity, &solution, error);
   for (size_t i = 0; i < lungs->mesh.vertex_count && status == SUPINE_OK; ++i) {
     double u[3];

@@ -263,7 +263,7 @@ static supine_status solve_forces(matching *m, const supine_model *model, supine
   for (size_t c = 0; c < 4 && status == SUPINE_OK; ++c) {
     supine_solution solution = {0};
     supine_model one = *model;
-    one.direction = supine_physics_direction_law_default();
+    one.direction = supine_physics_model(SUPINE_LAW_PAPER).direction;
     one.force = (supine_force_law){.base = c == 0 ? 1.0 : -0.5};
     if (c > 0) {
       one.force.box[c - 1] = 1.0;

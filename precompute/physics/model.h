@@ -40,7 +40,8 @@ typedef struct supine_model {
   supine_direction_law direction;
   const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
   const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL: 1 */
-  double reach;            /**< spreading length, mm; 0: the paper's, a fixed number of links */
+  double reach;            /**< spreading length, mm, at most half the box's diagonal counts; 0: the
+                                paper's, a fixed number of links */
   double tolerance;        /**< relative residual of every solve; 0: SUPINE_SOLVE_TOLERANCE
                               (equilibrium.h),        where directions are sampled 1e-6 */
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */

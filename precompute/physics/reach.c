@@ -108,7 +108,14 @@ supine_status supine_physics_model_network(const supine_lungs *lungs, const supi
   *network = NULL;
   supine_status status = supine_physics_network_create(&lungs->mesh, &lungs->topology, &made);
   if (status == SUPINE_OK && model->reach > 0.0) {
-    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology, model->reach);
+    /* From the size of the lungs on forces are even all over, and the matrix next to singular. */
+    double square = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double half = 0.5 * (lungs->maximum[k] - lungs->minimum[k]);
+      square += half * half;
+    }
+    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology,
+                                              fmin(model->reach, sqrt(square)));
   }
   if (status == SUPINE_OK && model->lesions != NULL) {
     made->lesions = malloc(made->vertex_count * sizeof *made->lesions);
