@@ -51,7 +51,7 @@ static void check(double soften, double reach) {
   static const char *const threads[] = {"2", "3", "7"};
   supine_lungs lungs = phantom();
   supine_precompute_options options = {
-      .model = supine_physics_model_default(), .band = 3, .modes = 8, .held_out = 20};
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 3, .modes = 8, .held_out = 20};
   options.model.force.soften = soften;
   options.model.reach = reach;
   size_t size;

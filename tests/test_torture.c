@@ -32,7 +32,7 @@ static void check(const char *what, supine_mesh *mesh, const double *stiffness) 
     fail_msg("%s: %s", what, error.message);
   }
   for (int k = 0; k < 2; ++k) {
-    supine_model model = supine_physics_model_default();
+    supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
     supine_solution solution = {0};
     model.reach = k == 0 ? 0.0 : 10.0;
     model.stiffness = stiffness;
