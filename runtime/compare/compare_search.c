@@ -124,7 +124,7 @@ static void turned(const double direction[3], int move, double step, double resu
   normalise(result);
 }
 
-/* Moves `free` of two directions (the first, or both) while that takes their states apart. */
+/* Moves `movable` of two directions (the first, or both) while that takes their states apart. */
 static double refine(const search *s, double direction[2][3], int movable, double step) {
   double q[2][SUPINE_MODES_MAX];
   (void)state_of(s, direction[0], q[0], NULL); /* both reached the inflation before */
