@@ -7,7 +7,7 @@ window.supineLive = (() => {
   const tilt = document.createElement('button');
   const bar = document.createElement('div');
   bar.id = 'live';
-  bar.style.cssText = 'position:fixed;left:12px;bottom:12px;display:flex;gap:8px;align-items:center;z-index:9';
+  bar.style.cssText = 'display:flex;gap:8px;align-items:center;margin-top:4px';
   said.style.cssText = 'margin:0;font-size:12px';
   said.setAttribute('role', 'status');
   tilt.type = 'button';
@@ -15,7 +15,7 @@ window.supineLive = (() => {
   tilt.title = 'Lay the phone on the breastbone, screen out, its top towards the head';
   tilt.hidden = typeof DeviceOrientationEvent === 'undefined' || !window.isSecureContext;
   bar.append(said, tilt);
-  document.body.append(bar);
+  (document.querySelector('#stage > header') ?? document.body).append(bar);
 
   let socket = null;
   let moments = 0;
