@@ -7,7 +7,7 @@ window.supineLive = (() => {
   const tilt = document.createElement('button');
   const bar = document.createElement('div');
   bar.id = 'live';
-  bar.style.cssText = 'display:flex;gap:8px;align-items:center;margin-top:4px';
+  bar.style.cssText = 'display:flex;gap:8px;align-items:center;margin-top:4px;pointer-events:auto';
   said.style.cssText = 'margin:0;font-size:12px';
   said.setAttribute('role', 'status');
   tilt.type = 'button';
