@@ -9,6 +9,7 @@ set -u
 supine=$1
 kills=${2:-2}
 work=$(mktemp -d) || exit 1
+trap 'exit 1' INT TERM
 trap 'cd /; umount "$work/small" 2>/dev/null; rm -rf "$work"' EXIT
 cd "$work" || exit 1
 failures=0
