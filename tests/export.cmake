@@ -19,6 +19,6 @@ foreach(what colour glb page page_views page_sizes accessibility report)
     add_test(NAME export_${what}_node
       COMMAND sh -c "echo 'skipped: node is not installed'; exit 77")
   endif()
-  set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 ENVIRONMENT
+  set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()

@@ -7,7 +7,8 @@
 // none, Chromium's software renderer; with a graphics card, --use-angle=gl or --use-angle=vulkan and
 // --enable-gpu, say. "still" draws the surface where it is, as a viewer of a plain mesh of as many
 // triangles would; "turning" is a frame in which the patient turns: weights, positions, normals and
-// that picture. Their ratio says what deforming costs over showing, whatever the graphics.
+// that picture; "script" is all of it that is not the graphics card's. Turning over
+// still says what deforming costs over showing, whatever the graphics.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -27,10 +28,10 @@ const browser = await chromium.launch({
 const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, reducedMotion: 'reduce' });
 page.setDefaultTimeout(300000);
 await page.goto(pathToFileURL(resolve(file)).href, { timeout: 300000 });
-await page.waitForFunction(() => window.supine?.state.moment && window.supine.view(), null, { timeout: 300000 });
+await page.waitForFunction(() => window.supine?.panes().length > 0, null, { timeout: 300000 });
 
 const found = await page.evaluate(() => {
-  const { picture, view, state } = window.supine;
+  const { picture, panes, state, frameScript } = window.supine;
   const { gl, basis } = picture;
   const pixel = new Uint8Array(4);
   const done = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits
@@ -42,10 +43,11 @@ const found = await page.evaluate(() => {
   };
   const passes = {
     weights,
-    positions: () => picture.capturePositions(state.moment, picture.moved),
-    deform: () => picture.deform(state.moment, null),
-    still: () => picture.draw(view()),
-    turning: () => { weights(); picture.deform(state.moment, null); picture.draw(view()); },
+    positions: () => picture.capturePositions(state.moment, picture.state('now').moved),
+    deform: () => picture.deform('now', state.moment),
+    script: frameScript,
+    still: () => picture.draw(panes()),
+    turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
   const times = Object.fromEntries(Object.keys(passes).map((name) => [name, Infinity]));
   const end = performance.now() + 30000;

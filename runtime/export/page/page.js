@@ -62,7 +62,7 @@ function start() {
   /** How far the lungs reach along gravity, mm: some of their vertices, as they are. */
   function lowest(moment) {
     let reach = -Infinity;
-    const stride = Math.ceil(basis.vertices / 1200);
+    const stride = Math.ceil(basis.vertices / 400);
     for (let i = 0; i < basis.vertices; i += stride) reach = Math.max(reach, dot(moment.gravity, placeOf(basis, moment, i)));
     return reach;
   }
@@ -591,6 +591,8 @@ function start() {
     positions: (gravity, volume) => picture.readPositions(momentFor(basis, unit(gravity), volume)),
     /** Weights with the breath scale in them, and the scale. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
+    /** All of a frame but the graphics card's part. */
+    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio()); showState(); },
     rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }

@@ -142,8 +142,10 @@ class State {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (!Number.isFinite(moment.scale)) return false;
     this.moment = moment;
-    const pinned = momentFor(this.basis, gravityOf(this.pinnedQ), this.depth);
-    this.pinned = Number.isFinite(pinned.scale) ? pinned : moment;
+    if (this.kind === 'difference' || this.beside) {
+      const pinned = momentFor(this.basis, gravityOf(this.pinnedQ), this.depth);
+      this.pinned = Number.isFinite(pinned.scale) ? pinned : moment;
+    }
     return true;
   }
 
