@@ -194,6 +194,9 @@ static void spoil_mode_size(fixture *f) {
   f->mode[11] = 1e277;
 }
 
+static void spoil_coefficient_size(fixture *f) {
+  f->coefficient[11] = 0x1p30F;
+}
 static void spoil_linear(fixture *f) {
   f->linear[5] = (double)NAN;
 }
@@ -223,6 +226,7 @@ static void test_open_wrong_content_refused_with_reason(void **state) {
   expect_refused(spoil_coefficient, "a coefficient is not finite");
   expect_refused(spoil_mode, "a mode is not finite");
   expect_refused(spoil_mode_size, "a mode is not finite, or 2^30 and more");
+  expect_refused(spoil_coefficient_size, "a coefficient is not finite, or 2^30 and more");
   expect_refused(spoil_linear, "volume_linear is not finite");
   expect_refused(spoil_quadratic, "volume_quadratic is not finite");
   expect_refused(spoil_cubic, "volume_cubic is not finite");

@@ -38,8 +38,7 @@ static void evaluate(const supine_basis *basis) {
   const size_t count = info->vertex_count < VERTICES_MOST ? info->vertex_count : VERTICES_MOST;
   supine_deform_range(basis, weights, scales, 0, count, xyz);
   for (size_t i = 0; i < 3 * count; ++i) {
-    /* Products beyond single precision are told by the error that the basis states. */
-    supine_fuzz_expect(!isnan(xyz[i]) || !(info->storage_error < 1e6), "a position or its error");
+    supine_fuzz_expect(!isnan(xyz[i]), "a position that is a number");
   }
 }
 
