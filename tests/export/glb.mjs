@@ -173,8 +173,8 @@ const mesh = join(folder, 'lungs.ply');
 const modes = join(folder, 'modes.safetensors');
 const many = join(folder, 'harmonics.safetensors');
 supine('phantom', '-o', mesh, '--vertices', '600');
-supine('precompute', mesh, '-o', modes);
-supine('precompute', mesh, '-o', many, '--band', '3', '--modes', 'harmonics');
+supine('precompute', mesh, '--law', 'paper', '-o', modes);
+supine('precompute', mesh, '--law', 'paper', '-o', many, '--band', '3', '--modes', 'harmonics');
 for (const [basis, raw, eight] of [[modes, 4, 4], [many, 16, 8]]) {
   for (const [extra, tolerance] of [[[], FLOAT_MM], [['--quantise'], QUANTISED_MM]]) {
     await check(basis, ['--profile', 'raw', ...extra], tolerance, raw, false);

@@ -98,8 +98,8 @@ const mesh = join(folder, 'lungs.ply');
 const torn = join(folder, 'torn.obj');
 const bases = ['modes', 'harmonics', 'torn'].map((name) => join(folder, `${name}.safetensors`));
 supine('phantom', '-o', mesh, '--vertices', '2000');
-supine('precompute', mesh, '-o', bases[0]);
-supine('precompute', mesh, '-o', bases[1], '--band', '3', '--modes', 'harmonics');
+supine('precompute', mesh, '--law', 'paper', '-o', bases[0]);
+supine('precompute', mesh, '--law', 'paper', '-o', bases[1], '--band', '3', '--modes', 'harmonics');
 const html = join(folder, 'lungs.html');
 
 supine('export', bases[0], '-o', html, '--title', 'Lungs </title><script>alert("1")</script> & "more"');
@@ -122,7 +122,7 @@ await dark.page.close();
 // A surface with a hole has no volume: the breath is in millimetres.
 supine('deform', bases[0], '--posture', 'supine', '--volume', '0', '-o', torn);
 writeFileSync(torn, readFileSync(torn, 'utf8').replace(/^f .*\n/m, ''));
-supine('precompute', torn, '-o', bases[2]);
+supine('precompute', torn, '--law', 'paper', '-o', bases[2]);
 supine('export', bases[2], '-o', html, '--scale', '8');
 const { page: opened, complaints: last } = await open(html);
 const [scale, found] = await opened.evaluate(() => [

@@ -55,7 +55,7 @@ function write(id, text) {
 function setSlider(id, value, text, digits = 0) {
   const slider = $(id);
   const number = $(`${id}-number`);
-  if (document.activeElement !== number && Number(number.value) !== Number(value.toFixed(digits))) number.value = value.toFixed(digits);
+  if (document.activeElement !== number && number.value !== value.toFixed(digits)) number.value = value.toFixed(digits);
   if (slider.getAttribute('aria-valuetext') === text) return;
   slider.value = value;
   slider.setAttribute('aria-valuetext', text);
