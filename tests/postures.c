@@ -12,7 +12,8 @@
 const char *const posture_figure_names[POSTURE_COUNT] = {"supine", "prone",   "left",
                                                          "right",  "upright", "inverted"};
 
-static const double breath = 500.0; /* mL */
+/* A breath is this part of the full volume: 500 mL of an adult's 7.5 L, less of smaller lungs. */
+static const double breath_share = 1.0 / 15.0;
 enum { QUARTERS = 4 };
 
 /* Positions at a volume, mL beyond the file's surface, and what each lung holds beyond it. */
@@ -107,6 +108,7 @@ supine_status postures_measure(const supine_basis *basis, posture_figures figure
   }
   double full[2];
   reference_volumes(&mesh, info, full);
+  const double breath = breath_share * (full[0] + full[1]);
   for (size_t p = 0; p < POSTURE_COUNT && status == SUPINE_OK; ++p) {
     posture_figures *f = &figures[p];
     double gravity[3];

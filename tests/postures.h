@@ -15,8 +15,9 @@ typedef struct posture_figures {
   double volume[2];           /* mL of each lung */
   double change[2];           /* of each lung's volume, from supine rest; 0.1 is 10 % more */
   double turned_over;         /* share of the triangles, from full inflation */
-  double dependent; /* what 500 mL adds per volume: lowest quarter of height over uppermost */
-  double breath[2]; /* share of each lung in those 500 mL */
+  double dependent; /* what a breath (a fifteenth of full) adds per volume: the lowest quarter of
+                       height over the uppermost */
+  double breath[2]; /* share of each lung in it */
 } posture_figures;
 
 /* Measures a basis of two lungs whose rest is known. */
