@@ -24,7 +24,7 @@ static void print_help(void) {
              "\n"
              "  supine phantom -o lungs.ply\n"
              "  supine precompute lungs.ply -o lungs.safetensors\n"
-             "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
+             "  supine deform lungs.safetensors --posture prone -o prone.vtp\n"
              "\n"
              "Lengths are millimetres and volumes millilitres; axes are the DICOM patient axes\n"
              "(x to the left, y to the back, z to the head).\n"

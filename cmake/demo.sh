@@ -8,8 +8,7 @@ mkdir -p "$folder"
 "$supine" phantom -o "$folder/lungs.ply"
 "$supine" precompute "$folder/lungs.ply" -o "$folder/lungs.safetensors"
 for posture in supine prone left right; do
-  "$supine" deform "$folder/lungs.safetensors" --posture $posture --volume 500 \
-    -o "$folder/$posture.vtp"
+  "$supine" deform "$folder/lungs.safetensors" --posture $posture -o "$folder/$posture.vtp"
 done
 "$supine" export "$folder/lungs.safetensors" -o "$folder/lungs.html"
 picture=""
@@ -20,14 +19,14 @@ fi
 cat <<END
 
 Made in $folder/:
-  lungs.ply            a pair of lungs at rest
+  lungs.ply            a pair of lungs at full inflation
   lungs.safetensors    their basis: every direction of gravity, every volume
   supine.vtp prone.vtp left.vtp right.vtp
-                       the lungs 500 mL fuller, lying on back, belly and either side
+                       the lungs at rest, lying on back, belly and either side
   lungs.html           the same lungs to turn and breathe in a browser
 $picture
 
 To look at them: open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
 coloured by displacement_magnitude.
-To go on: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume 800 -o mine.ply
+To go on: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume rest+800 -o mine.ply
 END
