@@ -77,12 +77,18 @@ static const char weights_text[] =
     "weight[k] = (s * sum over i of modes[k][i] * Y[i](g) - offset[k]) / unit[k]. g: unit vector "
     "of gravity in the patient's axes (x left, y back, z head; supine 0,1,0). Y: real spherical "
     "harmonics, orthonormal, no Condon-Shortley phase, index l*l+l+m, m < 0 the sine terms: "
-    "Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). s: breath scale, 0 at rest.";
+    "Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). s: breath scale, 0 for the vertices as "
+    "they are.";
 static const char volume_text[] =
     "mL gained by lung j at breath scale s: c1 s + c2 s^2 + c3 s^3, c1 = sum linear[j][k] v[k], "
     "c2 = sum quadratic[j][k][l] v[k] v[l], c3 = sum cubic[j][k][l][m] v[k] v[l] v[m], with v[k] "
     "= sum over i of modes[k][i] * Y[i](g); arrays are flat, last index fastest. For a volume: "
     "the root s that grows out of 0.";
+
+static const char resting_text[] =
+    "mL that all lungs hold at rest beyond the vertices as they are, which are full inflation: the "
+    "sum over l <= 2 and m of harmonics[l*l+l+m] * Y[l*l+l+m](g), negative; scan: the same of the "
+    "scan that they were found from.";
 
 static json_t *lungs(const export_source *source) {
   json_t *array = json_array();
@@ -128,6 +134,12 @@ json_t *supine_export_glb_extras(const export_source *source, const export_glb_o
     (void)json_object_set_new(supine, "breathVolume", json_real(options->breath.volume));
   } else {
     (void)json_object_set_new(supine, "breathScale", json_real(options->breath.scale));
+  }
+  if (source->info->resting_volume != NULL) {
+    (void)json_object_set_new(supine, "restingVolume",
+                              json_pack("{s:s, s:o, s:f}", "text", resting_text, "harmonics",
+                                        supine_export_glb_numbers(source->info->resting_volume, 9),
+                                        "scan", source->info->scan_volume));
   }
   if (source->info->has_volume && count <= FORMS_MAX) {
     (void)json_object_set_new(supine, "volume",
