@@ -20,8 +20,8 @@ def numbers(result):
     info, comparison = result["info"], result["comparison"]
     found = {"vertices": info["vertices"], "error_rms_percent": info["error"].get("rms_percent")}
     lungs = info["lungs"].split(",")
-    for lung, volume in zip(lungs, str(info.get("rest_volume_ml", "")).split(",")):
-        found[f"rest_{lung}_lung_ml"] = float(volume) if volume else None
+    for lung, volume in zip(lungs, str(info.get("reference_volume_ml", "")).split(",")):
+        found[f"{lung}_lung_ml"] = float(volume) if volume else None
     for posture in comparison["postures"]:
         found[f"rms_in_{posture['name']}_mm"] = posture["displacement_mm"]["rms"]
         for lung, gain in posture.get("gain_ml", {}).items():

@@ -230,7 +230,7 @@ const supine_option supine_command_model_options[] = {
      FILLS(law_choice), .choices = laws},
     {"resting", 0, "LIST|FILE",
      "volume at rest as a share of the full one, by posture; default "
-     "left=0.47,right=0.47,supine=0.43,prone=0.47,inverted=0.43,upright=0.53. Name those that "
+     "left, right and prone 0.47, supine and inverted 0.43, upright 0.53. Name those that "
      "differ, or a CSV file with the columns posture,share",
      .read = read_resting, .file = SUPINE_FILE_NONE,
      .wants = "POSTURE=SHARE,... or a CSV file with the columns posture,share"},

@@ -137,7 +137,10 @@ static int draw(const request *wanted, supine_renderer *renderer,
     memcpy(panel[i].gravity, postures->item[i].gravity, sizeof panel[i].gravity);
   }
   (void)snprintf(label, sizeof label, "%s%s, mm",
-                 reference != NULL ? "difference from " : "displacement from rest",
+                 reference != NULL ? "difference from "
+                 : supine_basis_get_info(basis)->resting_volume != NULL
+                     ? "displacement from full inflation"
+                     : "displacement from rest",
                  reference != NULL ? reference : "");
   supine_picture picture = {
       .panel = panel,
