@@ -123,7 +123,7 @@ static void choose_size(const request *wanted, supine_picture *picture) {
 }
 
 /* Draws and writes what states and colours were found for. */
-static int draw(const request *wanted, supine_renderer *renderer,
+static int draw(const supine_basis *basis, const request *wanted, supine_renderer *renderer,
                 const supine_posture_list *postures, const char *reference, const state *states,
                 const double ends[2]) {
   supine_panel panel[SUPINE_PANELS_MAX];
@@ -188,8 +188,8 @@ static int render(const supine_basis *basis, const request *wanted,
     find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &ends[0],
                &ends[1]);
   }
-  result =
-      draw(wanted, renderer, postures, reference != NULL ? reference->name : NULL, states, ends);
+  result = draw(basis, wanted, renderer, postures, reference != NULL ? reference->name : NULL,
+                states, ends);
 cleanup:
   supine_render_destroy(renderer);
   supine_compare_destroy(compare);
