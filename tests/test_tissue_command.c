@@ -135,6 +135,13 @@ static void test_solve_lesion_outside_is_warned(void **state) {
   assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is outside the lungs"));
 }
 
+static void test_solve_lesion_deep_inside_says_why_it_changes_nothing(void **state) {
+  (void)state;
+  assert_int_equal(solve("--lesion", "56,-111,-79,5,4", out), SUPINE_EXIT_OK);
+  assert_non_null(strstr(text, "the lesion at 56,-111,-79 is inside the lungs"));
+  assert_non_null(strstr(text, "a larger RADIUS would"));
+}
+
 static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
   (void)state;
   static const char *const bad[][2] = {{"--lesion", "1,2,3,4"},
@@ -413,6 +420,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_solve_lesion_factor_one_writes_the_same_bytes),
       cmocka_unit_test(test_solve_lesion_outside_is_warned),
+      cmocka_unit_test(test_solve_lesion_deep_inside_says_why_it_changes_nothing),
       cmocka_unit_test(test_solve_bad_tissue_options_are_usage_errors),
       cmocka_unit_test(test_solve_bad_expandability_file_names_vertex),
       cmocka_unit_test(test_solve_expandability_file_of_ones_equals_uniform),

@@ -9,6 +9,7 @@
 #include "sh/base/parallel.h"
 
 #include "precompute/command/model_options.h"
+#include "precompute/inside/surface.h"
 #include "runtime/options/posture_list.h"
 
 void supine_command_model_options_begin(supine_model_options *options) {
@@ -389,6 +390,24 @@ static supine_status set_directions(supine_model_options *options, const supine_
   return supine_physics_directions_load(options->direction, n, options->vectors, error);
 }
 
+/* Why a lesion changes nothing: stiffness is the surface's, and it reaches none of it. */
+static void mention_lesion(const char *command, const supine_lungs *lungs,
+                           const supine_lesion *lesion) {
+  supine_inside_surface *surface = NULL;
+  const double *c = lesion->centre;
+  if (supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                   lungs->mesh.triangles, &surface, NULL) != SUPINE_OK) {
+    return;
+  }
+  const supine_inside_place place = supine_inside_surface_find(surface, c, NULL);
+  supine_options_say(command,
+                     "warning: the lesion at %g,%g,%g is %s the lungs, %.0f mm from their surface: "
+                     "with a radius of %g mm it reaches none of it and changes nothing%s",
+                     c[0], c[1], c[2], place.depth > 0.0 ? "inside" : "outside", fabs(place.depth),
+                     lesion->radius, place.depth > 0.0 ? "; a larger RADIUS would" : "");
+  supine_inside_surface_destroy(surface);
+}
+
 static supine_status set_lesions(supine_model_options *options, const char *command,
                                  const supine_lungs *lungs, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -412,11 +431,7 @@ static supine_status set_lesions(supine_model_options *options, const char *comm
       return status;
     }
     if (reached == 0) {
-      supine_options_say(
-          command,
-          "warning: the lesion at %g,%g,%g is outside the lungs: no vertex within its "
-          "%g mm, so it changes nothing",
-          lesion->centre[0], lesion->centre[1], lesion->centre[2], lesion->radius);
+      mention_lesion(command, lungs, lesion);
     }
   }
   return SUPINE_OK;

@@ -161,10 +161,12 @@ SUPINE_API void supine_basis_lung_cubic(const supine_basis *basis, size_t lung,
 SUPINE_API void supine_basis_cubic(const supine_basis *basis, const double *weights,
                                    double cubic[3]);
 
-/** The scale at which the lungs together gain `volume` mL (negative: lose).
+/** The scale at which the lungs together hold `volume` mL beyond the file's surface (negative:
+ * less).
  * @param scale  one number for all lungs
  * @retval SUPINE_ERROR_OPEN_SURFACE  the file has no volume forms
- * @retval SUPINE_ERROR_NUMERICAL     no scale reaches that volume before the surface folds */
+ * @retval SUPINE_ERROR_NUMERICAL     the volume turns back before it gets there. Triangles may turn
+ *                                    over earlier: that takes a look at the positions */
 SUPINE_API supine_status supine_basis_scale(const supine_basis *basis, const double *weights,
                                             double volume, double *scale, supine_error *error);
 
