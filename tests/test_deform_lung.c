@@ -62,7 +62,7 @@ static void even_direction(size_t q, double g[3]) {
   g[2] = z;
 }
 
-/* Height along gravity, 0 to 1, projected to band 3 (DESIGN 5, 7), and d of (15)-(17). */
+/* Height along gravity, 0 to 1, projected to band 3, and d of (15)-(17). */
 static void make_field(fixture *f) {
   const size_t n = f->vertices;
   double *sums = fixture_allocate(n * MODES, sizeof *sums);

@@ -453,7 +453,7 @@ static void test_weights_bad_gravity_refused(void **state) {
   assert_int_equal(supine_basis_weights(basis, (double[]){0, (double)NAN, 0}, weights),
                    SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_basis_weights(basis, (double[]){0, 2.5, 0}, weights), SUPINE_OK);
-  /* Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), as DESIGN's convention lists them. */
+  /* Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), as sh.h lists them. */
   const double y[4] = {0.28209479177387814, 0.48860251190291992, 0, 0};
   for (size_t k = 0; k < 2; ++k) {
     double want = 0;

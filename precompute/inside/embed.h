@@ -42,7 +42,7 @@ typedef struct supine_inside_report {
 } supine_inside_report;
 
 /** Embeds content in the lungs of an open basis and writes the basis file that moves it: besides
- * what DESIGN calls for, tensors
+ * what every basis has, tensors
  *
  *     part   U32 [N]  which name a point goes by; of a grid, its node
  *     depth  F32 [N]  mm below the surface, negative outside

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/** Laws by name: a set of constants each (DESIGN tables what of measured motion they explain).
+/** Laws by name: a set of constants each.
  *
  *     law    base  gain  cx,cy,cz   c1..c6                    reach  moves
  *     deep   0.9   0.4   0,-0.2,0   6, 2.6, 15, 1, 16, 1.3    10 mm  all three ways, as a breath
@@ -22,9 +22,9 @@ extern "C" {
  * The paper's own constants (Table I) are lost: c1..c6 of `paper` and `tidal` are fits to the 4-D
  * CT landmarks of ten patients (DIR-Lab), those of `deep` to full breaths of ten more (DIR-Lab
  * COPDgene). In the posture of those scans, supine, h = 1 - Y: base, cy and gain cannot be told
- * apart there. What of the gradient turns with gravity, 0.4 of a mean of 1, is Milic-Emili's (J
- * Appl Physiol 1966): at rest the lowest lung lies about 1.5 times as far below its full size as
- * the uppermost. */
+ * apart there. What of the gradient turns with gravity is taken as 0.4 of a mean of 1: at rest the
+ * lowest lung lies 1.5 times as far below its full size as the uppermost. That lower regions are
+ * the emptier ones is Milic-Emili's (J Appl Physiol 1966); the figure itself is an assumption. */
 typedef enum supine_law {
   SUPINE_LAW_DEEP,
   SUPINE_LAW_TIDAL,
