@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Volume, box and vertex areas of a surface. */
 #include <math.h>
+#include <string.h>
 
 #include "mesh/mesh.h"
 
@@ -87,4 +88,29 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices) 
         0.0;
   }
   return mesh->triangle_count == 0 ? 0.0 : (double)turned / (double)mesh->triangle_count;
+}
+
+void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
+  memset(normals, 0, 3 * mesh->vertex_count * sizeof *normals);
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    const double *p = mesh->vertices + 3 * (size_t)corner[0];
+    const double *q = mesh->vertices + 3 * (size_t)corner[1];
+    const double *r = mesh->vertices + 3 * (size_t)corner[2];
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t a = (k + 1) % 3;
+      const size_t b = (k + 2) % 3;
+      const double area = (q[a] - p[a]) * (r[b] - p[b]) - (q[b] - p[b]) * (r[a] - p[a]);
+      for (size_t v = 0; v < 3; ++v) {
+        normals[3 * (size_t)corner[v] + k] += area;
+      }
+    }
+  }
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    double *n = normals + 3 * i;
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (size_t k = 0; k < 3 && length > 0.0; ++k) {
+      n[k] /= length;
+    }
+  }
 }

@@ -127,6 +127,10 @@ void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[
 /** One third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
+/** Outward unit normals [vertex_count, 3]: the triangles' at each vertex, weighted by their areas;
+ * 0 where they have none. */
+void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
+
 /** Share, 0 to 1, of the triangles whose normal turns by more than a right angle where the vertices
  * move to `vertices` [vertex_count, 3]: more than a few in a thousand, and the surface looks torn.
  */

@@ -61,32 +61,6 @@ supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs) {
   return frame;
 }
 
-/* Unit normals of vertices, of the triangles' areas. */
-static void find_normals(const supine_mesh *mesh, double *normals) {
-  memset(normals, 0, 3 * mesh->vertex_count * sizeof *normals);
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *corner = mesh->triangles + 3 * t;
-    const double *p = mesh->vertices + 3 * (size_t)corner[0];
-    const double *q = mesh->vertices + 3 * (size_t)corner[1];
-    const double *r = mesh->vertices + 3 * (size_t)corner[2];
-    for (size_t k = 0; k < 3; ++k) {
-      const size_t a = (k + 1) % 3;
-      const size_t b = (k + 2) % 3;
-      const double area = (q[a] - p[a]) * (r[b] - p[b]) - (q[b] - p[b]) * (r[a] - p[a]);
-      for (size_t v = 0; v < 3; ++v) {
-        normals[3 * (size_t)corner[v] + k] += area;
-      }
-    }
-  }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    double *n = normals + 3 * i;
-    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (size_t k = 0; k < 3 && length > 0.0; ++k) {
-      n[k] /= length;
-    }
-  }
-}
-
 /* Row i: the plane of the state's surface nearest to where vertex i is. Weight 0: none that fits.
  */
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -316,8 +290,8 @@ static supine_status prepare(matching *m, const supine_model *model, size_t land
     free(all);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  find_normals(&m->rest->mesh, all);
-  find_normals(m->state, m->state_normals);
+  supine_mesh_vertex_normals(&m->rest->mesh, all);
+  supine_mesh_vertex_normals(m->state, m->state_normals);
   for (size_t i = 0; i < m->count; ++i) {
     const size_t v = i * n / m->count;
     m->vertex[i] = v;

@@ -14,27 +14,6 @@ static void box_direction(const supine_lungs *lungs, const double c[6], size_t v
   d[2] = -c[4] * pow(box[2], c[5]);                    /* (17) */
 }
 
-/* Sums of the triangles' area vectors at each vertex, not yet of unit length. */
-static void vertex_normals(const supine_mesh *mesh, double *normals) {
-  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
-    normals[i] = 0.0;
-  }
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *corner = mesh->triangles + 3 * t;
-    const double *p = mesh->vertices + 3 * (size_t)corner[0];
-    const double *q = mesh->vertices + 3 * (size_t)corner[1];
-    const double *r = mesh->vertices + 3 * (size_t)corner[2];
-    for (size_t k = 0; k < 3; ++k) {
-      const size_t a = (k + 1) % 3;
-      const size_t b = (k + 2) % 3;
-      const double area = (q[a] - p[a]) * (r[b] - p[b]) - (q[b] - p[b]) * (r[a] - p[a]);
-      for (size_t v = 0; v < 3; ++v) {
-        normals[3 * (size_t)corner[v] + k] += area;
-      }
-    }
-  }
-}
-
 static void radial_directions(const supine_lungs *lungs, double *d) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const size_t begin = lungs->lung_begin[lung];
@@ -80,8 +59,7 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     }
     break;
   case SUPINE_DIRECTION_NORMAL:
-    vertex_normals(&lungs->mesh, directions);
-    normalise(n, directions);
+    supine_mesh_vertex_normals(&lungs->mesh, directions);
     break;
   case SUPINE_DIRECTION_RADIAL:
     radial_directions(lungs, directions);
