@@ -23,8 +23,3 @@ supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_m
   *mesh = made;
   return SUPINE_OK;
 }
-
-void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char *text,
-                                    size_t size) {
-  (void)snprintf(text, size, "%s", supine_basis_get_info(basis)->lung_names[lung]);
-}

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What commands that read a basis share: its surface as a mesh, its lungs' names. */
+/* What commands that read a basis share: its surface as a mesh. */
 #ifndef SUPINE_BASIS_INPUT_H
 #define SUPINE_BASIS_INPUT_H
 
@@ -10,9 +10,5 @@
 
 /* The rest surface as a mesh of its own. */
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
-
-/* Name of a lung, "left" or "right" for bases of this program; else its number. */
-void supine_options_basis_lung_name(const supine_basis *basis, size_t lung, char *text,
-                                    size_t size);
 
 #endif

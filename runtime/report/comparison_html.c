@@ -57,9 +57,7 @@ static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-    char name[32];
-    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
-    (void)json_array_append_new(list, json_string(name));
+    (void)json_array_append_new(list, json_string(info->lung_names[lung]));
   }
   return list;
 }

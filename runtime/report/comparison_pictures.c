@@ -24,8 +24,7 @@ static size_t choose_looks(const supine_comparison *c, look *looks) {
   const size_t lungs = supine_basis_get_info(c->basis)->lung_count;
   looks[0] = (look){.view = SUPINE_VIEW_ANTERIOR, .title = "from the front"};
   for (size_t lung = 0; lung < lungs; ++lung) {
-    char name[32];
-    supine_options_basis_lung_name(c->basis, lung, name, sizeof name);
+    const char *name = supine_basis_get_info(c->basis)->lung_names[lung];
     look *own = &looks[1 + lung];
     *own = (look){.view = strcmp(name, "right") == 0 ? SUPINE_VIEW_RIGHT : SUPINE_VIEW_LEFT,
                   .one_lung = true,
