@@ -141,17 +141,36 @@ writer page.html export lungs.safetensors
 writer lungs.glb export lungs.safetensors --animate
 writer frames.safetensors breathe lungs.safetensors --posture prone
 
-# A series is a folder of files: it cannot be nameless, so SIGKILL is beyond it; other signals not.
-for signal in TERM INT HUP; do
-  for i in 1 2 3 4; do
+# A series is a folder of files and an index, and a folder cannot be nameless: a process of its own
+# removes it, whatever ended the program, a moment later.
+settled() {
+  for _ in $(seq 1000); do
+    case "$(ls -A out)" in *.part-*) sleep 0.01 ;; *) return ;; esac
+  done
+}
+began=$(date +%s%N)
+mkdir out && "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null || fail "breathe"
+took=$((($(date +%s%N) - began) / 1000000))
+count=$(ls out/frames | wc -l)
+rm -rf out
+for signal in KILL TERM INT HUP; do
+  done_whole=0
+  for i in $(seq "$kills"); do
+    moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
     mkdir out
-    timeout -s $signal "0.0$i" "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null 2>&1
+    timeout -s $signal "$moment" "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null 2>&1
+    settled
     case "$(ls -A out | tr '\n' ' ')" in
-    "" | "frames frames.pvd ") ;;
-    *) fail "breathe: SIG$signal left $(ls -A out)" ;;
+    "") ;;
+    "frames frames.pvd ")
+      done_whole=$((done_whole + 1))
+      [ "$(ls out/frames | wc -l)" -eq "$count" ] || fail "breathe: SIG$signal at $moment s left part of a series"
+      ;;
+    *) fail "breathe: SIG$signal at $moment s left $(ls -A out)" ;;
     esac
     rm -rf out
   done
+  echo "breathe's series: $kills times SIG$signal within $took ms: $done_whole whole, the others nothing"
 done
 (mkdir out; ulimit -f 8; "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >said 2>&1)
 [ -z "$(ls -A out)" ] && grep -q 'File too large' said || fail "breathe: too large: $(cat said), $(ls -A out)"

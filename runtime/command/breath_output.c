@@ -1,13 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Where the frames of a breath go: a series for ParaView, or one safetensors file. */
-#include <dirent.h>
-#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
+#include "sh/base/folder.h"
 #include "sh/base/output.h"
 #include <supine/safetensors.h>
 
@@ -20,11 +17,9 @@ struct breath_output {
   const supine_mesh *rest;
   const breath_course *course;
   char *path;
-  char *folder;     /* of the series, when it is done; NULL: safetensors */
-  char *temporary;  /* where it grows, beside `folder`; empty: nowhere */
-  char *index;      /* the PVD file beside it; NULL: it is inside */
-  double *vertices; /* [N, 3] */
-  float *positions; /* [T, N, 3] */
+  supine_folder folder; /* of the series, with the PVD file beside it, or NULL: it is inside */
+  double *vertices;     /* [N, 3] */
+  float *positions;     /* [T, N, 3] */
   size_t next;
 };
 
@@ -42,83 +37,25 @@ static char *join(const char *first, const char *second) {
   return text;
 }
 
-static supine_status fail(const char *path, const char *what, supine_error *error) {
-  const int code = errno;
-  return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", path, what,
-                          strerror(code)); /* NOLINT(concurrency-mt-unsafe) */
-}
-
 static supine_status no_memory(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
 }
 
-/* Removes a folder of files, as far as it can. */
-static void remove_folder(const char *path) {
-  DIR *entries = opendir(path);
-  if (entries != NULL) {
-    const struct dirent *entry;
-    while ((entry = readdir(entries)) != NULL) { /* NOLINT(concurrency-mt-unsafe) */
-      if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) {
-        (void)unlinkat(dirfd(entries), entry->d_name, 0);
-      }
-    }
-    (void)closedir(entries);
-  }
-  (void)rmdir(path);
-}
-
-static supine_status folder_is_free(const char *path, supine_error *error) {
-  DIR *entries = opendir(path);
-  if (entries == NULL) {
-    return errno == ENOENT ? SUPINE_OK : fail(path, "cannot use this name for a folder", error);
-  }
-  size_t count = 0;
-  while (readdir(entries) != NULL) { /* NOLINT(concurrency-mt-unsafe) */
-    ++count;
-  }
-  (void)closedir(entries);
-  return count <= 2 ? SUPINE_OK
-                    : supine_error_set(error, SUPINE_ERROR_WRITE,
-                                       "%s: there is something in this folder already: remove it, "
-                                       "or choose another name",
-                                       path);
-}
-
-/* A folder of a name that ends in XXXXXX and nobody else has; its mode as the process's mask
- * allows, which mkdtemp's would not be. */
-static bool make_temporary(char *name) {
-  if (mkdtemp(name) == NULL || rmdir(name) != 0) {
-    return false;
-  }
-  return mkdir(name, 0777) == 0;
-}
-
 static supine_status open_series(breath_output *made, supine_error *error) {
-  made->folder = join(made->path, "");
-  if (made->folder == NULL) {
-    return no_memory(made->path, error);
-  }
-  size_t length = strlen(made->folder);
-  if (ends_in(made->path, ".pvd")) {
-    made->index = made->path;
-    length -= strlen(".pvd");
-  } else {
-    while (length > 1 && made->folder[length - 1] == '/') {
-      --length;
-    }
-  }
-  made->folder[length] = '\0';
   made->vertices = malloc(3 * made->rest->vertex_count * sizeof *made->vertices);
-  made->temporary = join(made->folder, ".part-XXXXXX");
-  if (made->vertices == NULL || made->temporary == NULL) {
+  if (made->vertices == NULL) {
     return no_memory(made->path, error);
   }
-  const supine_status status = folder_is_free(made->folder, error);
-  if (status != SUPINE_OK || !make_temporary(made->temporary)) {
-    made->temporary[0] = '\0';
-    return status != SUPINE_OK ? status : fail(made->path, "cannot create its folder", error);
+  if (!ends_in(made->path, ".pvd")) {
+    return supine_folder_open(made->path, NULL, &made->folder, error);
   }
-  return SUPINE_OK;
+  char *stem = strndup(made->path, strlen(made->path) - strlen(".pvd"));
+  if (stem == NULL) {
+    return no_memory(made->path, error);
+  }
+  const supine_status status = supine_folder_open(stem, made->path, &made->folder, error);
+  free(stem);
+  return status;
 }
 
 static supine_status open_tensors(breath_output *made, supine_error *error) {
@@ -166,12 +103,8 @@ void supine_command_breath_output_close(breath_output *output) {
   if (output == NULL) {
     return;
   }
-  if (output->temporary != NULL && output->temporary[0] != '\0') {
-    remove_folder(output->temporary);
-  }
+  supine_folder_close(&output->folder);
   free(output->path);
-  free(output->folder);
-  free(output->temporary);
   free(output->vertices);
   free(output->positions);
   free(output);
@@ -194,7 +127,7 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
   char name[FRAME_NAME_SIZE + 1];
   name[0] = '/';
   frame_name(frame, name + 1);
-  char *path = join(output->temporary, name);
+  char *path = join(output->folder.temporary, name);
   if (path == NULL) {
     return no_memory(output->path, error);
   }
@@ -238,7 +171,7 @@ static supine_status write_table(const breath_output *output, const double *volu
                                  supine_error *error) {
   const breath_course *course = output->course;
   supine_output file = {0};
-  char *path = join(output->temporary, "/breath.csv");
+  char *path = join(output->folder.temporary, "/breath.csv");
   if (path == NULL) {
     return no_memory(output->path, error);
   }
@@ -266,8 +199,8 @@ static supine_status write_table(const breath_output *output, const double *volu
 static supine_status commit_series(breath_output *output, const double *volumes,
                                    supine_error *error) {
   supine_status status = write_table(output, volumes, error);
-  if (status == SUPINE_OK && output->index == NULL) {
-    char *inside = join(output->temporary, "/breath.pvd");
+  if (status == SUPINE_OK && output->folder.index == NULL) {
+    char *inside = join(output->folder.temporary, "/breath.pvd");
     status =
         inside == NULL ? no_memory(output->path, error) : write_index(output, inside, "", error);
     free(inside);
@@ -275,16 +208,14 @@ static supine_status commit_series(breath_output *output, const double *volumes,
   if (status != SUPINE_OK) {
     return status;
   }
-  if (rename(output->temporary, output->folder) != 0) {
-    return fail(output->folder, "cannot give the series its name", error);
+  status = supine_folder_rename(&output->folder, error);
+  if (status == SUPINE_OK && output->folder.index != NULL) {
+    const char *slash = strrchr(output->folder.path, '/');
+    status = write_index(output, output->folder.index,
+                         slash == NULL ? output->folder.path : slash + 1, error);
   }
-  output->temporary[0] = '\0';
-  if (output->index != NULL) {
-    const char *slash = strrchr(output->folder, '/');
-    status = write_index(output, output->index, slash == NULL ? output->folder : slash + 1, error);
-    if (status != SUPINE_OK) {
-      remove_folder(output->folder);
-    }
+  if (status == SUPINE_OK) {
+    supine_folder_keep(&output->folder);
   }
   return status;
 }
