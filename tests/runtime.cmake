@@ -34,6 +34,13 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   set_tests_properties(install PROPERTIES TIMEOUT 120)
 endif()
 
+# The package for Python, by Debian's.
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
+  add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
+    ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
+  set_tests_properties(python PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
+endif()
+
 supine_test(runtime_quiet runtime_fixture)
 foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open close)
   target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})

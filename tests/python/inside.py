@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_python.py runs inside the clean environment that the wheel was installed into.
+
+    inside.py REFERENCE BASIS"""
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+
+import supine
+
+reference, path = sys.argv[1:3]
+
+
+def refused(kind, text, call, *arguments, **keywords):
+    try:
+        call(*arguments, **keywords)
+    except kind as error:
+        assert text in str(error), (text, str(error))
+        return str(error)
+    raise AssertionError(f"not refused: {text}")
+
+
+assert os.path.dirname(supine.__file__).startswith(sys.prefix), supine.__file__
+lungs = supine.open(path)
+n, k = lungs.vertex_count, lungs.mode_count
+assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
+
+# Views, without copies, that live as long as anyone looks.
+for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
+                            (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
+                            (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
+                            (lungs.tensor("lung"), (n,), np.uint8), (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int16)):
+    assert array.shape == shape and array.dtype == dtype and not array.flags.owndata
+    assert not array.flags.writeable and array.flags.c_contiguous
+assert lungs.tensor("vertices").ctypes.data == lungs.vertices.ctypes.data
+assert lungs.tensor("none") is None
+for i, part in enumerate(lungs.lungs.values()):
+    assert (lungs.tensor("lung")[part] == i).all()
+    assert (lungs.vertices[part].min(0) == lungs.bounds[i, 0]).all()
+    assert (lungs.vertices[part].max(0) == lungs.bounds[i, 1]).all()
+faces = lungs.faces.reshape(-1, 4)
+assert faces.dtype == np.int64 and (faces[:, 0] == 3).all() and (faces[:, 1:] == lungs.triangles).all()
+kept, first = supine.open(path).vertices, lungs.vertices.copy()
+gc.collect()
+assert (kept == first).all()
+
+# Bit for bit as C, from a file, from memory, in ranges.
+weights = lungs.weights("prone")
+scale = lungs.scale(weights, lungs.resting_volume("prone") + 321.5)
+assert abs(lungs.volume(weights, scale) - lungs.resting_volume("prone") - 321.5) < 1e-6
+assert abs(sum(lungs.volume(weights, scale, i) for i in range(2)) - lungs.volume(weights, scale)) < 1e-9
+out = path + ".raw"
+subprocess.run([reference, path, "prone", repr(scale), out], check=True)
+raw = np.fromfile(out, np.float32).reshape(5, n, 3)
+assert np.ptp(raw[0] - lungs.vertices) > 1.0  # mm: something moves
+with open(path, "rb") as file:
+    in_memory = supine.open(file.read())
+for basis in (lungs, in_memory):
+    points, normals = basis.deform_lit(weights, scale)
+    assert points.tobytes() == raw[0].tobytes() and normals.tobytes() == raw[1].tobytes()
+    assert basis.deform(list(weights), [scale, scale]).tobytes() == raw[0].tobytes()
+    assert basis.normals(points).tobytes() == raw[2].tobytes()
+    assert basis.deform_batch([weights, weights], [scale, -0.5 * scale]).tobytes() == raw[3:].tobytes()
+part = np.empty((50, 3), np.float32)
+assert lungs.deform(weights, scale, part, 100, 150) is part and part.tobytes() == raw[0, 100:150].tobytes()
+moved = lungs.displace(weights, scale)
+assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(weights, scale)
+
+# Directions.
+assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
+assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
+assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
+assert (lungs.weights(np.float32([0, -2, 0])) == weights).all()
+
+# The C library's refusals, as Python's kinds of exception and as Supine's.
+with open(path, "rb") as file:
+    whole = file.read()
+with open(path + ".cut", "wb") as file:
+    file.write(whole[:-1000])
+in_c = subprocess.run([reference, path + ".cut", "prone", "0", out], capture_output=True, text=True, check=False)
+assert in_c.returncode == 2 and in_c.stderr.startswith(path + ".cut: ")
+assert refused(ValueError, ".cut: ", supine.open, path + ".cut") == in_c.stderr.rstrip("\n")
+refused(supine.FormatError, "basis in memory: ", supine.open, whole[:-1000])
+refused(OSError, "missing.safetensors: cannot read", supine.open, "missing.safetensors")
+refused(supine.ArgumentError, "did you mean 'prone'", lungs.weights, "pron")
+refused(supine.ArgumentError, "gravity has no direction", lungs.weights, (0, 0, 0))
+refused(supine.ArgumentError, "gravity has no direction", lungs.resting_volume, (0, 0, float("nan")))
+refused(supine.NumericalError, "volume", lungs.scale, weights, -1e6)
+refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, weights, scale)
+assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
+# Python's own.
+refused(ValueError, "weights must be", lungs.deform, weights[:-1], scale)
+refused(ValueError, "scales must be 2 numbers", lungs.deform, weights, [scale] * 3)
+refused(ValueError, "float32", lungs.deform, weights, scale, np.empty((n, 3)))
+refused(ValueError, "float32", lungs.deform, weights, scale, np.empty((n - 1, 3), np.float32))
+refused(ValueError, "contiguous", lungs.deform, weights, scale, np.empty((n, 6), np.float32)[:, ::2])
+refused(IndexError, "vertices 0 to", lungs.deform, weights, scale, None, 0, n + 1)
+refused(IndexError, "lung 2 of 2", lungs.scale, weights, 0, 2)
+refused(ValueError, "scales must be", lungs.deform, weights, "deep")
+refused(TypeError, "", lungs.deform, weights, None)
+refused(ValueError, "", supine.open, path, storage="tiny")
+refused((ValueError, BufferError), "read-only", lungs.displace, weights, scale, lungs.vertices)
+try:
+    lungs.vertices[0] = 0
+    raise AssertionError("an open basis was written to")
+except ValueError:
+    pass
+
+# The interpreter's lock is released while vertices are visited: with a switch interval that never ends
+# a waiting thread gets the lock only where a call gives it away. `weights` keeps it.
+def lets_others_run(call, *arguments, tries=None):
+    gate, ran = threading.Lock(), []
+
+    def wait():
+        with gate:
+            ran.append(True)
+
+    gate.acquire()
+    waiting = threading.Thread(target=wait)
+    waiting.start()
+    gate.release()
+    count, until = 0, time.monotonic() + 60  # s, on the busiest machine
+    while not ran and (count < tries if tries else time.monotonic() < until):
+        call(*arguments)
+        count += 1
+    result = bool(ran)
+    waiting.join()
+    return result
+
+
+sys.setswitchinterval(1000)
+assert not lets_others_run(lungs.weights, "left", weights.copy(), tries=2000), "the test proves nothing"
+points = np.empty((n, 3), np.float32)
+many = np.tile(weights, (100, 1)), np.full(100, scale), np.empty((100, n, 3), np.float32)
+for call, *arguments in ((lungs.deform, weights, scale, points), (lungs.displace, weights, scale, points),
+                         (lungs.deform_lit, weights, scale, points, points.copy()),
+                         (lungs.normals, raw[0], points), (lungs.deform_batch, *many), (supine.open, path)):
+    assert lets_others_run(call, *arguments), f"{call} keeps the lock"
+sys.setswitchinterval(0.005)
+print("all as in C")

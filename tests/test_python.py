@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The package for Python, as others have it: a wheel, built and installed without a network into a
+clean environment.
+
+    test_python.py SOURCE_FOLDER LIBRARY SUPINE CC"""
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+
+source, library, supine, cc = sys.argv[1:5]
+for wanted in ("pip", "setuptools", "wheel", "numpy"):
+    if importlib.util.find_spec(wanted) is None:
+        print(f"skipped: this python has no {wanted}")
+        sys.exit(77)
+
+with tempfile.TemporaryDirectory() as folder:
+    # Modules of the user's own must not take the place of Debian's.
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PIP_"))}
+    clean.update(SUPINE_LIBRARY=library, HOME=folder, PIP_CONFIG_FILE=os.devnull, PIP_NO_CACHE_DIR="1",
+                 PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_NO_INDEX="1")
+
+    def run(*arguments, **keywords):
+        done = subprocess.run(arguments, cwd=folder, env=clean, text=True, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, check=False, **keywords)
+        assert done.returncode == 0, f"{' '.join(arguments)}\n{done.stdout}"
+        return done.stdout
+
+    # From a copy: building leaves files beside the sources.
+    for name in ("CMakeLists.txt", "sh", "runtime"):
+        path = os.path.join(source, name)
+        target = os.path.join(folder, "source", name)
+        if os.path.isdir(path):
+            shutil.copytree(path, target)
+        else:
+            os.makedirs(os.path.dirname(target))
+            shutil.copy(path, target)
+    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", "wheels",
+        "source/runtime/python")
+    wheel, = os.listdir(os.path.join(folder, "wheels"))
+    run(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", "clean")
+    python = os.path.join(folder, "clean/bin/python")
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", os.path.join("wheels", wheel))
+
+    run(cc, "-std=c17", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{source}/runtime/include",
+        f"-I{source}/sh/include", f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
+    run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
+    run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
+    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
+
+    # The examples; VTK's where Debian's python has it.
+    with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:
+        text = readme.read()
+    if importlib.util.find_spec("vtk") is None:
+        text = text[:text.index("## VTK")]
+    with open(os.path.join(folder, "examples.txt"), "w", encoding="utf-8") as examples:
+        examples.write(text)
+    print(run(python, "-m", "doctest", "examples.txt"), "examples run")
+    run(supine, "phantom", "-o", "small.ply", "--vertices", "500")
+    run(supine, "precompute", "small.ply", "-o", "small.safetensors", "--band", "3")
+    print(run(python, f"{source}/tests/bench/bench_python.py", "./reference", "small.safetensors", "2"))
