@@ -15,17 +15,15 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
 }
 
 /* Vertices begin <= i < end, all in one tile: the tile is evaluated aside and the part copied. */
-static void deform_part(const supine_kernels *kernels, const supine_tiles *tiles,
-                        const float *folded, size_t begin, size_t end,
-                        const supine_target *target) {
+static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
+                        size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
   const bool joined = target->y == NULL;
   const supine_target whole = {.x = aside,
                                .y = joined ? NULL : aside + TILE,
                                .z = joined ? NULL : aside + (size_t)2 * TILE,
-                               .rest = target->rest,
-                               .unit = target->unit};
-  kernels->deform(tiles, folded, begin / TILE, 1, &whole);
+                               .rest = target->rest};
+  kernel(tiles, folded, begin / TILE, 1, &whole);
   const size_t first = begin % TILE;
   const size_t count = end - begin;
   if (joined) {
@@ -37,20 +35,19 @@ static void deform_part(const supine_kernels *kernels, const supine_tiles *tiles
   }
 }
 
-void supine_deform_lung(const supine_kernels *kernels, const supine_tiles *tiles,
-                        const float *folded, size_t begin, size_t end,
-                        const supine_target *target) {
+void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
+                        size_t begin, size_t end, const supine_target *target) {
   size_t at = begin;
   while (at < end) {
     const supine_target here = supine_target_after(target, at - begin);
     const size_t whole = at % TILE == 0 ? (end - at) / TILE : 0;
     if (whole > 0) {
-      kernels->deform(tiles, folded, at / TILE, whole, &here);
+      kernel(tiles, folded, at / TILE, whole, &here);
       at += whole * TILE;
     } else {
       const size_t next = (at / TILE + 1) * TILE;
       const size_t last = next < end ? next : end;
-      deform_part(kernels, tiles, folded, at, last, &here);
+      deform_part(kernel, tiles, folded, at, last, &here);
       at = last;
     }
   }
@@ -65,7 +62,7 @@ static void deform_lungs(const supine_basis *basis, const double *weights, const
     if (first < last) {
       const supine_target here = supine_target_after(target, first - begin);
       supine_fold(basis, weights, scales[lung], folded);
-      supine_deform_lung(basis->kernels, &basis->tiles, folded, first, last, &here);
+      supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, first, last, &here);
     }
   }
   supine_stream_fence(target->stream);

@@ -26,7 +26,7 @@ struct supine_basis {
   const char *name_of[SUPINE_LUNGS_MAX];
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit; /**< the normals' modes: three axes, no rest; bytes NULL where there are none */
+  supine_tiles lit;   /**< the normals' modes; bytes NULL where there are none */
   supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
   const supine_kernels *kernels;
   bool stream; /**< positions outgrow the cache: store past it */
@@ -51,8 +51,8 @@ supine_status supine_basis_pack_normals(supine_basis *basis);
 unsigned char *supine_tiles_allocate(size_t bytes);
 
 /** Evaluates vertices begin <= i < end, all of one lung, into a target for them. */
-void supine_deform_lung(const supine_kernels *kernels, const supine_tiles *tiles,
-                        const float *folded, size_t begin, size_t end, const supine_target *target);
+void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
+                        size_t begin, size_t end, const supine_target *target);
 
 /** A target `count` vertices further on. */
 supine_target supine_target_after(const supine_target *target, size_t count);

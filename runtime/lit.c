@@ -5,23 +5,25 @@
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 
-/* What one unit of a packed mode stands for: its 16 bits are the upper ones of a word. */
-static const double packed_unit = 0x1p-16;
-
 enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
 
-/* Words of 16 vertices' modes j and j + 1 along one axis. */
-static void pack_pair(const supine_basis *basis, size_t tile, size_t axis, size_t j,
+/* Word `word` of 16 vertices along one axis. */
+static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
                       unsigned char *at) {
   const size_t count = basis->info.normal_count;
+  const size_t words = supine_tiles_normal_words(count);
   const size_t last = basis->info.vertex_count - 1;
-  uint32_t words[TILE];
+  uint32_t packed[TILE];
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = tile * TILE + v < last ? tile * TILE + v : last;
-    const int16_t *n = basis->info.normals + (3 * i + axis) * count + j;
-    words[v] = pair_narrow(n[0] / packed_unit, j + 1 < count ? n[1] / packed_unit : 0);
+    const int16_t *n = basis->info.normals + (3 * i + axis) * count;
+    double three[3] = {0, 0, 0};
+    for (size_t j = word, which = 0; j < count; j += words, ++which) {
+      three[which] = n[j] / normal_unit();
+    }
+    packed[v] = normal_narrow(three[0], three[1], three[2]);
   }
-  memcpy(at, words, sizeof words);
+  memcpy(at, packed, sizeof packed);
 }
 
 supine_status supine_basis_pack_normals(supine_basis *basis) {
@@ -35,9 +37,8 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   for (size_t t = 0; t < tile_count; ++t) {
     unsigned char *tile = tiles->bytes + t * tiles->stride;
     for (size_t axis = 0; axis < 3; ++axis) {
-      for (size_t j = 0; j < tiles->modes; j += 2) {
-        pack_pair(basis, t, axis, j,
-                  tile + axis * tiles->axis_bytes + supine_tiles_words_begin(tiles->modes, j));
+      for (size_t j = 0; j < supine_tiles_normal_words(tiles->modes); ++j) {
+        pack_word(basis, t, axis, j, tile + axis * tiles->axis_bytes + 64 * j);
       }
     }
   }
@@ -76,25 +77,23 @@ static void fold(const supine_basis *basis, size_t lung, const double *weights, 
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, weights, scale, v);
   for (size_t j = 0; j < basis->info.normal_count; ++j) {
-    folded[j] = (float)(packed_unit * v[j]);
+    folded[j] = (float)(normal_unit() * v[j]);
   }
 }
 
 /* Normals of vertices begin <= i < end, which may be of several lungs. */
 static void light(const supine_basis *basis, const double *weights, const double *scales,
                   size_t begin, size_t end, bool stream, float *normals) {
-  const supine_target target = {.x = normals,
-                                .unit = true,
-                                .stream = stream,
-                                .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX];
+  const supine_target target = {
+      .x = normals, .stream = stream, .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* words are filled up to three modes */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = supine_target_after(&target, first - begin);
       fold(basis, lung, weights, scales[lung], folded);
-      supine_deform_lung(basis->kernels, &basis->lit, folded, first, last, &here);
+      supine_deform_lung(basis->kernels->light, &basis->lit, folded, first, last, &here);
     }
   }
   supine_stream_fence(stream);

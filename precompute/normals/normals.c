@@ -7,14 +7,18 @@
 #include "precompute/normals/polynomial.h"
 #include "precompute/normals/states.h"
 #include "precompute/projection/compression.h"
+#include "runtime/kernels/compact.h"
+#include "runtime/kernels/tiles.h"
 #include "sh/base/parallel.h"
 
 /* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
  * errors change in the second digit. */
-enum { ROWS = 4096, STATES = 192, HELD_OUT = 64, STEP = 4 };
+enum { ROWS = 4096, STATES = 192, HELD_OUT = 64, STEP = 3 };
 
-static const double mean_wanted = 0.1; /* degrees */
-static const double p999_wanted = 1.0;
+/* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
+ * little differently. */
+static const double mean_wanted = 0.08;
+static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232;
 
 /* One lung's modes before they are rounded. */
@@ -121,27 +125,44 @@ static double angle_between(const double *a, const double *b) {
   return degrees * atan2(sqrt(x * x + y * y + z * z), dot(a, b, 3));
 }
 
-/* Angles off of each row in each state, added at `angles`; returns how many. `modes` are those that
- * the file will hold, `weights` theirs. */
+/* A vertex's modes along one axis as an open basis has them: rounded to 13, 10 and 9 bits. */
+static void pack(const int16_t *modes, size_t count, double *packed) {
+  const size_t words = supine_tiles_normal_words(count);
+  for (size_t j = 0; j < words; ++j) {
+    double three[3] = {0.0, 0.0, 0.0};
+    for (size_t k = j, which = 0; k < count; k += words, ++which) {
+      three[which] = modes[k] / normal_unit();
+    }
+    const uint32_t word = normal_narrow(three[0], three[1], three[2]);
+    for (size_t k = j, which = 0; k < count; k += words, ++which) {
+      packed[k] = (double)normal_number(word, which) * normal_unit();
+    }
+  }
+}
+
+/* Angles off of each row in each held-out state, added at `angles`; returns how many. `modes` are
+ * those that the file will hold, `weights` theirs. */
 static size_t measure(const supine_normals_rows *rows, size_t terms,
                       const supine_normals_states *states, size_t count, const int16_t *modes,
                       const double *weights, double *angles) {
   size_t found = 0;
+  double v[HELD_OUT][SUPINE_NORMALS_MOST];
   for (size_t i = 0; i < states->count; ++i) {
-    const double *phi = states->phi + i * terms;
-    double v[SUPINE_NORMALS_MOST];
     for (size_t j = 0; j < count; ++j) {
-      v[j] = dot(weights + j * terms, phi, terms);
+      v[i][j] = dot(weights + j * terms, states->phi + i * terms, terms);
     }
-    for (size_t r = 0; r < rows->count; ++r) {
+  }
+  for (size_t r = 0; r < rows->count; ++r) {
+    double packed[3][SUPINE_NORMALS_MOST];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      pack(modes + (3 * (size_t)rows->vertex[r] + axis) * count, count, packed[axis]);
+    }
+    for (size_t i = 0; i < states->count; ++i) {
       double exact[3];
-      double made[3] = {0.0, 0.0, 0.0};
+      double made[3];
       for (size_t axis = 0; axis < 3; ++axis) {
-        const int16_t *n = modes + (3 * (size_t)rows->vertex[r] + axis) * count;
-        exact[axis] = dot(rows->terms + (3 * r + axis) * terms, phi, terms);
-        for (size_t j = 0; j < count; ++j) {
-          made[axis] += v[j] * (double)n[j];
-        }
+        exact[axis] = dot(rows->terms + (3 * r + axis) * terms, states->phi + i * terms, terms);
+        made[axis] = dot(v[i], packed[axis], count);
       }
       angles[found++] = angle_between(exact, made);
     }

@@ -47,13 +47,15 @@ typedef struct supine_normals_modes {
   double p999;     /**< the 99.9th percentile of that */
 } supine_normals_modes;
 
-/** Finds them: the fewest modes of SUPINE_NORMALS_FEW, 4 more, ... SUPINE_NORMALS_MOST that err by
- * at most 0.1 degrees in the mean and 1 in the 99.9th percentile, or the most. More than
+/** Finds them: the fewest modes of SUPINE_NORMALS_FEW, 3 more (three share a word in an open
+ * basis),
+ * ... SUPINE_NORMALS_MOST that err by at most 0.08 degrees in the mean and 0.8 in the 99.9th
+ * percentile, or the most. More than
  * SUPINE_NORMALS_FIELD_MAX modes of the field are too many: then none are made.
  * Cost: Q (K + 1)^2 operations a triangle. Uses all cores.
  * @retval SUPINE_ERROR_NUMERICAL  the SVD failed
  * @retval SUPINE_ERROR_MEMORY */
-enum { SUPINE_NORMALS_FEW = 8, SUPINE_NORMALS_MOST = 24, SUPINE_NORMALS_FIELD_MAX = 24 };
+enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24, SUPINE_NORMALS_FIELD_MAX = 24 };
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,
                                           supine_normals_modes *made, supine_error *error);
 

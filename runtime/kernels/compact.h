@@ -86,6 +86,25 @@ static inline float triple_number(uint32_t word, size_t number) {
   return (float)word_integer(word << 11 * number);
 }
 
+/** Three modes of a normal in a word, likewise: 13, 10 and 9 bits from the uppermost, as the first
+ * modes are the large ones. */
+static inline uint32_t normal_narrow(double first, double second, double third) {
+  const uint32_t low = word_nearest(third, 0, 23) >> 23;
+  const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
+  return word_nearest(first, lower, 19);
+}
+
+/** What one unit of such a word stands for, of a file's 16 bits: the largest of those, 32767, comes
+ * to the largest that 9 bits in the upper end of a word can hold, 255 x 2^23. */
+static inline double normal_unit(void) {
+  return INT16_MAX / (255 * 0x1p23);
+}
+
+/** Number 0, 1 or 2 of those. */
+static inline float normal_number(uint32_t word, size_t number) {
+  return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
+}
+
 /** Three numbers in two words, in units of 2^-31 of their limit: the first and second in the upper
  * 21 bits of a word each, the third in what is left of both. None becomes 0 (see fixed_scale). */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {

@@ -7,8 +7,6 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-enum { NORMAL_MODES = 8 }; /* the usual number */
-
 /* Coefficient 2 pair, or the one after it, of vertices 8 half to 8 half + 7. */
 INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
                           supine_storage storage) {
@@ -159,34 +157,26 @@ INLINE void put(float *to, __m256 v, bool stream) {
 
 /* x y z over their length: the estimate of the inverse root has 12 bits, Newton's step doubles
  * them. The smallest normal number keeps 0 from becoming NaN. */
-INLINE void normalise(halves *x, halves *y, halves *z) {
-  for (size_t half = 0; half < 2; ++half) {
-    const __m256 square =
-        _mm256_max_ps(_mm256_fmadd_ps(x->v[half], x->v[half],
-                                      _mm256_fmadd_ps(y->v[half], y->v[half],
-                                                      _mm256_mul_ps(z->v[half], z->v[half]))),
-                      _mm256_set1_ps(0x1p-126F));
-    const __m256 guess = _mm256_rsqrt_ps(square);
-    const __m256 error = _mm256_fnmadd_ps(_mm256_mul_ps(square, guess), guess, _mm256_set1_ps(1));
-    const __m256 inverse =
-        _mm256_fmadd_ps(_mm256_mul_ps(guess, error), _mm256_set1_ps(0.5F), guess);
-    x->v[half] = _mm256_mul_ps(x->v[half], inverse);
-    y->v[half] = _mm256_mul_ps(y->v[half], inverse);
-    z->v[half] = _mm256_mul_ps(z->v[half], inverse);
-  }
+INLINE void normalise(__m256 *x, __m256 *y, __m256 *z) {
+  const __m256 square =
+      _mm256_max_ps(_mm256_fmadd_ps(*x, *x, _mm256_fmadd_ps(*y, *y, _mm256_mul_ps(*z, *z))),
+                    _mm256_set1_ps(0x1p-126F));
+  const __m256 guess = _mm256_rsqrt_ps(square);
+  const __m256 error = _mm256_fnmadd_ps(_mm256_mul_ps(square, guess), guess, _mm256_set1_ps(1));
+  const __m256 inverse = _mm256_fmadd_ps(_mm256_mul_ps(guess, error), _mm256_set1_ps(0.5F), guess);
+  *x = _mm256_mul_ps(*x, inverse);
+  *y = _mm256_mul_ps(*y, inverse);
+  *z = _mm256_mul_ps(*z, inverse);
 }
 
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                           bool with_rest, bool unit, supine_storage storage, bool vector) {
+                           bool with_rest, supine_storage storage, bool vector) {
   const bool compact = supine_tiles_compact(storage);
   triples result;
   if (vector) {
-    halves x = dot(tile, w, tiles->modes, storage);
-    halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
-    halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
-    if (unit) {
-      normalise(&x, &y, &z);
-    }
+    const halves x = dot(tile, w, tiles->modes, storage);
+    const halves y = dot(tile + tiles->axis_bytes, w, tiles->modes, storage);
+    const halves z = dot(tile + 2 * tiles->axis_bytes, w, tiles->modes, storage);
     interleave8(x.v[0], y.v[0], z.v[0], result.v);
     interleave8(x.v[1], y.v[1], z.v[1], result.v + 3);
     if (with_rest) {
@@ -226,12 +216,11 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
 }
 
 INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                       const supine_target *target, bool unit, supine_storage storage,
-                       bool vector) {
+                       const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    const triples xyz = deform_tile(tiles, tile, weights, target->rest, unit, storage, vector);
+    const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
     if (target->y != NULL) {
       put_separate(&xyz, target, t * TILE);
       continue;
@@ -245,24 +234,14 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
 INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
                            size_t count, const supine_target *target, supine_storage storage) {
   if (tiles->axes == 3) {
-    deform_all(tiles, weights, first, count, target, false, storage, true);
+    deform_all(tiles, weights, first, count, target, storage, true);
   } else {
-    deform_all(tiles, weights, first, count, target, false, storage, false);
+    deform_all(tiles, weights, first, count, target, storage, false);
   }
 }
 
 static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                    const supine_target *target) {
-  if (target->unit) {
-    supine_tiles same = *tiles;
-    if (tiles->modes == NORMAL_MODES) { /* known to the compiler */
-      supine_tiles_layout_lit(&same, NORMAL_MODES, tiles->count);
-      deform_all(&same, weights, first, count, target, true, SUPINE_STORAGE_INT16, true);
-    } else {
-      deform_all(tiles, weights, first, count, target, true, SUPINE_STORAGE_INT16, true);
-    }
-    return;
-  }
   switch (tiles->storage) {
   case SUPINE_STORAGE_EXACT:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
@@ -278,6 +257,67 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
     break;
   default:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+/* Modes that words begin, that they hold second and third: compact.h. */
+INLINE __m256 normal_mode(__m256i words, size_t which) {
+  return _mm256_cvtepi32_ps(which == 0   ? words /* shifts take constants */
+                            : which == 1 ? _mm256_slli_epi32(words, 13)
+                                         : _mm256_slli_epi32(words, 23));
+}
+
+/* A normal along one axis, before its length is taken out: a chain for each place in the words. */
+INLINE __m256 dot_normal(const unsigned char *at, const float *w, size_t words) {
+  __m256 sum[3] = {_mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps()};
+  for (size_t j = 0; j < words; ++j) {
+    const __m256i word = _mm256_load_si256((const __m256i *)(at + 64 * j));
+    for (size_t which = 0; which < 3; ++which) {
+      sum[which] = _mm256_fmadd_ps(_mm256_broadcast_ss(w + which * words + j),
+                                   normal_mode(word, which), sum[which]);
+    }
+  }
+  return _mm256_add_ps(_mm256_add_ps(sum[0], sum[1]), sum[2]);
+}
+
+INLINE void light_words(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                        const supine_target *target, size_t words) {
+  const size_t axis_bytes = 64 * words;
+  const unsigned char *tile = tiles->bytes + first * 3 * axis_bytes;
+  for (size_t t = 0; t < count; ++t, tile += 3 * axis_bytes) {
+    supine_prefetch_tile(tile, 3 * axis_bytes, target->prefetch);
+    for (size_t half = 0; half < 2; ++half) {
+      const unsigned char *at = tile + 32 * half;
+      __m256 x = dot_normal(at, weights, words);
+      __m256 y = dot_normal(at + axis_bytes, weights, words);
+      __m256 z = dot_normal(at + 2 * axis_bytes, weights, words);
+      __m256 xyz[3];
+      normalise(&x, &y, &z);
+      interleave8(x, y, z, xyz);
+      for (size_t j = 0; j < 3; ++j) {
+        put(target->x + t * TILE_NUMBERS + 24 * half + 8 * j, xyz[j], target->stream);
+      }
+    }
+  }
+}
+
+/* The usual numbers are known to the compiler. */
+static void light(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                  const supine_target *target) {
+  const size_t words = supine_tiles_normal_words(tiles->modes);
+  switch (words) {
+  case 2:
+    light_words(tiles, weights, first, count, target, 2);
+    break;
+  case 3:
+    light_words(tiles, weights, first, count, target, 3);
+    break;
+  case 4:
+    light_words(tiles, weights, first, count, target, 4);
+    break;
+  default:
+    light_words(tiles, weights, first, count, target, words);
     break;
   }
 }
@@ -334,7 +374,7 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
   }
 }
 
-const supine_kernels supine_kernels_avx2 = {deform, widen};
+const supine_kernels supine_kernels_avx2 = {deform, light, widen};
 #else
-const supine_kernels supine_kernels_avx2 = {NULL, NULL};
+const supine_kernels supine_kernels_avx2 = {NULL, NULL, NULL};
 #endif

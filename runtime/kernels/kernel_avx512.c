@@ -13,7 +13,7 @@
 #define UNROLL _Pragma("GCC unroll 16")
 #endif
 
-enum { COMMON_MODES = 16, NORMAL_MODES = 8 }; /* whose weights stay in registers */
+enum { COMMON_MODES = 16 }; /* whose weights stay in registers */
 
 /* Weight k in every lane: from a register where the number of modes is the common one. */
 typedef struct weights16 {
@@ -206,20 +206,15 @@ INLINE void normalise(__m512 *x, __m512 *y, __m512 *z) {
 }
 
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
-                           bool with_rest, bool unit, size_t known, supine_storage storage,
-                           bool vector) {
+                           bool with_rest, size_t known, supine_storage storage, bool vector) {
   const size_t modes = known > 0 ? known : tiles->modes;
   const bool common = known > 0;
   const bool compact = supine_tiles_compact(storage);
   triples result;
   if (vector) {
-    __m512 x = dot(tile, w, modes, common, storage);
-    __m512 y = dot(tile + tiles->axis_bytes, w, modes, common, storage);
-    __m512 z = dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage);
-    if (unit) {
-      normalise(&x, &y, &z);
-    }
-    result = interleave(x, y, z);
+    result = interleave(dot(tile, w, modes, common, storage),
+                        dot(tile + tiles->axis_bytes, w, modes, common, storage),
+                        dot(tile + 2 * tiles->axis_bytes, w, modes, common, storage));
     if (with_rest) {
       const triples rest = rest_positions(tiles, tile, compact);
       for (size_t j = 0; j < 3; ++j) {
@@ -246,16 +241,14 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
 /* What a caller's constants make of one loop. */
 typedef struct form {
   supine_storage storage;
-  bool vector, rest, unit, joined;
+  bool vector, rest, joined;
   size_t modes; /* where the compiler knows how many; else 0 */
 } form;
 
 INLINE void deform_all(const supine_tiles *any, const float *weights, size_t first, size_t count,
                        const supine_target *target, form f) {
   supine_tiles same = *any;
-  if (f.modes > 0 && f.unit) {
-    supine_tiles_layout_lit(&same, f.modes, any->count);
-  } else if (f.modes > 0) {
+  if (f.modes > 0) {
     supine_tiles_layout(&same, f.storage, f.modes, f.vector, any->count);
   }
   const supine_tiles *tiles = &same;
@@ -270,7 +263,7 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
   }
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.unit, f.modes, f.storage, f.vector);
+    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.modes, f.storage, f.vector);
     if (f.joined) {
       writer_put(&out[0], xyz.v[0]);
       writer_put(&out[0], xyz.v[1]);
@@ -311,17 +304,6 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size
 
 static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                    const supine_target *target) {
-  if (target->unit && tiles->modes == NORMAL_MODES) {
-    deform_all(tiles, weights, first, count, target,
-               (form){SUPINE_STORAGE_INT16, .vector = true, .unit = true, .joined = true,
-                      .modes = NORMAL_MODES});
-    return;
-  }
-  if (target->unit) {
-    deform_all(tiles, weights, first, count, target,
-               (form){SUPINE_STORAGE_INT16, .vector = true, .unit = true, .joined = true});
-    return;
-  }
   switch (tiles->storage) {
   case SUPINE_STORAGE_EXACT:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
@@ -337,6 +319,67 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
     break;
   default:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
+    break;
+  }
+}
+
+/* Modes that words begin, that they hold second and third: compact.h. */
+INLINE __m512 normal_mode(__m512i words, size_t which) {
+  return _mm512_cvtepi32_ps(which == 0   ? words /* shifts take constants */
+                            : which == 1 ? _mm512_slli_epi32(words, 13)
+                                         : _mm512_slli_epi32(words, 23));
+}
+
+/* A normal along one axis, before its length is taken out: a chain for each place in the words. */
+INLINE __m512 dot_normal(const unsigned char *at, const float *w, size_t words) {
+  __m512 sum[3] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
+  UNROLL for (size_t j = 0; j < words; ++j) {
+    const __m512i word = _mm512_load_si512(at + 64 * j);
+    UNROLL for (size_t which = 0; which < 3; ++which) {
+      sum[which] = _mm512_fmadd_ps(_mm512_set1_ps(w[which * words + j]), normal_mode(word, which),
+                                   sum[which]);
+    }
+  }
+  return _mm512_add_ps(_mm512_add_ps(sum[0], sum[1]), sum[2]);
+}
+
+INLINE void light_words(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                        const supine_target *target, size_t words) {
+  const size_t axis_bytes = 64 * words;
+  const unsigned char *tile = tiles->bytes + first * 3 * axis_bytes;
+  writer out = writer_open(target->x, target);
+  for (size_t t = 0; t < count; ++t, tile += 3 * axis_bytes) {
+    supine_prefetch_tile(tile, 3 * axis_bytes, target->prefetch);
+    __m512 x = dot_normal(tile, weights, words);
+    __m512 y = dot_normal(tile + axis_bytes, weights, words);
+    __m512 z = dot_normal(tile + 2 * axis_bytes, weights, words);
+    normalise(&x, &y, &z);
+    const triples xyz = interleave(x, y, z);
+    for (size_t j = 0; j < 3; ++j) {
+      writer_put(&out, xyz.v[j]);
+    }
+  }
+  if (count > 0) {
+    writer_close(&out, target);
+  }
+}
+
+/* The usual numbers are known to the compiler. */
+static void light(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                  const supine_target *target) {
+  const size_t words = supine_tiles_normal_words(tiles->modes);
+  switch (words) {
+  case 2:
+    light_words(tiles, weights, first, count, target, 2);
+    break;
+  case 3:
+    light_words(tiles, weights, first, count, target, 3);
+    break;
+  case 4:
+    light_words(tiles, weights, first, count, target, 4);
+    break;
+  default:
+    light_words(tiles, weights, first, count, target, words);
     break;
   }
 }
@@ -389,7 +432,7 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
   }
 }
 
-const supine_kernels supine_kernels_avx512 = {deform, widen};
+const supine_kernels supine_kernels_avx512 = {deform, light, widen};
 #else
-const supine_kernels supine_kernels_avx512 = {NULL, NULL};
+const supine_kernels supine_kernels_avx512 = {NULL, NULL, NULL};
 #endif

@@ -81,7 +81,7 @@ static void normalise(float v[3][TILE]) {
 }
 
 static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                        bool rest, bool unit, float *xyz) {
+                        bool rest, float *xyz) {
   float amount[3][TILE] = {{0}};
   float p[TILE_NUMBERS] = {0};
   for (size_t axis = 0; axis < tiles->axes; ++axis) {
@@ -89,9 +89,6 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
   }
   if (rest) {
     widen_rest(tiles, tile, p);
-  }
-  if (unit) {
-    normalise(amount);
   }
   if (tiles->axes == 3) {
     for (size_t v = 0; v < TILE; ++v) {
@@ -115,15 +112,37 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   for (size_t t = 0; t < count; ++t) {
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
     if (target->y == NULL) {
-      deform_tile(tiles, tile, weights, target->rest, target->unit, target->x + t * TILE_NUMBERS);
+      deform_tile(tiles, tile, weights, target->rest, target->x + t * TILE_NUMBERS);
     } else {
       float xyz[TILE_NUMBERS];
-      deform_tile(tiles, tile, weights, target->rest, target->unit, xyz);
+      deform_tile(tiles, tile, weights, target->rest, xyz);
       for (size_t v = 0; v < TILE; ++v) {
         target->x[t * TILE + v] = xyz[3 * v];
         target->y[t * TILE + v] = xyz[3 * v + 1];
         target->z[t * TILE + v] = xyz[3 * v + 2];
       }
+    }
+  }
+}
+
+static void light(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                  const supine_target *target) {
+  const size_t words = supine_tiles_normal_words(tiles->modes);
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    float n[3][TILE] = {{0}};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t k = 0; k < 3 * words; ++k) {
+        uint32_t word[TILE];
+        memcpy(word, tile + axis * tiles->axis_bytes + k % words * sizeof word, sizeof word);
+        for (size_t v = 0; v < TILE; ++v) {
+          n[axis][v] += weights[k] * normal_number(word[v], k / words);
+        }
+      }
+    }
+    normalise(n);
+    for (size_t i = 0; i < TILE_NUMBERS; ++i) {
+      target->x[t * TILE_NUMBERS + i] = n[i % 3][i / 3];
     }
   }
 }
@@ -146,4 +165,4 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
   }
 }
 
-const supine_kernels supine_kernels_portable = {deform, widen};
+const supine_kernels supine_kernels_portable = {deform, light, widen};

@@ -79,10 +79,17 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->count = count;
 }
 
-/** The layout of tiles of normals: INT16 modes along three axes, and nothing else. */
+/** How many words hold the modes of a normal along one axis: word j modes j, j + words and
+ * j + 2 words (compact.h), missing ones 0. */
+static inline size_t supine_tiles_normal_words(size_t modes) {
+  return (modes + 2) / 3;
+}
+
+/** The layout of tiles of normals: 16 words for each word of each axis, and nothing else. */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
-  supine_tiles_layout(tiles, SUPINE_STORAGE_INT16, modes, true, count);
-  tiles->stride = tiles->rest_begin;
+  *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
+  tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
+  tiles->stride = 3 * tiles->axis_bytes;
 }
 
 /** How to ask for tiles that come from memory ahead of their use. */
@@ -111,7 +118,6 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 typedef struct supine_target {
   float *x, *y, *z;
   bool rest;   /**< positions; otherwise displacements alone */
-  bool unit;   /**< vectors of length 1, of tiles laid out for normals; without rest, one array */
   bool stream; /**< store past the cache */
   supine_prefetch prefetch;
   /** [16] or NULL. Where one array is written in several runs, what one run leaves to the next, so
@@ -145,6 +151,9 @@ typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t 
 
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
+  /** Vectors of length 1 from tiles of supine_tiles_layout_lit into one array; three weights for
+   * each of its words, in the order of the modes. */
+  supine_deform_tiles *light;
   supine_widen_tiles *widen;
 } supine_kernels;
 
