@@ -172,7 +172,18 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(1, "every lung", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "takes rest, full",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
+  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL): lungs hold 10 to 120 %",
+         "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
+  EXPECT(5, "left: 8080 mL are 135 % of", /* at the breath's end */
+         "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
+  EXPECT(5, "7720 mL are 129 % of",
+         "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.pvd");
   assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "7720 mL are 129 % of",
+         "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 --allow-folds "
+         "-o a.safetensors");
+  EXPECT(0, "8080 mL are 135 % of",
+         "compare lungs.safetensors --postures left --breath 5000 --allow-folds");
   EXPECT(0, "lungs hold 10 to 120 %",
          "deform lungs.safetensors --posture left --volume -5500 --allow-folds -o a.ply");
 }

@@ -8,6 +8,7 @@
 #include "runtime/command/breath_output.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
+#include "runtime/options/volume.h"
 
 static const char name[] = "breathe";
 
@@ -20,6 +21,7 @@ typedef struct request {
   supine_pv_breath breath;
   const char *pv;
   const char *path;
+  bool allow_folds;
   double fps, seconds, step; /* 0: not given */
 } request;
 
@@ -82,6 +84,7 @@ static const supine_option table[] = {
      "the paper's own breath instead: constant flow of this volume a frame, in and out; 1.5 takes "
      "5 s to inhale 500 mL at 66.66 frames a second",
      SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames a second, one every 15 ms", SUPINE_FILLS(request, fps),
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
@@ -186,6 +189,35 @@ static supine_status play_frames(const breath_course *course, breath_frames *fra
   return status;
 }
 
+/* Whether lungs can look as they do at the ends of the breath. */
+static supine_status check_ends(const supine_basis *basis, const request *wanted,
+                                const breath_course *course, supine_error *error) {
+  size_t least = 0;
+  size_t most = 0;
+  for (size_t t = 1; t < course->count; ++t) {
+    least = course->volume[t] < course->volume[least] ? t : least;
+    most = course->volume[t] > course->volume[most] ? t : most;
+  }
+  const size_t ends[2] = {least, most};
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
+    double weights[SUPINE_MODES_MAX];
+    double scales[SUPINE_LUNGS_MAX];
+    status = supine_basis_weights(basis, course->gravity + 3 * ends[i], weights);
+    if (status == SUPINE_OK) {
+      status = supine_basis_scale(basis, weights, course->volume[ends[i]], &scales[0], error);
+    }
+    for (size_t lung = 1; lung < course->lungs; ++lung) {
+      scales[lung] = scales[0];
+    }
+    if (status == SUPINE_OK) {
+      status =
+          supine_options_volume_check(basis, name, wanted->allow_folds, weights, scales, error);
+    }
+  }
+  return status;
+}
+
 static supine_status play(const supine_basis *basis, const request *wanted, size_t count,
                           const char *made_by, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -218,6 +250,9 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   }
   if (status == SUPINE_OK) {
     status = supine_breath_frames_create(basis, &course, &frames, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_ends(basis, wanted, &course, error);
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {

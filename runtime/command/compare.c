@@ -33,8 +33,9 @@ typedef struct request {
   bool json;
   bool by_rms;
   const char *volume; /* as given, or NULL */
-  double breath;      /* mL */
-  double rms;         /* mm */
+  bool allow_folds;
+  double breath; /* mL */
+  double rms;    /* mm */
 } request;
 
 static const supine_option table[] = {
@@ -42,6 +43,7 @@ static const supine_option table[] = {
      .standard = "supine,prone,left,right"},
     {"volume", 0, "VOLUME", "in every posture: " SUPINE_VOLUME_HELP, SUPINE_FILLS(request, volume),
      .rivals = "breath"},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {"breath", 0, "ML",
      "air added to that volume, to see which heights ventilate (where rest is known; elsewhere the "
      "breath is --volume itself)",
@@ -61,6 +63,8 @@ static const supine_option table[] = {
 
 static int compare(const char *path, const supine_basis *basis, const request *wanted) {
   supine_comparison comparison = {.path = path,
+                                  .command = name,
+                                  .allow_folds = wanted->allow_folds,
                                   .basis = basis,
                                   .inflation = {SUPINE_INFLATION_RMS, wanted->rms},
                                   .breath = wanted->breath};

@@ -11,14 +11,18 @@ static const double least_of_full = 0.1;         /* tissue alone: nothing is emp
 static const double most_of_full = 1.2;
 static const double folded_limit = 0.01; /* of the triangles: the surface is no lung's any more */
 
+const supine_option supine_options_folds[] = {
+    {"allow-folds", 0, NULL,
+     "also volumes below a tenth or above 1.2 of full inflation, and surfaces of which more than 1 "
+     "% of the triangles turn over",
+     .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
+    {.name = NULL}};
+
 const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: lung by lung, all named",
      SUPINE_FILLS(supine_volume_options, text), .rivals = "breath"},
-    {"allow-folds", 0, NULL,
-     "also volumes below a tenth or above 1.2 of full inflation, and surfaces of which more than 1 "
-     "% of the triangles turn over",
-     SUPINE_FILLS(supine_volume_options, allow_folds)},
+    {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
     {.name = NULL}};
 
 bool supine_options_volume_parse(const char *text, supine_volume *volume) {
@@ -59,6 +63,11 @@ double supine_options_volume_of(const supine_basis *basis, const supine_volume *
 void supine_options_volume_reference(const supine_basis *basis, double *volumes) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   memset(volumes, 0, info->lung_count * sizeof *volumes);
+  const char *stated = supine_basis_metadata(basis, "reference_volume_ml");
+  if (supine_basis_metadata(basis, "content") != NULL && stated != NULL &&
+      supine_options_parse_numbers(stated, info->lung_count, volumes)) {
+    return; /* what is inside has not the lungs' surface */
+  }
   for (size_t t = 0; t < info->triangle_count; ++t) {
     const uint32_t *corner = info->triangles + 3 * t;
     size_t lung = 0;
@@ -152,13 +161,52 @@ static supine_status lung_scales(const supine_basis *basis, const supine_volume 
   return status;
 }
 
-/* What is wrong with the surface at these scales: SUPINE_EXIT_OK, or after a message the exit code
- * (where rest is known and folds are not allowed). */
-static int check_surface(const supine_basis *basis, const char *command, bool allowed,
-                         const double *weights, const double *scales) {
+/* Fails with what is wrong where that is `strict`; else says it. */
+static supine_status say_or_fail(const supine_error *wrong, const char *command, bool strict,
+                                 supine_error *error) {
+  if (strict) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds does it all the same",
+                            wrong->message);
+  }
+  supine_options_say(command, "%s", wrong->message);
+  return SUPINE_OK;
+}
+
+static supine_status check_folds(const supine_basis *basis, const char *command, bool strict,
+                                 const double *weights, const double *scales, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const bool strict = info->resting_volume != NULL && !allowed;
-  const char *remedy = strict ? "; --allow-folds shows it all the same" : "";
+  supine_mesh mesh = {0};
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  double *moved = malloc(3 * info->vertex_count * sizeof *moved);
+  supine_status status = SUPINE_OK;
+  if (xyz == NULL || moved == NULL || supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  } else {
+    supine_deform(basis, weights, scales, xyz);
+    for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+      moved[i] = (double)xyz[i];
+    }
+    const double turned = supine_mesh_turned_over(&mesh, moved);
+    if (turned > folded_limit) {
+      supine_error wrong;
+      (void)supine_error_set(&wrong, SUPINE_ERROR_NUMERICAL,
+                             "the surface folds: %.3g %% of its triangles turn over",
+                             100.0 * turned);
+      status = say_or_fail(&wrong, command, strict, error);
+    }
+  }
+  supine_mesh_free(&mesh);
+  free(xyz);
+  free(moved);
+  return status;
+}
+
+supine_status supine_options_volume_check(const supine_basis *basis, const char *command,
+                                          bool allow_folds, const double *weights,
+                                          const double *scales, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const bool known = info->resting_volume != NULL;
+  const bool strict = known && !allow_folds;
   double reference[SUPINE_LUNGS_MAX];
   double full = 0.0;
   double volume = 0.0;
@@ -168,39 +216,16 @@ static int check_surface(const supine_basis *basis, const char *command, bool al
     volume += supine_basis_lung_volume(basis, lung, weights, scales[lung]);
   }
   const double share = 1.0 + volume / full;
-  if (info->resting_volume != NULL && !(share >= least_of_full && share <= most_of_full)) {
-    supine_options_say(command,
-                       "%.0f mL are %.0f %% of full inflation (%.0f mL): lungs hold %.0f to %.0f "
-                       "%%%s",
-                       full + volume, 100.0 * share, full, 100.0 * least_of_full,
-                       100.0 * most_of_full, remedy);
-    if (strict) {
-      return SUPINE_EXIT_NUMERICAL;
-    }
+  supine_status status = SUPINE_OK;
+  if (known && !(share >= least_of_full && share <= most_of_full)) {
+    supine_error wrong;
+    (void)supine_error_set(
+        &wrong, SUPINE_ERROR_NUMERICAL,
+        "%.0f mL are %.0f %% of full inflation (%.0f mL): lungs hold %.0f to %.0f %%",
+        full + volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+    status = say_or_fail(&wrong, command, strict, error);
   }
-  supine_mesh mesh = {0};
-  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
-  double *moved = malloc(3 * info->vertex_count * sizeof *moved);
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  int result = SUPINE_EXIT_OK;
-  if (xyz == NULL || moved == NULL || supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK) {
-    result = supine_options_fail(command, &error);
-  } else {
-    supine_deform(basis, weights, scales, xyz);
-    for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-      moved[i] = (double)xyz[i];
-    }
-    const double turned = supine_mesh_turned_over(&mesh, moved);
-    if (turned > folded_limit) {
-      supine_options_say(command, "the surface folds: %.3g %% of its triangles turn over%s",
-                         100.0 * turned, remedy);
-      result = strict ? SUPINE_EXIT_NUMERICAL : SUPINE_EXIT_OK;
-    }
-  }
-  supine_mesh_free(&mesh);
-  free(xyz);
-  free(moved);
-  return result;
+  return status != SUPINE_OK ? status : check_folds(basis, command, strict, weights, scales, error);
 }
 
 int supine_options_volume_scales(const supine_basis *basis, const char *command,
@@ -224,8 +249,11 @@ int supine_options_volume_scales(const supine_basis *basis, const char *command,
                                                       : "numbered from 0",
         wanted->text);
   }
-  const supine_status status = one ? common_scale(basis, wishes, gravity, weights, scales, &error)
-                                   : lung_scales(basis, wishes, gravity, weights, scales, &error);
-  return status != SUPINE_OK ? supine_options_fail(command, &error)
-                             : check_surface(basis, command, wanted->allow_folds, weights, scales);
+  supine_status status = one ? common_scale(basis, wishes, gravity, weights, scales, &error)
+                             : lung_scales(basis, wishes, gravity, weights, scales, &error);
+  if (status == SUPINE_OK) {
+    status =
+        supine_options_volume_check(basis, command, wanted->allow_folds, weights, scales, &error);
+  }
+  return status != SUPINE_OK ? supine_options_fail(command, &error) : SUPINE_EXIT_OK;
 }

@@ -10,6 +10,9 @@
 /* A table of options that fills a supine_volume_options: --volume and --allow-folds. */
 extern const supine_option supine_options_volume[];
 
+/* --allow-folds alone, into a bool. */
+extern const supine_option supine_options_folds[];
+
 typedef struct supine_volume_options {
   const char *text; /* as given, or NULL */
   bool allow_folds;
@@ -45,10 +48,15 @@ double supine_options_volume_of(const supine_basis *basis, const supine_volume *
 /* Volumes of the lungs of the file's surface, mL [lung_count]. */
 void supine_options_volume_reference(const supine_basis *basis, double *volumes);
 
+/* Whether a closed lung can look like this: where rest is known, volumes below tissue alone or a
+ * fifth above full, and surfaces that fold, are SUPINE_ERROR_NUMERICAL unless folds are allowed;
+ * elsewhere, and then, it is said. */
+supine_status supine_options_volume_check(const supine_basis *basis, const char *command,
+                                          bool allow_folds, const double *weights,
+                                          const double *scales, supine_error *error);
+
 /* Breath scales [lung_count] for --volume, also "left=rest,right=rest+200" for every lung of the
- * file; an exit code after a message. Where rest is known, volumes below tissue alone or a fifth
- * above full, and surfaces that fold, are refused unless folds are allowed; elsewhere, and then, it
- * is said. */
+ * file, checked; an exit code after a message. */
 int supine_options_volume_scales(const supine_basis *basis, const char *command,
                                  const supine_volume_options *wanted, const double gravity[3],
                                  const double *weights, double *scales);

@@ -40,6 +40,11 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   if (status != SUPINE_OK) {
     return status;
   }
+  status = supine_options_volume_check(c->basis, c->command, c->allow_folds, posture->weights,
+                                       after, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   supine_deform(c->basis, posture->weights, posture->scales, xyz[0]);
   supine_deform(c->basis, posture->weights, after, xyz[1]);
   status = supine_compare_slabs(c->basis, item->gravity, known ? xyz[0] : NULL, xyz[1],
@@ -58,7 +63,7 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   double scale = 0.0;
   supine_status status = supine_basis_weights(c->basis, item->gravity, posture->weights);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: gravity has no direction", item->name);
+    return supine_error_set(error, status, "gravity has no direction");
   }
   status = supine_compare_scale(c->compare, &c->inflation, item->gravity, posture->weights, &scale,
                                 error);
@@ -76,7 +81,12 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   }
   supine_compare_distances(c->compare, posture->weights, posture->scales, NULL, NULL, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
-  return info->has_volume ? find_breath(c, item, xyz, posture, error) : SUPINE_OK;
+  if (info->has_volume) {
+    status = supine_options_volume_check(c->basis, c->command, c->allow_folds, posture->weights,
+                                         posture->scales, error);
+  }
+  return info->has_volume && status == SUPINE_OK ? find_breath(c, item, xyz, posture, error)
+                                                 : status;
 }
 
 static supine_status find_energy(supine_comparison *c, supine_error *error) {
@@ -117,7 +127,11 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   }
   status = supine_compare_create(c->basis, &c->compare, error);
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], error);
+    supine_error wrong = {SUPINE_OK, ""};
+    status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
+    if (status != SUPINE_OK) {
+      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name, wrong.message);
+    }
   }
   if (status != SUPINE_OK) {
     goto cleanup;

@@ -22,7 +22,9 @@ typedef struct supine_compared_posture {
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path; /* of the basis, for showing */
+  const char *path;    /* of the basis, for showing */
+  const char *command; /* that compares, for what it says */
+  bool allow_folds;
   const supine_basis *basis;
   supine_inflation inflation;
   double breath; /* mL, on top of the inflation where rest is known; else it is the breath */
