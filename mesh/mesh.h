@@ -142,6 +142,7 @@ typedef struct supine_mesh_save_options {
   const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
                             vector and its magnitude (mm) as point data */
   const char *comment; /**< optional, one line */
+  double millimetres_per_unit; /**< of the file; 0: 1. Displacements are in its units as well */
 } supine_mesh_save_options;
 
 /** Writes the surface as the name's ending says: .ply (binary), .obj, .stl (binary), .vtp.

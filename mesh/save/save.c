@@ -77,6 +77,8 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   const supine_mesh_save_options chosen =
       options == NULL ? (supine_mesh_save_options){0} : *options;
   const bool ras = chosen.axes == SUPINE_AXES_RAS;
+  const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
+  const double horizontal = (ras ? -1.0 : 1.0) / unit;
   supine_output output;
   supine_status status = check(path, mesh, error);
   if (status != SUPINE_OK) {
@@ -89,7 +91,7 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   mesh_writer writer = {.out = output.file,
                         .mesh = mesh,
                         .rest = chosen.rest,
-                        .sign = {ras ? -1.0 : 1.0, ras ? -1.0 : 1.0, 1.0},
+                        .factor = {horizontal, horizontal, 1.0 / unit},
                         .space = ras ? "RAS" : "LPS"};
   copy_comment(chosen.comment, writer.comment, sizeof writer.comment);
   function(&writer);
@@ -98,7 +100,7 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
   for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
-    position[axis] = (float)(writer->sign[axis] * writer->mesh->vertices[3 * i + axis] + 0.0);
+    position[axis] = (float)(writer->factor[axis] * writer->mesh->vertices[3 * i + axis] + 0.0);
   }
 }
 
@@ -106,8 +108,9 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double d = writer->mesh->vertices[3 * i + axis] - writer->rest[3 * i + axis];
-    displacement[axis] = (float)(writer->sign[axis] * d + 0.0);
-    square += d * d;
+    const double scaled = writer->factor[axis] * d;
+    displacement[axis] = (float)(scaled + 0.0);
+    square += scaled * scaled;
   }
   displacement[3] = (float)sqrt(square);
 }

@@ -12,14 +12,14 @@ typedef struct mesh_writer {
   FILE *out;
   const supine_mesh *mesh;
   const double *rest; /**< NULL: no displacement */
-  double sign[3];     /**< of x, y, z in the file's axes */
+  double factor[3];   /**< of x, y, z: the sign of the file's axes over its unit */
   const char *space;  /**< "LPS" or "RAS" */
   char comment[256];  /**< one printable line, "" where there is none */
 } mesh_writer;
 
-/** Vertex i in the file's axes. */
+/** Vertex i in the file's axes and units. */
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
-/** Displacement of vertex i in the file's axes, and its length. */
+/** Displacement of vertex i in the file's axes and units, and its length. */
 void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
 
 /** Little-endian bytes of `count` values; at grows. */

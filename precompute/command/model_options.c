@@ -509,13 +509,17 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
                                              : "assumed",
       options->load.millimetres_per_unit == 0.0 ? 1.0 : options->load.millimetres_per_unit);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    double low = INFINITY;
-    double high = -INFINITY;
-    for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-      low = fmin(low, lungs->mesh.vertices[3 * i]);
-      high = fmax(high, lungs->mesh.vertices[3 * i]);
+    put(text, size, "; %s lung in", supine_lungs_name(lungs, lung));
+    for (size_t axis = 0; axis < 3; ++axis) {
+      double low = INFINITY;
+      double high = -INFINITY;
+      for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
+        low = fmin(low, lungs->mesh.vertices[3 * i + axis]);
+        high = fmax(high, lungs->mesh.vertices[3 * i + axis]);
+      }
+      put(text, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",", "xyz"[axis], low, high);
     }
-    put(text, size, "; %s lung at x %.0f to %.0f mm", supine_lungs_name(lungs, lung), low, high);
+    put(text, size, " mm");
   }
   put(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
   if (!reference->known) {

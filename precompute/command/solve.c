@@ -9,6 +9,7 @@
 #include <supine/volume.h>
 
 #include "precompute/command/model_options.h"
+#include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
 #include "runtime/options/volume.h"
 
@@ -19,7 +20,7 @@ typedef struct request {
   supine_orientation orientation;
   const char *path;
   const char *volume; /* as given, or NULL */
-  bool has_scale, has_vertex;
+  bool has_scale, has_vertex, as_scanned;
   double scale;
   size_t vertex;
 } request;
@@ -40,6 +41,7 @@ static const supine_option table[] = {
      "instead of a posture: the response of every vertex to a unit force on this one (from 0), a "
      "column of the transfer matrix T, as CSV",
      SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex"},
+    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -168,7 +170,11 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   }
   supine_tissue_rest(lungs, wanted->model.model.share, rest.vertices);
   supine_physics_solution_apply(&solution, &rest, scale, deformed.vertices);
-  const supine_mesh_save_options save = {.rest = rest.vertices};
+  supine_mesh_save_options save = {.rest = rest.vertices};
+  if (wanted->as_scanned) {
+    save.axes = wanted->model.frame.axes;
+    save.millimetres_per_unit = wanted->model.frame.millimetres_per_unit;
+  }
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
@@ -213,6 +219,11 @@ static int run(void *chosen, const supine_arguments *given) {
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
                                        wanted->has_vertex, &lungs);
+  }
+  if (result == SUPINE_EXIT_OK && wanted->as_scanned &&
+      wanted->model.frame.millimetres_per_unit == 0.0) {
+    supine_options_say(name, "--as-scanned: the surfaces came in different axes");
+    result = SUPINE_EXIT_INPUT;
   }
   if (result == SUPINE_EXIT_OK) {
     supine_error error;

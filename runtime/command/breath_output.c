@@ -15,6 +15,7 @@
 
 struct breath_output {
   const supine_mesh *rest;
+  supine_mesh_save_options save;
   const breath_course *course;
   char *path;
   supine_folder folder; /* of the series, with the PVD file beside it, or NULL: it is inside */
@@ -75,6 +76,7 @@ static supine_status open_tensors(breath_output *made, supine_error *error) {
 }
 
 supine_status supine_command_breath_output_open(const char *path, const supine_mesh *rest,
+                                                const supine_mesh_save_options *frame,
                                                 const breath_course *course, breath_output **output,
                                                 supine_error *error) {
   breath_output *made = calloc(1, sizeof *made);
@@ -83,6 +85,8 @@ supine_status supine_command_breath_output_open(const char *path, const supine_m
     return no_memory(path, error);
   }
   made->rest = rest;
+  made->save = *frame;
+  made->save.rest = rest->vertices;
   made->course = course;
   made->path = join(path, "");
   supine_status status = SUPINE_OK;
@@ -136,8 +140,7 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
   }
   supine_mesh mesh = *output->rest;
   mesh.vertices = output->vertices;
-  const supine_mesh_save_options options = {.rest = output->rest->vertices};
-  const supine_status status = supine_mesh_save(path, &mesh, &options, error);
+  const supine_status status = supine_mesh_save(path, &mesh, &output->save, error);
   free(path);
   return status;
 }

@@ -16,9 +16,11 @@ typedef struct breath_output breath_output;
  *     NAME.pvd           that file, and a folder NAME with a VTP file a frame
  *     NAME               a folder with breath.pvd and a VTP file a frame
  *
- * A folder must not be there yet, or be empty. `rest` is the surface at rest.
+ * A folder must not be there yet, or be empty. `rest` is the surface at rest; `frame` says axes and
+ * units of the VTP files.
  * SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_command_breath_output_open(const char *path, const supine_mesh *rest,
+                                                const supine_mesh_save_options *frame,
                                                 const breath_course *course, breath_output **output,
                                                 supine_error *error);
 

@@ -21,7 +21,7 @@ typedef struct request {
   supine_pv_breath breath;
   const char *pv;
   const char *path;
-  bool allow_folds;
+  bool allow_folds, as_scanned;
   double fps, seconds, step; /* 0: not given */
 } request;
 
@@ -90,6 +90,7 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
     {"seconds", 0, "S", "how long; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
@@ -101,6 +102,10 @@ static int complete(request *wanted, size_t *count) {
     breath->course = SUPINE_PV_CONSTANT_FLOW;
     breath->inhale_fraction = 0.5;
     breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
+  }
+  const char *ending = strrchr(wanted->path, '.');
+  if (wanted->as_scanned && ending != NULL && strcmp(ending, ".safetensors") == 0) {
+    return supine_options_usage(name, "--as-scanned is for a series: tensors are LPS and mm");
   }
   if (wanted->turns && wanted->orientation.given) {
     return supine_options_usage(name, "give --turn, or one posture, not both");
@@ -218,8 +223,9 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
-static supine_status play(const supine_basis *basis, const request *wanted, size_t count,
-                          const char *made_by, supine_error *error) {
+static supine_status play(const supine_basis *basis, const request *wanted,
+                          const supine_mesh_save_options *frame, size_t count, const char *made_by,
+                          supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   supine_pv pv = *supine_breath_normal();
   supine_mesh rest = {0};
@@ -256,7 +262,7 @@ static supine_status play(const supine_basis *basis, const request *wanted, size
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    status = supine_command_breath_output_open(wanted->path, &rest, &course, &output, error);
+    status = supine_command_breath_output_open(wanted->path, &rest, frame, &course, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
@@ -301,10 +307,16 @@ static int run(void *chosen, const supine_arguments *given) {
                               "before 'supine precompute'",
                               path);
   }
+  supine_mesh_save_options frame = {0};
   if (status == SUPINE_OK) {
-    status = play(basis, wanted, count, given->made_by, &error);
+    result = supine_options_basis_frame(basis, name, wanted->as_scanned, &frame);
   }
-  result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  if (status == SUPINE_OK && result == SUPINE_EXIT_OK) {
+    status = play(basis, wanted, &frame, count, given->made_by, &error);
+  }
+  if (result == SUPINE_EXIT_OK) {
+    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  }
   supine_basis_close(basis);
   return result;
 }

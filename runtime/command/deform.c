@@ -32,9 +32,7 @@ static const supine_option table[] = {
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
-    {"as-scanned", 0, NULL,
-     "in the axes and units that the scan came in, to lie on top of it; default LPS and mm",
-     SUPINE_FILLS(request, as_scanned)},
+    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
@@ -92,17 +90,6 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
   return SUPINE_EXIT_OK;
 }
 
-/* The scan's own axes and units, where the file knows them. */
-static bool scan_frame(const supine_basis *basis, supine_axes *axes, double *unit) {
-  const char *named = supine_basis_metadata(basis, "scan_axes");
-  const char *size = supine_basis_metadata(basis, "scan_unit_mm");
-  if (named == NULL || size == NULL || !supine_options_parse_number(size, unit) || !(*unit > 0.0)) {
-    return false;
-  }
-  *axes = strcmp(named, "RAS") == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
-  return true;
-}
-
 static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double weights[SUPINE_MODES_MAX];
@@ -126,10 +113,8 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     goto cleanup;
   }
   supine_mesh_save_options save = {.rest = rest.vertices};
-  double unit = 1.0; /* mm */
-  if (wanted->as_scanned && !scan_frame(basis, &save.axes, &unit)) {
-    supine_options_say(name, "the file does not say in which axes and units its scan came");
-    result = SUPINE_EXIT_INPUT;
+  result = supine_options_basis_frame(basis, name, wanted->as_scanned, &save);
+  if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
   if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK) {
@@ -138,10 +123,6 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   }
   const double largest = largest_displacement(&rest, &mesh);
   const double gained = 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest));
-  for (size_t i = 0; i < 3 * mesh.vertex_count && unit != 1.0; ++i) {
-    mesh.vertices[i] /= unit;
-    rest.vertices[i] /= unit;
-  }
   if (supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
