@@ -236,6 +236,50 @@ static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **
   supine_lungs_free(&lungs);
 }
 
+/* A program of one's own, of the installed library alone, breathes as the command does, bit for
+ * bit. */
+static void test_breathe_library_calls_give_the_command_s_frames(void **state) {
+  (void)state;
+  enum { FRAMES = 21 };
+  supine_safetensors *file = NULL;
+  supine_basis *opened = NULL;
+  assert_int_equal(
+      RUN(basis, "--turn", "supine:left:2s", "--fps", "10", "--rate", "20", "-o", breath), 0);
+  assert_int_equal(supine_safetensors_open(breath, &file, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_open(basis, &opened, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(opened);
+  const float *positions = supine_safetensors_find(file, "positions")->data;
+  const double *gravity = supine_safetensors_find(file, "gravity")->data;
+  const double *time = supine_safetensors_find(file, "time")->data;
+  assert_int_equal(supine_safetensors_find(file, "time")->shape[0], FRAMES);
+  supine_pv_breath wanted = supine_breath_default();
+  wanted.rate = 20.0;
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  assert_non_null(xyz);
+  for (size_t t = 0; t < FRAMES; ++t) {
+    double weights[SUPINE_MODES_MAX];
+    double scales[SUPINE_LUNGS_MAX];
+    double volume = 0.0;
+    double rest = 0.0;
+    double scale = 0.0;
+    assert_int_equal(
+        supine_breath_evaluate(supine_breath_normal(), &wanted, 1, &time[t], &volume, NULL, NULL),
+        SUPINE_OK);
+    assert_int_equal(supine_basis_weights(opened, gravity + 3 * t, weights), SUPINE_OK);
+    assert_int_equal(supine_basis_resting_volume(opened, gravity + 3 * t, &rest), SUPINE_OK);
+    assert_int_equal(supine_basis_scale(opened, weights, rest + volume, &scale, NULL), SUPINE_OK);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      scales[lung] = scale;
+    }
+    supine_deform(opened, weights, scales, xyz);
+    assert_memory_equal(xyz, positions + 3 * t * info->vertex_count,
+                        3 * info->vertex_count * sizeof *xyz);
+  }
+  free(xyz);
+  supine_safetensors_close(file);
+  supine_basis_close(opened);
+}
+
 static void test_breathe_one_posture_three_additions_keep_volumes(void **state) {
   (void)state;
   supine_pv_breath course = supine_breath_default();
@@ -443,6 +487,7 @@ static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_breathe_real_lungs_turning_volumes_exact_in_every_frame),
+      cmocka_unit_test(test_breathe_library_calls_give_the_command_s_frames),
       cmocka_unit_test(test_breathe_one_posture_three_additions_keep_volumes),
       cmocka_unit_test(test_breathe_options_shape_the_breath),
       cmocka_unit_test(test_breathe_series_lists_every_frame_and_its_time),

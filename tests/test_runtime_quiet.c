@@ -13,6 +13,7 @@
 
 #include <cmocka.h>
 
+#include <supine/breath.h>
 #include <supine/posture.h>
 #include <supine/runtime.h>
 
@@ -124,6 +125,11 @@ static void use_all(const supine_basis *basis, float *xyz) {
     scales[i] = 0.5;
   }
   (void)supine_basis_error(basis, weights, scales);
+  const supine_pv_breath breath = supine_breath_default();
+  (void)supine_breath_evaluate(supine_breath_normal(), &breath, 2, (const double[]){0.4, 3},
+                               weights, scales, &error);
+  (void)supine_basis_weights(basis, gravity, weights);
+  scales[0] = scales[1] = 0.5;
   supine_deform(basis, weights, scales, xyz);
   supine_deform_range(basis, weights, scales, 3, n - 1, xyz);
   supine_deform_separate(basis, weights, scales, 0, n, xyz, xyz + n, xyz + 2 * n);

@@ -32,6 +32,13 @@ static int equation_derivative(double x, const double state[], double derivative
   return GSL_SUCCESS;
 }
 
+double supine_breath_normalise(const supine_pv_curve *curve, double pressure) {
+  const double low = curve->pressure[0];
+  const double high = curve->pressure[1];
+  const double x = ((pressure - low) - (high - pressure)) / (high - low);
+  return x < -1.0 ? -1.0 : x > 1.0 ? 1.0 : x;
+}
+
 supine_status supine_breath_integrate(const double control[SUPINE_PV_CONTROLS], size_t count,
                                       const double *x, size_t size, double *states) {
   static const double first_step = 1e-3;

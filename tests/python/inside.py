@@ -77,6 +77,16 @@ assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
 assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
 assert (lungs.weights(np.float32([0, -2, 0])) == weights).all()
 
+# A breath.
+times = np.array([[0, 5 / 3], [5, 2]])
+volumes = supine.breath(times)
+assert volumes.shape == (2, 2) and np.allclose(volumes[:, 0], 0, atol=1e-9) and abs(volumes[0, 1] - 500) < 1e-9
+assert np.allclose(supine.breath([0.5, 3], course="flow", inhale=0.5, tidal=100), [20, 80])
+straight = [[0, 30, 0, 3000, 0, 0, 0, 0, 0]] * 2  # mL are 100 times cmH2O
+assert np.allclose(supine.breath([5 / 6], pv=straight, course="ramp"), 250) and supine.breath(5 / 6).shape == ()
+refused(supine.ArgumentError, "tidal volume", supine.breath, [0], tidal=9000)
+refused(ValueError, "pv must be 18 numbers", supine.breath, [0], pv=straight[0])
+
 # The C library's refusals, as Python's kinds of exception and as Supine's.
 with open(path, "rb") as file:
     whole = file.read()

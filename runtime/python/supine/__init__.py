@@ -25,7 +25,7 @@ from . import _supine
 from ._supine import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
                       OutOfMemoryError, ReadError, UnsupportedError)
 
-__all__ = ["open", "Basis", "gravity", "gravity_of_quaternion", "tilt", "postures", "Gravity", "Error",
+__all__ = ["open", "Basis", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity", "Error",
            "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _supine.version
@@ -35,6 +35,7 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
 STORAGES = ("auto", "exact", "float32", "float16", "int16", "mixed")
+COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512")
 
 
@@ -56,6 +57,27 @@ def tilt(posture: Gravity, degrees: float) -> Doubles:
 def postures() -> tuple[str, ...]:
     """Every posture's name."""
     return _supine.postures()
+
+
+def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale: float = 1 / 3,
+           rest_pressure: float = 5.0, course: str = "cosine",
+           pv: Optional[ArrayLike] = None) -> Doubles:
+    """mL above rest at times in s, as `supine breathe` breathes; a breath begins at 0.
+
+    rate           breaths a minute
+    inhale         share of the breath's time that is inhalation
+    rest_pressure  cmH2O at the end of an exhalation
+    course         of the pressure: "cosine", "ramp"; "flow" is a constant flow
+    pv             [2, 9], inhale and exhale: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
+                   `supine pv fit` finds them; a normal adult's by default
+    """
+    times = np.asarray(times, np.float64)
+    flat = np.ascontiguousarray(times).ravel()
+    volumes = np.empty_like(flat)
+    relation = None if pv is None else np.ascontiguousarray(pv, np.float64)
+    _supine.breath(tidal, rate, inhale, rest_pressure, COURSES.index(course), relation, flat.size, flat,
+                   volumes)
+    return volumes.reshape(times.shape)
 
 
 class Basis:

@@ -1,6 +1,6 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* The normal adult lung. */
-#include "runtime/breath/pv_internal.h"
+#include <supine/breath.h>
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {

@@ -1,9 +1,9 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* A breath: the course of pressure, and the volume that the limbs give it. */
 #include <math.h>
-#include <stdlib.h>
+#include <stdbool.h>
 
-#include "runtime/breath/pv_internal.h"
+#include "runtime/limb.h"
 
 supine_pv_breath supine_breath_default(void) {
   return (supine_pv_breath){.tidal = 500.0,
@@ -46,7 +46,8 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
 
 /* Each limb at rest and at the peak. */
 typedef struct loop {
-  double rest, peak;                   /* cmH2O */
+  double rest, peak; /* cmH2O */
+  supine_limb limb[SUPINE_PV_LIMB_COUNT];
   double volume[SUPINE_PV_LIMB_COUNT]; /* mL at rest */
   double gain[SUPINE_PV_LIMB_COUNT];   /* mL from rest to peak */
 } loop;
@@ -69,18 +70,19 @@ static supine_status limb_holds(const supine_pv *pv, const char *what, double pr
   return SUPINE_OK;
 }
 
-static supine_status loop_fill(const supine_pv *pv, const supine_pv_breath *breath, loop *cycle,
-                               supine_error *error) {
+static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *breath, loop *cycle,
+                                supine_error *error) {
   const supine_pv_curve *inhale = &pv->limb[SUPINE_PV_INHALE];
-  double rest = 0.0;
   cycle->rest = breath->rest_pressure;
   supine_status status = limb_holds(pv, "rest", cycle->rest, error);
-  if (status == SUPINE_OK) {
-    status = supine_breath_curve_evaluate(inhale, 1, &cycle->rest, &rest, NULL, error);
-  }
   if (status != SUPINE_OK) {
     return status;
   }
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    supine_limb_begin(&pv->limb[limb], &cycle->limb[limb]);
+    cycle->volume[limb] = supine_limb_volume(&cycle->limb[limb], cycle->rest, NULL);
+  }
+  const double rest = cycle->volume[SUPINE_PV_INHALE];
   const double full = rest + breath->tidal;
   if (full > inhale->volume[1]) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -88,17 +90,15 @@ static supine_status loop_fill(const supine_pv *pv, const supine_pv_breath *brea
                             "above its volume at %g cmH2O",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
-  status = supine_breath_invert(inhale, 1, &full, &cycle->peak, error);
-  if (status == SUPINE_OK) {
-    status = limb_holds(pv, "peak", cycle->peak, error);
+  status = supine_limb_pressure(&cycle->limb[SUPINE_PV_INHALE], full, &cycle->peak);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "no pressure found for %g mL on the inhale limb", full);
   }
+  status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
-    const double pressures[2] = {cycle->rest, cycle->peak};
-    double volumes[2] = {0.0, 0.0};
-    status = supine_breath_curve_evaluate(&pv->limb[limb], 2, pressures, volumes, NULL, error);
-    cycle->volume[limb] = volumes[0];
-    cycle->gain[limb] = volumes[1] - volumes[0];
-    if (status == SUPINE_OK && !(cycle->gain[limb] > 0.0)) {
+    cycle->gain[limb] =
+        supine_limb_volume(&cycle->limb[limb], cycle->peak, NULL) - cycle->volume[limb];
+    if (!(cycle->gain[limb] > 0.0)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL, "the %s limb is too flat between %g and %g cmH2O",
           supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
@@ -111,49 +111,30 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* The moments of one limb, gathered so that the limb is integrated once: pressures to volumes or,
- * at constant flow, volumes to pressures. `scratch` [2 count]. */
-static supine_status breath_follow(const supine_pv *pv, const supine_pv_breath *breath,
-                                   const loop *cycle, supine_pv_limb limb, size_t count,
-                                   const double *times, double *volumes, double *pressures,
-                                   double *scratch, supine_error *error) {
-  const supine_pv_curve *curve = &pv->limb[limb];
-  const bool flow = breath->course == SUPINE_PV_CONSTANT_FLOW;
-  const double begin = flow ? cycle->volume[limb] : cycle->rest;
-  const double end = flow ? begin + cycle->gain[limb] : cycle->peak;
-  double *given = scratch;
-  double *found = scratch + count;
-  size_t used = 0;
-  for (size_t j = 0; j < count; ++j) {
-    supine_pv_limb of = limb;
-    double share = breath_share(breath, times[j], &of);
-    if (of == limb) {
-      if (breath->course == SUPINE_PV_COSINE) {
-        share = 0.5 - 0.5 * cos(M_PI * share);
-      }
-      given[used++] = between(begin + share * (end - begin), begin, end);
-    }
+/* One moment: from pressure to volume or, at constant flow, from volume to pressure (NULL: not
+ * wanted). */
+static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
+                            double *volume, double *pressure, supine_error *error) {
+  static const double pi = 3.14159265358979323846;
+  supine_pv_limb of = SUPINE_PV_INHALE;
+  double share = breath_share(breath, time, &of);
+  const supine_limb *limb = &cycle->limb[of];
+  if (breath->course == SUPINE_PV_CONSTANT_FLOW) {
+    const double low = cycle->volume[of];
+    const double high = low + cycle->gain[of];
+    *volume = breath->tidal * share;
+    const supine_status status =
+        supine_limb_pressure(limb, between(low + share * cycle->gain[of], low, high), pressure);
+    return status == SUPINE_OK ? status
+                               : supine_error_set(error, status, "no pressure found at %g s", time);
   }
-  const supine_status status =
-      flow ? supine_breath_invert(curve, used, given, found, error)
-           : supine_breath_curve_evaluate(curve, used, given, found, NULL, error);
-  used = 0;
-  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
-    supine_pv_limb of = limb;
-    (void)breath_share(breath, times[j], &of);
-    if (of == limb) {
-      const double volume = flow ? given[used] : found[used];
-      const double gained = (volume - cycle->volume[limb]) / cycle->gain[limb];
-      if (volumes != NULL) {
-        volumes[j] = breath->tidal * between(gained, 0.0, 1.0);
-      }
-      if (pressures != NULL) {
-        pressures[j] = flow ? found[used] : given[used];
-      }
-      ++used;
-    }
+  if (breath->course == SUPINE_PV_COSINE) {
+    share = 0.5 - 0.5 * cos(pi * share);
   }
-  return status;
+  *pressure = between(cycle->rest + share * (cycle->peak - cycle->rest), cycle->rest, cycle->peak);
+  const double gained = supine_limb_volume(limb, *pressure, NULL) - cycle->volume[of];
+  *volume = breath->tidal * between(gained / cycle->gain[of], 0.0, 1.0);
+  return SUPINE_OK;
 }
 
 supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
@@ -179,19 +160,18 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "this breath needs a pressure-volume relation");
   }
-  loop cycle = {0};
-  status = loop_fill(pv, breath, &cycle, error);
-  if (status != SUPINE_OK) {
-    return status;
+  loop cycle;
+  status = loop_begin(pv, breath, &cycle, error);
+  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+    double volume = 0.0;
+    double pressure = 0.0;
+    status = follow(breath, &cycle, times[j], &volume, &pressure, error);
+    if (volumes != NULL) {
+      volumes[j] = volume;
+    }
+    if (pressures != NULL) {
+      pressures[j] = pressure;
+    }
   }
-  double *scratch = calloc(count, 2 * sizeof *scratch);
-  if (scratch == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
-    status = breath_follow(pv, breath, &cycle, (supine_pv_limb)limb, count, times, volumes,
-                           pressures, scratch, error);
-  }
-  free(scratch);
   return status;
 }
