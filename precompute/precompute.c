@@ -28,6 +28,8 @@ static const double breath_volume =
 /* Fewer modes are kept where the error stays within this factor of what the most would have. */
 static const double same_error = 1.01;
 
+static const char *const route_names[] = {"auto", "linear", "sampled", "smooth"}; /* supine_route */
+
 /* Everything between the lungs and the file. */
 typedef struct pipeline {
   const supine_lungs *given;
@@ -35,7 +37,7 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   supine_lungs anchored; /* the lungs with vertices of their own, where a scan is to be met */
   supine_reference reference;
-  bool linear;
+  supine_route route; /* as taken */
   double *directions; /* [N, 3] */
   double *weight;     /* [N] |d|^2: modes then minimise the error of displacement itself, 0.34 % RMS
                          with 16 where plain or area-weighted ones leave 0.40 and 0.42 % (a left
@@ -103,13 +105,15 @@ static supine_status project(pipeline *p, supine_error *error) {
   if (!stage_progress(&part, 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
-  p->linear = options->route == SUPINE_ROUTE_LINEAR ||
-              (options->route == SUPINE_ROUTE_AUTO && model->force.soften == 0.0);
-  if (p->linear) {
+  p->route = options->route != SUPINE_ROUTE_AUTO              ? options->route
+             : model->force.soften == 0.0                     ? SUPINE_ROUTE_LINEAR
+             : supine_projection_smooth_directions(model) > 0 ? SUPINE_ROUTE_SMOOTH
+                                                              : SUPINE_ROUTE_SAMPLED;
+  if (p->route == SUPINE_ROUTE_LINEAR) {
     return supine_projection_linear(p->lungs, model, options->band, &p->projection, error);
   }
-  return supine_projection_sampled(p->lungs, model, options->band, stage_progress, &part,
-                                   &p->projection, error);
+  return (p->route == SUPINE_ROUTE_SMOOTH ? supine_projection_smooth : supine_projection_sampled)(
+      p->lungs, model, options->band, stage_progress, &part, &p->projection, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
@@ -177,7 +181,7 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
   if (!p->lungs->topology.closed) {
     return SUPINE_OK;
   }
-  if (p->linear) {
+  if (p->route == SUPINE_ROUTE_LINEAR) {
     supine_status status =
         p->column_forms.linear != NULL
             ? SUPINE_OK
@@ -207,20 +211,20 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
 }
 
 static size_t held_out_default(const pipeline *p) {
-  const size_t most = p->linear ? HELD_OUT_MAX : HELD_OUT_SAMPLED_MAX;
+  const size_t most = p->route == SUPINE_ROUTE_LINEAR ? HELD_OUT_MAX : HELD_OUT_SAMPLED_MAX;
   const size_t count = HELD_OUT_WORK / p->lungs->mesh.vertex_count;
   return count < HELD_OUT_MIN ? HELD_OUT_MIN : count > most ? most : count;
 }
 
 static supine_status hold_out(pipeline *p, supine_error *error) {
   const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
-  if (p->linear) {
+  if (p->route == SUPINE_ROUTE_LINEAR) {
     return supine_accuracy_held_out_linear(p->lungs, &p->options->model, &p->projection,
                                            p->lungs->topology.closed ? &p->column_forms : NULL,
                                            count, &p->held_out, error);
   }
-  return supine_accuracy_held_out_sampled(p->lungs, &p->options->model, p->directions, count,
-                                          &p->held_out, error);
+  return supine_accuracy_held_out_sampled(p->lungs, &p->options->model, p->directions,
+                                          &p->compression, count, &p->held_out, error);
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
@@ -290,7 +294,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->state.resting,
-                                        .route = p->linear ? "linear" : "sampled",
+                                        .route = route_names[p->route],
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,
@@ -322,14 +326,13 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
     status = write_file(&p, path, error);
   }
   if (status == SUPINE_OK && report != NULL) {
-    *report =
-        (supine_precompute_report){.route = p.linear ? SUPINE_ROUTE_LINEAR : SUPINE_ROUTE_SAMPLED,
-                                   .mode_count = p.compression.mode_count,
-                                   .solve_count = p.projection.solve_count,
-                                   .iterations = p.projection.iterations,
-                                   .residual = p.projection.residual,
-                                   .accuracy = p.accuracy,
-                                   .turned_over = p.turned_over};
+    *report = (supine_precompute_report){.route = p.route,
+                                         .mode_count = p.compression.mode_count,
+                                         .solve_count = p.projection.solve_count,
+                                         .iterations = p.projection.iterations,
+                                         .residual = p.projection.residual,
+                                         .accuracy = p.accuracy,
+                                         .turned_over = p.turned_over};
   }
   pipeline_free(&p);
   return status;

@@ -16,9 +16,10 @@ extern "C" {
 
 /** How the field over orientation is found. */
 typedef enum supine_route {
-  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it */
+  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it, else smooth, else sampled */
   SUPINE_ROUTE_LINEAR,   /**< needs soften = 0 */
-  SUPINE_ROUTE_SAMPLED
+  SUPINE_ROUTE_SAMPLED,  /**< for any law */
+  SUPINE_ROUTE_SMOOTH    /**< for soften of some 2.5 at most */
 } supine_route;
 
 /** What a basis is made of. */

@@ -91,6 +91,86 @@ static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
   supine_projection_free(&sampled);
 }
 
+/* Where the stiffness does not turn, the field is a polynomial of degree 1 in what the smooth route
+ * fits, and its rule is the linear route's. */
+static void test_smooth_route_is_exact_where_stiffness_does_not_turn(void **state) {
+  const supine_lungs *lungs = *state;
+  enum { BAND = 5 };
+  const size_t values = lungs->mesh.vertex_count * supine_sh_count(BAND);
+  supine_projection linear;
+  supine_projection smooth;
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  model.force = (supine_force_law){.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
+  model.tolerance = 1e-13;
+  assert_int_equal(supine_projection_linear(lungs, &model, BAND, &linear, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_smooth(lungs, &model, BAND, NULL, NULL, &smooth, NULL),
+                   SUPINE_OK);
+  assert_int_equal(smooth.solve_count, supine_projection_smooth_directions(&model));
+  double *a = coefficients_of(&linear);
+  double *b = coefficients_of(&smooth);
+  assert_true(helper_difference(values, a, b) <= 1e-10 * helper_largest(values, a));
+  free(a);
+  free(b);
+  supine_projection_free(&linear);
+  supine_projection_free(&smooth);
+}
+
+/* Of low even bands next to nothing of the kinks folds back (h(-g) = 1 - h(g)), so that there a
+ * grid is as exact as its solves; in all it errs by a third of what lies beyond its band
+ * (sh/grid.h). */
+static void test_smooth_route_agrees_with_a_grid(void **state) {
+  const supine_lungs *lungs = *state;
+  enum { BAND = 23, LOW = 4 };
+  static const double softens[] = {1.0, 1.0, 2.0};
+  static const double reaches[] = {0.0, 50.0, 10.0};
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t terms = supine_sh_count(BAND);
+  for (size_t c = 0; c < sizeof softens / sizeof *softens; ++c) {
+    supine_projection smooth;
+    supine_projection grid;
+    supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+    model.force.soften = softens[c];
+    model.reach = reaches[c];
+    assert_int_equal(supine_projection_smooth(lungs, &model, BAND, NULL, NULL, &smooth, NULL),
+                     SUPINE_OK);
+    assert_int_equal(supine_projection_sampled(lungs, &model, BAND, NULL, NULL, &grid, NULL),
+                     SUPINE_OK);
+    double *a = coefficients_of(&smooth);
+    double *b = coefficients_of(&grid);
+    double low = 0.0;
+    double high = 0.0;
+    double all = 0.0;
+    for (size_t i = 0; i < n * terms; ++i) {
+      const double miss = (a[i] - b[i]) * (a[i] - b[i]);
+      const size_t band = (size_t)sqrt((double)(i % terms));
+      low += band <= LOW && band % 2 == 0 ? miss : 0.0;
+      high += miss;
+      all += b[i] * b[i];
+    }
+    printf("soften %g, reach %g: %zu directions against %zu: low even bands %.1e, all %.1e\n",
+           softens[c], reaches[c], smooth.solve_count, grid.solve_count, sqrt(low / all),
+           sqrt(high / all));
+    assert_true(sqrt(low / all) <= 2e-4); /* what smooth.c promises */
+    assert_true(sqrt(high / all) <= 2e-3);
+    free(a);
+    free(b);
+    supine_projection_free(&smooth);
+    supine_projection_free(&grid);
+  }
+}
+
+static void test_smooth_route_refuses_what_no_polynomial_follows(void **state) {
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  supine_projection projection;
+  supine_error error;
+  model.force.soften = 4.0;
+  assert_int_equal(supine_projection_smooth_directions(&model), 0);
+  assert_int_equal(supine_projection_smooth(*state, &model, 5, NULL, NULL, &projection, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_string_equal(error.message,
+                      "soften 4 is too much for a polynomial: take the sampled route");
+}
+
 /* Singular values and reproduced fields against a dense decomposition of the weighted matrix. */
 static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
   const size_t n = projection->vertex_count;
@@ -169,6 +249,11 @@ static void test_modes_equal_dense_decomposition(void **state) {
   check_modes(&projection, weight, 7);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
+  assert_int_equal(supine_projection_smooth(lungs, &model, 5, NULL, NULL, &projection, NULL),
+                   SUPINE_OK);
+  check_modes(&projection, weight, 7);
+  check_modes(&projection, weight, 16);
+  supine_projection_free(&projection);
   free(weight);
 }
 
@@ -239,6 +324,9 @@ static void test_tally_percentile_is_the_edge_above(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_routes_agree_where_stiffness_does_not_turn),
+      cmocka_unit_test(test_smooth_route_is_exact_where_stiffness_does_not_turn),
+      cmocka_unit_test(test_smooth_route_agrees_with_a_grid),
+      cmocka_unit_test(test_smooth_route_refuses_what_no_polynomial_follows),
       cmocka_unit_test(test_modes_equal_dense_decomposition),
       cmocka_unit_test(test_modes_end_where_rounding_begins),
       cmocka_unit_test(test_tally_percentile_is_the_edge_above),

@@ -4,7 +4,11 @@
 #include <stdlib.h>
 
 #include "precompute/accuracy/held_out.h"
+#include "precompute/projection/compression.h"
 #include "precompute/projection/sampler.h"
+#include "sh/base/clones.h"
+#include "sh/base/parallel.h"
+#include <supine/sh.h>
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
   const double golden = M_PI * (3.0 - sqrt(5.0));
@@ -76,8 +80,53 @@ cleanup:
   return SUPINE_OK;
 }
 
+typedef struct guess_work {
+  const supine_compression *guess;
+  const double *weights; /* [D, K] */
+  double *fields;        /* [D, N] */
+} guess_work;
+
+SUPINE_CLONES static void guess_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const guess_work *work = context;
+  const size_t n = work->guess->vertex_count;
+  const size_t modes = work->guess->mode_count;
+  for (size_t d = begin; d < end; ++d) {
+    const double *weights = work->weights + d * modes;
+    for (size_t i = 0; i < n; ++i) {
+      const float *c = work->guess->coefficients + i * modes;
+      double sum = 0.0;
+      for (size_t k = 0; k < modes; ++k) {
+        sum += weights[k] * (double)c[k];
+      }
+      work->fields[d * n + i] = sum;
+    }
+  }
+}
+
+/* What a compression says at every direction. */
+static supine_status find_guesses(const supine_compression *guess, const supine_held_out *made) {
+  const size_t terms = supine_sh_count(guess->band);
+  const size_t count = made->truth.direction_count;
+  double *y = malloc(terms * sizeof *y);
+  double *weights = malloc(count * guess->mode_count * sizeof *weights);
+  supine_status status = y == NULL || weights == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
+    status = supine_sh_evaluate(guess->band, made->directions + 3 * d, y);
+    supine_projection_compression_weights(guess, y, weights + d * guess->mode_count);
+  }
+  if (status == SUPINE_OK) {
+    guess_work work = {guess, weights, made->fields};
+    supine_parallel_for(count, 1, 0, guess_range, &work);
+  }
+  free(y);
+  free(weights);
+  return status;
+}
+
 supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
-                                               const double *directions, size_t count,
+                                               const double *directions,
+                                               const supine_compression *guess, size_t count,
                                                supine_held_out *held_out, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const bool closed = lungs->topology.closed;
@@ -85,14 +134,14 @@ supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const 
   supine_held_out made;
   supine_status status = begin(count, closed, &made);
   made.fields = malloc(count * n * sizeof *made.fields);
-  if (status != SUPINE_OK || made.fields == NULL) {
+  if (status != SUPINE_OK || made.fields == NULL || find_guesses(guess, &made) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu held-out directions",
                               count);
     goto cleanup;
   }
   status = supine_projection_sampler_create(lungs, model, &sampler, error);
   if (status == SUPINE_OK) {
-    status = supine_projection_sampler_solve(sampler, count, made.directions, false, made.fields,
+    status = supine_projection_sampler_solve(sampler, count, made.directions, true, made.fields,
                                              NULL, error);
   }
   for (size_t d = 0; d < count && closed && status == SUPINE_OK; ++d) {

@@ -19,9 +19,10 @@ supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs, const s
                                               const supine_volume_forms *forms, size_t count,
                                               supine_held_out *held_out, supine_error *error);
 
-/* The sampled route: solved one by one. */
+/* Every other route: solved one by one, from what `guess` says, to the tolerance of samples. */
 supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
-                                               const double *directions, size_t count,
+                                               const double *directions,
+                                               const supine_compression *guess, size_t count,
                                                supine_held_out *held_out, supine_error *error);
 
 void supine_accuracy_held_out_free(supine_held_out *held_out);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Extent of the lungs along many directions: the min and max of the heights in (18). */
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,9 +12,10 @@
 
 /* Vertices are taken in blocks, each with its box. The box's own extent along a direction bounds
  * its vertices', so that only the few blocks that can hold an extreme are read: the result is
- * exact, and its cost next to nothing. Blocks are of neighbours in space, whatever the file's
- * order: vertices are put in the order of a curve through 32 x 32 x 32 cells (Morton 1966). */
-enum { BLOCK = 256, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
+ * exact, and its cost next to nothing; boxes of boxes bound those. Blocks are of neighbours in
+ * space, whatever the file's order: vertices are put in the order of a curve through 32 x 32 x 32
+ * cells (Morton 1966). */
+enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
 
 typedef struct block_box {
   double centre[3];
@@ -21,9 +23,10 @@ typedef struct block_box {
 } block_box;
 
 typedef struct range_work {
-  size_t count;           /* vertices */
-  const double *vertices; /* [count, 3] */
-  const block_box *boxes;
+  size_t count;            /* vertices */
+  const double *vertices;  /* [count, 3] */
+  const block_box *boxes;  /* [box_count] */
+  const block_box *groups; /* of GROUP boxes each */
   size_t box_count;
   const double *directions;
   double *minimum, *maximum;
@@ -49,23 +52,33 @@ static size_t block_size(const range_work *work, size_t block) {
   return left < BLOCK ? left : BLOCK;
 }
 
+static double bound_of(const block_box *box, const double *g, const double *size) {
+  return supine_dot(g, box->centre) + supine_dot(size, box->half);
+}
+
+/* Raises `best` to what a block holds above it; whether there is such. */
+static bool look_into(const range_work *work, const double *g, size_t block, double *best) {
+  const double *p = work->vertices + 3 * block * BLOCK;
+  const double before = *best;
+  for (size_t i = 0; i < block_size(work, block); ++i) {
+    const double h = supine_dot(g, p + 3 * i);
+    *best = h > *best ? h : *best;
+  }
+  return *best > before;
+}
+
 /* Largest g.p, starting from `seed`, a block that held the last direction's: turned to `seed`
  * again. */
 static double highest(const range_work *work, const double *g, size_t *seed) {
   const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
   double best = -INFINITY;
-  const size_t first = *seed;
-  for (size_t step = 0; step <= work->box_count; ++step) {
-    const size_t block = step == 0 ? first : step - 1;
-    const block_box *box = &work->boxes[block];
-    if (supine_dot(g, box->centre) + supine_dot(size, box->half) <= best) {
+  (void)look_into(work, g, *seed, &best);
+  for (size_t first = 0; first < work->box_count; first += GROUP) {
+    if (bound_of(&work->groups[first / GROUP], g, size) <= best) {
       continue;
     }
-    const double *p = work->vertices + 3 * block * BLOCK;
-    for (size_t i = 0; i < block_size(work, block); ++i) {
-      const double h = supine_dot(g, p + 3 * i);
-      if (h > best) {
-        best = h;
+    for (size_t block = first; block < first + GROUP && block < work->box_count; ++block) {
+      if (bound_of(&work->boxes[block], g, size) > best && look_into(work, g, block, &best)) {
         *seed = block;
       }
     }
@@ -118,19 +131,27 @@ static supine_status range_of(const supine_mesh *mesh, size_t count, const doubl
                               double *minimum, double *maximum) {
   const size_t box_count = (mesh->vertex_count + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
+  block_box *groups = malloc((box_count / GROUP + 1) * sizeof *groups);
   double *sorted = malloc((3 * mesh->vertex_count + 1) * sizeof *sorted);
   size_t *begin = calloc(CELLS + 1, sizeof *begin);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (boxes != NULL && sorted != NULL && begin != NULL) {
-    range_work work = {mesh->vertex_count, sorted, boxes, box_count, directions, minimum, maximum};
+  if (boxes != NULL && groups != NULL && sorted != NULL && begin != NULL) {
+    range_work work = {mesh->vertex_count, sorted,     boxes,   groups,
+                       box_count,          directions, minimum, maximum};
     sort_vertices(mesh, begin, sorted);
     for (size_t b = 0; b < box_count; ++b) {
       boxes[b] = box_of(sorted + 3 * b * BLOCK, block_size(&work, b));
+    }
+    for (size_t b = 0; b < box_count; b += GROUP) {
+      const size_t left = mesh->vertex_count - b * BLOCK;
+      groups[b / GROUP] =
+          box_of(sorted + 3 * b * BLOCK, left < GROUP * BLOCK ? left : GROUP * BLOCK);
     }
     supine_parallel_for(count, 16, 0, height_range, &work);
     status = SUPINE_OK;
   }
   free(boxes);
+  free(groups);
   free(sorted);
   free(begin);
   return status;

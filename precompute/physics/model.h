@@ -43,7 +43,7 @@ typedef struct supine_model {
   double reach;            /**< spreading length, mm, at most half the box's diagonal counts; 0: the
                                 paper's, a fixed number of links */
   double tolerance;        /**< relative residual of every solve; 0: SUPINE_SOLVE_TOLERANCE
-                              (equilibrium.h),        where directions are sampled 1e-6 */
+                              (equilibrium.h); where directions are sampled 5e-6 */
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
 } supine_model;
 

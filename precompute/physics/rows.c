@@ -30,31 +30,75 @@ static void add_up(supine_rows *rows) {
   }
 }
 
+/* What one thread has summed: consecutive rows. */
+typedef struct piece {
+  supine_row row;
+  size_t first, count, space;
+  uint32_t *column;
+  float *value;
+  bool full; /* of memory */
+} piece;
+
 typedef struct build_work {
   supine_row_function *sum;
   const void *context;
   supine_rows *rows;
-  supine_row *scratch; /* one a thread */
+  piece *pieces; /* one a thread */
 } build_work;
 
-/* Counts the entries of each row, or where there is space for them writes them. */
+static bool piece_create(size_t columns, piece *made) {
+  supine_row *row = &made->row;
+  row->column = malloc((columns + 1) * sizeof *row->column);
+  row->value = malloc((columns + 1) * sizeof *row->value);
+  row->place = malloc((columns + 1) * sizeof *row->place);
+  if (row->column == NULL || row->value == NULL || row->place == NULL) {
+    return false;
+  }
+  memset(row->place, 0xff, columns * sizeof *row->place);
+  return true;
+}
+
+static void piece_free(piece *made) {
+  free(made->row.column);
+  free(made->row.value);
+  free(made->row.place);
+  free(made->column);
+  free(made->value);
+}
+
+/* Room for one more row. */
+static bool piece_grow(piece *to) {
+  const size_t wanted = to->count + to->row.count;
+  if (wanted <= to->space) {
+    return true;
+  }
+  const size_t space = 2 * wanted;
+  uint32_t *column = realloc(to->column, space * sizeof *column);
+  to->column = column != NULL ? column : to->column;
+  float *value = realloc(to->value, space * sizeof *value);
+  to->value = value != NULL ? value : to->value;
+  to->space = column != NULL && value != NULL ? space : to->space;
+  return to->space == space;
+}
+
 static void build_range(void *context, size_t begin, size_t end, size_t thread) {
   const build_work *work = context;
-  supine_rows *rows = work->rows;
-  supine_row *row = &work->scratch[thread];
-  for (size_t i = begin; i < end; ++i) {
+  piece *to = &work->pieces[thread];
+  supine_row *row = &to->row;
+  to->first = begin;
+  for (size_t i = begin; i < end && !to->full; ++i) {
     row->count = 0;
     work->sum(work->context, i, row);
+    to->full = !piece_grow(to);
     for (size_t k = 0; k < row->count; ++k) {
       row->place[row->column[k]] = UINT32_MAX;
-      if (rows->value != NULL) {
-        rows->column[rows->begin[i] + k] = row->column[k];
-        rows->value[rows->begin[i] + k] = (float)row->value[k];
+      if (!to->full) {
+        to->column[to->count + k] = row->column[k];
+        to->value[to->count + k] = (float)row->value[k];
       }
     }
-    if (rows->value == NULL) {
-      rows->begin[i + 1] = row->count;
-    }
+    to->count += to->full ? 0 : row->count;
+    work->rows->begin[i + 1] = row->count;
   }
 }
 
@@ -62,37 +106,37 @@ supine_status supine_physics_rows_build(size_t count, size_t columns, supine_row
                                         const void *context, supine_rows *rows) {
   const size_t threads = supine_thread_count();
   supine_rows made = {.count = count, .begin = calloc(count + 1, sizeof *made.begin)};
-  supine_row *scratch = calloc(threads, sizeof *scratch);
-  build_work work = {sum, context, &made, scratch};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  bool whole = made.begin != NULL && scratch != NULL;
+  piece *pieces = calloc(threads, sizeof *pieces);
+  build_work work = {sum, context, &made, pieces};
+  bool whole = made.begin != NULL && pieces != NULL;
   for (size_t t = 0; t < threads && whole; ++t) {
-    scratch[t].column = malloc((columns + 1) * sizeof *scratch[t].column);
-    scratch[t].value = malloc((columns + 1) * sizeof *scratch[t].value);
-    scratch[t].place = malloc((columns + 1) * sizeof *scratch[t].place);
-    whole = scratch[t].column != NULL && scratch[t].value != NULL && scratch[t].place != NULL;
-    if (whole) {
-      memset(scratch[t].place, 0xff, columns * sizeof *scratch[t].place);
-    }
+    whole = piece_create(columns, &pieces[t]);
   }
   if (whole) {
     supine_parallel_for(count, ROWS_GRAIN, threads, build_range, &work);
+  }
+  for (size_t t = 0; t < threads && whole; ++t) {
+    whole = !pieces[t].full;
+  }
+  if (whole) {
     add_up(&made);
-    status = allocate_entries(&made, made.begin[count]);
+    whole = allocate_entries(&made, made.begin[count]) == SUPINE_OK;
   }
-  if (status == SUPINE_OK) {
-    supine_parallel_for(count, ROWS_GRAIN, threads, build_range, &work);
-    *rows = made;
-  } else {
+  for (size_t t = 0; t < threads && pieces != NULL; ++t) {
+    if (whole && pieces[t].count > 0) {
+      const size_t at = made.begin[pieces[t].first];
+      memcpy(made.column + at, pieces[t].column, pieces[t].count * sizeof *made.column);
+      memcpy(made.value + at, pieces[t].value, pieces[t].count * sizeof *made.value);
+    }
+    piece_free(&pieces[t]);
+  }
+  free(pieces);
+  if (!whole) {
     supine_physics_rows_free(&made);
+    return SUPINE_ERROR_MEMORY;
   }
-  for (size_t t = 0; t < threads && scratch != NULL; ++t) {
-    free(scratch[t].column);
-    free(scratch[t].value);
-    free(scratch[t].place);
-  }
-  free(scratch);
-  return status;
+  *rows = made;
+  return SUPINE_OK;
 }
 
 supine_status supine_physics_rows_transpose(const supine_rows *rows, size_t columns,

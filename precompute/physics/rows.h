@@ -39,7 +39,7 @@ static inline void supine_physics_row_add(supine_row *row, uint32_t column, doub
 /* Sums row i. */
 typedef void supine_row_function(const void *context, size_t i, supine_row *row);
 
-/* The matrix of `count` rows whose entries `sum` adds up; called twice for each row, in threads.
+/* The matrix of `count` rows whose entries `sum` adds up; called in threads.
  * The same matrix for any number of them.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_rows_build(size_t count, size_t columns, supine_row_function *sum,

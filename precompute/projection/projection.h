@@ -58,6 +58,22 @@ supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_
                                         void *context, supine_projection *projection,
                                         supine_error *error);
 
+/** The smooth route: a full solve for each of some 100 directions, and a polynomial through them in
+ * gravity over the lungs' extent along it, in which the field is analytic while over the sphere it
+ * has kinks (smooth.c). Columns and functions as from the linear route, without what a grid folds
+ * back; memory is the columns and the fields of 32 directions.
+ * @param progress  optional
+ * @retval SUPINE_ERROR_ARGUMENT  soften is too large for a polynomial (above some 2.5), a bad band
+ * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
+ * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+supine_status supine_projection_smooth(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_progress_function *progress,
+                                       void *context, supine_projection *projection,
+                                       supine_error *error);
+
+/** How many directions that solves for; 0: soften is too large. */
+size_t supine_projection_smooth_directions(const supine_model *model);
+
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */
 typedef struct supine_compression {
