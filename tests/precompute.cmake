@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(equilibrium supine_precompute supine_phantom supine_mesh_read supine_gsl umfpack)
 supine_test(force supine_precompute supine_phantom supine_mesh_read)
+supine_test(lit_angles supine_precompute supine_phantom supine_mesh_read supine_gsl)
 supine_test(postures supine_precompute supine_phantom supine_mesh_read supine_gsl)
 target_sources(test_postures PRIVATE postures.c)
 supine_test(reference supine_precompute supine_phantom supine_mesh_read supine_gsl)

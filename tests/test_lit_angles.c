@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How far supine_deform_lit's normals are from supine_normals', in postures and volumes from rest
+ * to full inflation that took no part in making them: what was promised, and what the file says. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <supine/runtime.h>
+
+#include "precompute/phantom/phantom.h"
+#include "precompute/precompute.h"
+
+#include "lungs_helpers.h"
+
+enum { STATES = 192 };
+
+/* Promised, degrees. */
+static const double mean_most = 0.1;
+static const double p999_most = 1.0;
+/* The file's numbers have two digits: the last is rounded by up to 5 %. */
+static const double printed = 0.05;
+/* States differ in their error, which is why the mean over STATES of them is known to no better
+ * than its standard error; this many of it. */
+static const double sigmas = 4.0;
+/* The percentile is the worst states' own. */
+static const double p999_near = 1.4;
+
+/* The basis of lungs at full inflation, of the usual law but for `soften`. */
+static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
+  const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  const supine_resting resting = supine_reference_resting_default();
+  supine_precompute_options options = {
+      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 15, .modes = modes, .held_out = 20};
+  supine_reference reference;
+  supine_precompute_report report;
+  supine_error error = {0};
+  supine_basis *basis = NULL;
+  char path[] = "/tmp/supine-angles-XXXXXX";
+  const int file = mkstemp(path);
+  assert_true(file >= 0 && close(file) == 0);
+  options.model.force.soften = soften;
+  options.reference = &reference;
+  /* EXACT: rest positions of fewer bits would turn the small triangles that normals are made of. */
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
+  if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
+          SUPINE_OK ||
+      supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK ||
+      supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(unlink(path), 0);
+  return basis;
+}
+
+static int compare_floats(const void *left, const void *right) {
+  const float a = *(const float *)left;
+  const float b = *(const float *)right;
+  return a < b ? -1 : a > b;
+}
+
+/* Angles of one state, degrees, [N]; their mean. */
+static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
+                      float *exact, float *angles) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double gravity[3];
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  double rest = 0.0;
+  double sum = 0.0;
+  supine_error error = {0};
+  random_direction(seed, gravity);
+  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+  assert_int_equal(supine_basis_resting_volume(basis, gravity, &rest), SUPINE_OK);
+  assert_true(rest < 0.0);
+  assert_int_equal(
+      supine_basis_scale(basis, weights, rest * helper_random(seed), &scales[0], &error),
+      SUPINE_OK);
+  for (size_t lung = 1; lung < info->lung_count; ++lung) {
+    scales[lung] = scales[0];
+  }
+  assert_int_equal(supine_deform_lit(basis, weights, scales, xyz, lit), SUPINE_OK);
+  supine_normals(basis, xyz, exact);
+  for (size_t i = 0; i < info->vertex_count; ++i) {
+    double square = 0.0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double off = (double)lit[3 * i + axis] - (double)exact[3 * i + axis];
+      square += off * off;
+    }
+    angles[i] = (float)(2.0 * asin(fmin(1.0, sqrt(square) / 2.0)) * 180.0 / M_PI);
+    sum += (double)angles[i];
+  }
+  return sum / (double)info->vertex_count;
+}
+
+static void check_angles(supine_lungs *lungs, double soften, size_t modes) {
+  supine_basis *basis = make_basis(lungs, soften, modes);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  uint64_t seed = 20261;
+  float *xyz = calloc(3 * n, sizeof *xyz);
+  float *lit = calloc(3 * n, sizeof *lit);
+  float *exact = calloc(3 * n, sizeof *exact);
+  float *angles = calloc(STATES * n, sizeof *angles);
+  double sum = 0.0;
+  double squares = 0.0;
+  assert_true(xyz != NULL && lit != NULL && exact != NULL && angles != NULL);
+  assert_true(info->normal_count > 0);
+  for (size_t i = 0; i < STATES; ++i) {
+    const double mean = measure(basis, &seed, xyz, lit, exact, angles + i * n);
+    sum += mean;
+    squares += mean * mean;
+  }
+  qsort(angles, STATES * n, sizeof *angles, compare_floats);
+  const double mean = sum / STATES;
+  const double error = sqrt((squares / STATES - mean * mean) / (STATES - 1));
+  const double p999 = (double)angles[STATES * n * 999 / 1000];
+  const char *said_mean = supine_basis_metadata(basis, "normals_mean_degrees");
+  const char *said_p999 = supine_basis_metadata(basis, "normals_p999_degrees");
+  assert_true(said_mean != NULL && said_p999 != NULL);
+  printf("%zu vertices, %zu modes, %zu of the normals: mean %.3f degrees (said %s), 99.9th "
+         "percentile %.2f (said %s)\n",
+         n, info->mode_count, info->normal_count, mean, said_mean, p999, said_p999);
+  assert_true(mean <= mean_most);
+  assert_true(p999 <= p999_most);
+  assert_true(fabs(mean - strtod(said_mean, NULL)) <= sigmas * error + printed * mean);
+  assert_true(p999 <= p999_near * strtod(said_p999, NULL));
+  assert_true(strtod(said_p999, NULL) <= p999_near * p999);
+  free(xyz);
+  free(lit);
+  free(exact);
+  free(angles);
+  supine_basis_close(basis);
+}
+
+static void check_real(const char *left, const char *right, supine_axes axes, double soften,
+                       size_t modes) {
+  const char *const names[] = {left, right};
+  supine_lungs lungs = {0};
+  if (!helper_real_lungs(names, 2, axes, &lungs)) {
+    skip();
+  }
+  check_angles(&lungs, soften, modes);
+  supine_lungs_free(&lungs);
+}
+
+static void test_made_lungs_as_said(void **state) {
+  (void)state;
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+  check_angles(&lungs, 0.0, 16);
+  supine_mesh_free(&mesh);
+  supine_lungs_free(&lungs);
+}
+
+static void test_adult_as_said(void **state) {
+  (void)state;
+  check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 0.0, 16);
+}
+
+static void test_adult_softened_sixteen_modes_as_said(void **state) {
+  (void)state;
+  check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 1.0, 16);
+}
+
+static void test_001_as_said(void **state) {
+  (void)state;
+  check_real("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS, 0.0, 16);
+}
+
+static void test_005_as_said(void **state) {
+  (void)state;
+  check_real("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS, 0.0, 16);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_made_lungs_as_said),
+      cmocka_unit_test(test_adult_as_said),
+      cmocka_unit_test(test_adult_softened_sixteen_modes_as_said),
+      cmocka_unit_test(test_001_as_said),
+      cmocka_unit_test(test_005_as_said),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
