@@ -78,6 +78,29 @@ static void range_deform(void *context, size_t begin, size_t end, size_t thread)
                       t->work->xyz + 3 * begin);
 }
 
+static void range_normals(void *context, size_t begin, size_t end, size_t thread) {
+  const task *t = context;
+  (void)thread;
+  (void)supine_deform_lit_range(t->basis, t->work->weights, t->work->scales, begin, end, NULL,
+                                t->work->c + 3 * begin);
+}
+
+static void range_lit(void *context, size_t begin, size_t end, size_t thread) {
+  const task *t = context;
+  (void)thread;
+  (void)supine_deform_lit_range(t->basis, t->work->weights, t->work->scales, begin, end,
+                                t->work->xyz + 3 * begin, t->work->c + 3 * begin);
+}
+
+/* Of one thread: it knows no ranges. */
+static void range_exact_normals(void *context, size_t begin, size_t end, size_t thread) {
+  const task *t = context;
+  (void)begin;
+  (void)end;
+  (void)thread;
+  supine_normals(t->basis, t->work->xyz, t->work->c);
+}
+
 static void range_separate(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   const size_t n = t->work->image.vertices;
@@ -286,7 +309,8 @@ static supine_status bench_open(bench *work, size_t vertices, const supine_basis
     return status;
   }
   for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
-    const supine_basis_options options = {sizeof options, .storage = (supine_storage)storage};
+    const supine_basis_options options = {sizeof options, .storage = (supine_storage)storage,
+                                          .without_normals = storage != SUPINE_STORAGE_INT16};
     status = supine_basis_open_memory_with(work->image.bytes, work->image.size, &options,
                                            &work->bases[storage], error);
     if (status != SUPINE_OK) {
@@ -351,6 +375,33 @@ static void say_basis(supine_bench_row *row, const supine_basis *basis) {
   row->additions = (double)supine_basis_get_info(basis)->mode_count + 2;
 }
 
+/* Normals by their modes, with positions and alone, and exactly. */
+static void add_lit(list *l, bench *work, size_t threads) {
+  const supine_basis *basis = work->bases[SUPINE_STORAGE_INT16];
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = work->image.vertices;
+  const double words = (double)((info->normal_count + 2) / 3); /* three modes a word of 4 bytes */
+  const double output = 12;
+  const double bytes = 3 * 4 * words + output;
+  const double products = 3 * (double)info->normal_count;
+  if (info->normal_count == 0) {
+    return;
+  }
+  supine_bench_row *row = add(l, work, "normals", basis, threads, range_normals, n, bytes);
+  say_basis(row, basis);
+  row->multiplications = products + 8;
+  row->additions = products + 2;
+  row = add(l, work, "lit", basis, threads, range_lit, n, bytes + info->bytes_per_vertex + output);
+  say_basis(row, basis);
+  row->multiplications += products + 8;
+  row->additions += products + 2;
+  if (threads == 1) {
+    const double triangles = (double)info->triangle_count / (double)n;
+    (void)add(l, work, "supine_normals", basis, 1, range_exact_normals, n,
+              12 * triangles + 2 * output);
+  }
+}
+
 static void add_all(list *l, bench *work, size_t threads) {
   const size_t n = work->image.vertices;
   const double modes = (double)work->image.modes;
@@ -372,6 +423,7 @@ static void add_all(list *l, bench *work, size_t threads) {
   row = add(l, work, "supine_separate", basis, threads, range_separate, n,
             supine_basis_get_info(basis)->bytes_per_vertex + output);
   say_basis(row, basis);
+  add_lit(l, work, threads);
   row = add(l, work, "supine_step", basis, threads, range_step, n, 3 * output);
   row->additions = 3;
   row = add(l, work, "supine_batch64", basis, threads, range_batch, work->batch_vertices,

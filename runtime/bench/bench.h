@@ -41,16 +41,18 @@ typedef struct supine_bench_entry {
  * flushed, and fills in the rows' times, rates and shares from the fastest run of each. */
 void supine_bench_measure(supine_bench_entry *entries, size_t count, size_t repeats);
 
-/** A made basis of any size as a file in memory, for want of a file: the fields of `like` over and
- * over, or random ones of `modes` modes where it is NULL. `coefficients`, `direction` and `rest`
- * point into the bytes; free the bytes after the bases that were opened on them. */
+/** A made basis of any size as a file in memory, for want of a file: the fields and triangles of
+ * `like` over and over, or random fields of `modes` modes, and no triangles, where it is NULL. The
+ * arrays point into the bytes; free the bytes after the bases that were opened on them. */
 typedef struct supine_bench_image {
   unsigned char *bytes;
   size_t size;
-  size_t vertices, modes;
-  const float *coefficients; /**< [N, K] */
-  const float *direction;    /**< [N, 3] */
-  const float *rest;         /**< [N, 3] */
+  size_t vertices, modes, triangle_count, normal_count;
+  float *coefficients; /**< [N, K] */
+  float *direction;    /**< [N, 3] */
+  float *rest;         /**< [N, 3] */
+  uint32_t *triangles; /**< [M, 3] */
+  int16_t *normals;    /**< [N, 3, Q] */
 } supine_bench_image;
 
 /** @retval SUPINE_ERROR_MEMORY
@@ -77,7 +79,9 @@ typedef size_t supine_bench_peers(void *context, const supine_bench_image *image
 
 /** Measures "supine" (every storage; separate arrays; a frozen step; a batch of 64), "traffic"
  * (the evaluator's loads and stores without its arithmetic), "plain_loop", "copy", "triad" and
- * "arithmetic" (what threads gain where memory plays no part) at each size.
+ * "arithmetic" (what threads gain where memory plays no part) at each size; where the basis has
+ * normals, those alone ("normals"), with positions ("lit") and exactly from the triangles
+ * ("supine_normals"), too.
  * `peers` may be NULL.
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_ARGUMENT  no vertices, or more than 256 threads */

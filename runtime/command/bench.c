@@ -126,7 +126,9 @@ const supine_command supine_command_bench = {
     .notes =
         "Rows: supine (AoS output by storage, and others named in full), plain_loop (-O3, "
         "float32), traffic (the same loads and stores without arithmetic: with AVX-512, memory's "
-        "bound), copy and triad (the memory's own speed, with stores past the caches), arithmetic "
+        "bound), normals (by their modes), lit (positions and normals), supine_normals (exactly, "
+        "from the triangles), copy and triad (the memory's own speed, with stores past the "
+        "caches), arithmetic "
         "(what threads gain where memory plays no part). triad is the share of the triad's "
         "bandwidth that is reached.\n"
         "A tracked head-worn display allows 15 ms a frame: 15 ns a vertex for a million vertices.",

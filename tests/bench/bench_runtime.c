@@ -2,18 +2,25 @@
 /* The evaluator against OpenBLAS and plain loops, interleaved in one process.
  *
  *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES...]
+ *     bench_runtime lit [VERTICES or BASIS...]
  *
- * OpenBLAS 0.3.21 takes newer processors for old ones; the variable names one that it knows. */
+ * OpenBLAS 0.3.21 takes newer processors for old ones; the variable names one that it knows. `lit`
+ * sets normals by their modes beside exact ones: at each size the made lungs' own fields, as the
+ * default options make them, over and over; of a basis file, itself. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
 
+#include "precompute/phantom/phantom.h"
+#include "precompute/precompute.h"
 #include "runtime/bench/bench.h"
 
 #include "full_solve.h"
 
+enum { MADE_VERTICES = 40000 };
 enum { ROWS_MAX = 256, BATCH = 64, BATCH_VERTICES = 50000, SOLVE_VERTICES_MAX = 2000000 };
 
 /* OpenBLAS's own, which cblas.h does not declare everywhere. */
@@ -234,8 +241,156 @@ static int run_modes(size_t vertices) {
   return 0;
 }
 
+/* The loop over triangles that anyone would write, compiled with -march=native. */
+static void scatter(const supine_bench_image *m, const float *restrict xyz, float *restrict n) {
+  memset(n, 0, 3 * m->vertices * sizeof *n);
+  for (size_t t = 0; t < m->triangle_count; ++t) {
+    const uint32_t *corner = m->triangles + 3 * t;
+    const float *a = xyz + 3 * (size_t)corner[0];
+    const float *b = xyz + 3 * (size_t)corner[1];
+    const float *c = xyz + 3 * (size_t)corner[2];
+    const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const float v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    const float cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                            u[0] * v[1] - u[1] * v[0]};
+    for (size_t j = 0; j < 3; ++j) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        n[3 * (size_t)corner[j] + axis] += cross[axis];
+      }
+    }
+  }
+  for (size_t i = 0; i < m->vertices; ++i) {
+    float *at = n + 3 * i;
+    const float inverse = 1 / sqrtf(at[0] * at[0] + at[1] * at[1] + at[2] * at[2] + 1e-30F);
+    at[0] *= inverse;
+    at[1] *= inverse;
+    at[2] *= inverse;
+  }
+}
+
+static void run_scatter(void *context) {
+  peers *p = context;
+  scatter(p->image, p->xyz, p->product);
+}
+
+static size_t add_scatter(void *context, const supine_bench_image *image, float *xyz,
+                          supine_bench_entry *entries, size_t room) {
+  peers *p = context;
+  free(p->product);
+  p->image = image;
+  p->xyz = xyz;
+  p->product = calloc(3 * image->vertices, sizeof *p->product);
+  if (p->product == NULL || room < 1) {
+    return 0;
+  }
+  entries[0] = (supine_bench_entry){{.what = "scatter_native",
+                                     .storage = "",
+                                     .code = "",
+                                     .vertices = image->vertices,
+                                     .modes = image->modes,
+                                     .threads = 1},
+                                    1,
+                                    run_scatter,
+                                    p};
+  return 1;
+}
+
+static void print_lit(const peers *p, size_t from) {
+  const double normals = find(p, from, "normals", "", 1);
+  const double exact = find(p, from, "supine_normals", "", 1);
+  const double lit = find(p, from, "lit", "", 1);
+  const double deform = find(p, from, "supine", "int16", 1);
+  printf("%zu vertices, ns each: deform %.3f  normals %.3f  lit %.3f  supine_normals %.3f  "
+         "scatter %.3f\n",
+         p->row[from].vertices, deform, normals, lit, exact,
+         find(p, from, "scatter_native", "", 1));
+  printf(
+      "  normals are %.2f times as fast as supine_normals, %.2f as a plain scatter loop (>= 4); a "
+      "lit frame takes %.3f of deform + supine_normals (<= 0.35)\n",
+      exact / normals, find(p, from, "scatter_native", "", 1) / normals, lit / (deform + exact));
+  printf("  two threads gain: normals %.2f, lit %.2f; arithmetic %.2f, bare traffic %.2f, copy "
+         "%.2f\n",
+         normals / find(p, from, "normals", "", 2), lit / find(p, from, "lit", "", 2),
+         find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2),
+         find(p, from, "traffic", "int16", 1) / find(p, from, "traffic", "int16", 2),
+         find(p, from, "copy", "", 1) / find(p, from, "copy", "", 2));
+}
+
+/* The made lungs by the default options. */
+static supine_basis *made_basis(supine_error *error) {
+  const char *path = "bench_runtime.safetensors";
+  const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  const supine_resting resting = supine_reference_resting_default();
+  supine_precompute_options options = {
+      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 23, .modes = 16, .held_out = 20};
+  supine_reference reference;
+  supine_precompute_report report;
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
+  supine_basis *basis = NULL;
+  options.reference = &reference;
+  if (supine_phantom_create(MADE_VERTICES, 6000, &mesh, error) == SUPINE_OK &&
+      supine_lungs_create(&mesh, 1, NULL, &lungs, error) == SUPINE_OK &&
+      supine_reference_find(&lungs, &options.model, &full, &resting, &reference, error) ==
+          SUPINE_OK &&
+      supine_precompute(&lungs, &options, path, &report, error) == SUPINE_OK) {
+    (void)supine_basis_open(path, &basis, error);
+    (void)remove(path);
+  }
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&mesh);
+  return basis;
+}
+
+/* One size of the made lungs, or a file's own. */
+static int run_lit(const char *what, const supine_basis *made) {
+  size_t vertices = strtoul(what, NULL, 10);
+  supine_error error = {0};
+  supine_basis *own = NULL;
+  peers *p = calloc(1, sizeof *p);
+  if (p == NULL || (vertices == 0 && supine_basis_open(what, &own, &error) != SUPINE_OK)) {
+    (void)fprintf(stderr, "%s\n", error.message);
+    free(p);
+    return 1;
+  }
+  vertices = own != NULL ? supine_basis_get_info(own)->vertex_count : vertices;
+  const supine_basis *like = own != NULL ? own : made;
+  const supine_bench_options options = {.vertices = &vertices, .vertices_count = 1, .like = like};
+  const supine_status status = supine_bench_run(&options, add_scatter, report, p, &error);
+  if (status == SUPINE_OK) {
+    const supine_basis_info *info = supine_basis_get_info(like);
+    printf("%s: %zu modes, %zu of the normals\n", what, info->mode_count, info->normal_count);
+    print_lit(p, 0);
+  } else {
+    (void)fprintf(stderr, "%s\n", error.message);
+  }
+  supine_basis_close(own);
+  free(p->product);
+  free(p);
+  return status != SUPINE_OK;
+}
+
+static int run_lits(int count, char **what) {
+  static char *usual[] = {"40000", "508000", "16000000"};
+  supine_error error = {0};
+  supine_basis *made = made_basis(&error);
+  if (made == NULL) {
+    (void)fprintf(stderr, "%s\n", error.message);
+    return 1;
+  }
+  int code = 0;
+  for (int i = 0; i < (count > 0 ? count : 3); ++i) {
+    code |= run_lit(count > 0 ? what[i] : usual[i], made);
+  }
+  supine_basis_close(made);
+  return code;
+}
+
 int main(int argc, char **argv) {
   static const size_t usual[] = {10000, 100000, 1000000, 16000000};
+  if (argc > 1 && strcmp(argv[1], "lit") == 0) {
+    return run_lits(argc - 2, argv + 2);
+  }
   size_t sizes[32];
   size_t count = 0;
   for (int i = 1; i < argc && count < 32; ++i) {
