@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(inside supine_inside supine_phantom)
 supine_test(image supine_image)
+supine_test(labels supine_labels supine_image supine_inside supine_phantom m)
 supine_test(field supine_inside supine_field supine_phantom)
-set_tests_properties(image PROPERTIES
+set_tests_properties(image labels PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")
+
+# Orientation as nibabel and VTK have it, where Debian's python has both.
+add_test(NAME labels_orientation COMMAND /usr/bin/python3
+  ${CMAKE_CURRENT_SOURCE_DIR}/test_labels_orientation.py $<TARGET_FILE:supine>)
+set_tests_properties(labels_orientation PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)

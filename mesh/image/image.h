@@ -35,6 +35,9 @@ typedef struct supine_image {
   supine_image_voxel voxel;
   size_t channels; /**< numbers a voxel: 1 where read; 3 for a displacement field */
   void *values;
+  const char *frame_source; /**< where the frame of a file was: "sform", "qform" or "space
+                                 directions", a literal */
+  bool frames_differ;       /**< a NIfTI file's other form puts some voxel half a voxel away */
 } supine_image;
 
 /** Does the name end in .nrrd, .nii or .nii.gz? */

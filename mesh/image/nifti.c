@@ -16,6 +16,26 @@
 static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
                                               DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};
 
+/* Does the qform put a corner of the image half a voxel or more from where the sform does? */
+static bool forms_differ(const nifti_image *nifti) {
+  const double size[3] = {(double)nifti->nx, (double)nifti->ny, (double)nifti->nz};
+  const double voxel = fmin(fabs(nifti->dx), fmin(fabs(nifti->dy), fabs(nifti->dz)));
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double apart = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      double difference = nifti->sto_xyz.m[k][3] - nifti->qto_xyz.m[k][3];
+      for (int a = 0; a < 3; ++a) {
+        difference +=
+            (corner >> a & 1) * (size[a] - 1.0) * (nifti->sto_xyz.m[k][a] - nifti->qto_xyz.m[k][a]);
+      }
+      apart += difference * difference;
+    }
+    farthest = fmax(farthest, sqrt(apart));
+  }
+  return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
+}
+
 /* Size, type and frame; NIfTI is RAS. */
 static supine_status check(const char *path, const nifti_image *nifti, size_t file_size,
                            supine_image *image, supine_error *error) {
@@ -42,6 +62,8 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
                             nifti_datatype_string(nifti->datatype));
   }
   image->voxel = (supine_image_voxel)type;
+  image->frame_source = nifti->sform_code > 0 ? "sform" : "qform";
+  image->frames_differ = forms_differ(nifti);
   for (int k = 0; k < 3; ++k) {
     const double turn = k < 2 ? -unit : unit;
     image->size[k] = (size_t)size[k];

@@ -64,6 +64,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             airEnumStr(nrrdType, nrrd->type));
   }
   image->voxel = (supine_image_voxel)type;
+  image->frame_source = "space directions";
   for (unsigned a = 0; a < 3; ++a) {
     image->size[a] = nrrd->axis[a].size;
     for (int k = 0; k < 3; ++k) {

@@ -213,6 +213,7 @@ const supine_option supine_command_model_options[] = {
      "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
      "the inner face of a single lung's",
      FILLS(midline), SUPINE_SAYS_GIVEN(supine_model_options, has_midline), .wants = "an x in mm"},
+    {.table = supine_command_label_options, FILLS(maps)},
     {.help = "The scan and the law:"},
     {"scanned", 0, "POSTURE:STATE",
      "what the surfaces show: full (a breath-hold at full inflation, the default; then the posture "
@@ -539,23 +540,60 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
   put(text, size, "; rest supine %.0f mL", share * reference->full_volume);
 }
 
+/* Surfaces from files, all at once; an exit code. */
+static int load_meshes(const char *command, load_work *work, size_t count) {
+  supine_parallel_for(count, 1, count, load_range, work);
+  for (size_t i = 0; i < count; ++i) {
+    if (work->errors[i].status != SUPINE_OK) {
+      return supine_options_fail(command, &work->errors[i]);
+    }
+    mention(command, work->paths[i], &work->reports[i]);
+  }
+  return SUPINE_EXIT_OK;
+}
+
+/* Surfaces from label maps, whose headers say axes and units. A lung alone has its inner face for a
+ * midline. */
+static int load_maps(supine_model_options *options, const char *command, load_work *work,
+                     size_t *count) {
+  int sides[2];
+  if (options->load.axes != SUPINE_AXES_AUTO || options->load.millimetres_per_unit != 0.0) {
+    return supine_options_usage(command, "--axes and --units are of surfaces: a label map's header "
+                                         "says both");
+  }
+  const int result = supine_command_labels_load(&options->maps, command, work->paths, *count,
+                                                work->meshes, count, sides);
+  for (size_t i = 0; i < *count && result == SUPINE_EXIT_OK; ++i) {
+    work->reports[i] = (supine_mesh_report){.axes = SUPINE_AXES_LPS, .axes_from_tag = true};
+  }
+  if (result == SUPINE_EXIT_OK && *count == 1 && !options->has_midline) {
+    double low[3];
+    double high[3];
+    supine_mesh_box(&work->meshes[0], low, high);
+    options->midline = sides[0] > 0 ? low[0] : high[0];
+    options->has_midline = true;
+  }
+  return result;
+}
+
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
                               size_t count, bool keep, supine_lungs *lungs) {
-  int result = SUPINE_EXIT_OK;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  load_work work = {&options->load, paths, calloc(count, sizeof(supine_mesh)),
-                    calloc(count, sizeof(supine_mesh_report)), calloc(count, sizeof(supine_error))};
+  bool maps = false;
+  int result = supine_command_labels_check(&options->maps, command, paths, count, &maps);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  const size_t most = count > 2 ? count : 2; /* a map holds two lungs */
+  load_work work = {&options->load, paths, calloc(most, sizeof(supine_mesh)),
+                    calloc(most, sizeof(supine_mesh_report)), calloc(most, sizeof(supine_error))};
   if (work.meshes == NULL || work.reports == NULL || work.errors == NULL) {
     result = supine_options_fail(command, &error);
     goto cleanup;
   }
-  supine_parallel_for(count, 1, count, load_range, &work);
-  for (size_t i = 0; i < count; ++i) {
-    if (work.errors[i].status != SUPINE_OK) {
-      result = supine_options_fail(command, &work.errors[i]);
-      goto cleanup;
-    }
-    mention(command, paths[i], &work.reports[i]);
+  result = maps ? load_maps(options, command, &work, &count) : load_meshes(command, &work, count);
+  if (result != SUPINE_EXIT_OK) {
+    goto cleanup;
   }
   if (supine_lungs_create(work.meshes, count, options->has_midline ? &options->midline : NULL,
                           lungs, &error) != SUPINE_OK) {
@@ -592,7 +630,7 @@ int supine_command_model_load(supine_model_options *options, const char *command
   options->frame = frame_of(options, work.reports, count);
   say_assumed(options, lungs, &work.reports[0]);
 cleanup:
-  for (size_t i = 0; work.meshes != NULL && i < count; ++i) {
+  for (size_t i = 0; work.meshes != NULL && i < most; ++i) {
     supine_mesh_free(&work.meshes[i]);
   }
   free(work.meshes);

@@ -9,7 +9,7 @@
 #include "precompute/tissue/disease.h"
 #include "precompute/tissue/expandability.h"
 
-#include "runtime/options/command.h"
+#include "precompute/command/label_options.h"
 
 /* A table of options that fills a supine_model_options: {.table = ..., SUPINE_FILLS(...)}. */
 extern const supine_option supine_command_model_options[];
@@ -18,6 +18,7 @@ enum { MODEL_LESIONS_MAX = 64 };
 
 typedef struct supine_model_options {
   supine_mesh_load_options load;
+  supine_label_options maps;
   bool has_midline;
   double midline;
   int law_choice;     /* as supine_law, or SUPINE_LAW_COUNT: by the scan's state */

@@ -276,15 +276,18 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_precompute = {
     name,
     "turn lung surfaces into a basis file (offline)",
-    .usage = "MESH... -o FILE [OPTIONS]",
+    .usage = "MESH... -o FILE [OPTIONS]\n"
+             "LABELS... -o FILE [OPTIONS]",
     .about =
         "Solves the physics of one or two lungs for every direction of gravity at once and writes "
         "a basis file, which 'supine deform' and the run-time library turn into deformed lungs in "
         "real time. Both lungs may be in one file or in two; any surface that assimp reads will do "
-        "(PLY, OBJ, STL, OFF, ...). Closed surfaces can be asked for exact volumes later.",
+        "(PLY, OBJ, STL, OFF, ...), or the label map of a segmenter (NRRD, NIfTI). Closed surfaces "
+        "can be asked for exact volumes later.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"
+             "  supine precompute lungs.nii.gz -o lungs.safetensors\n"
              "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors",
     SUPINE_SURFACES,
     .request_size = sizeof(request),

@@ -239,7 +239,8 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_solve = {
     name,
     "full physics for one posture: the reference",
-    .usage = "MESH... --posture NAME -o FILE [OPTIONS]",
+    .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
+             "LABELS... --posture NAME -o FILE [OPTIONS]",
     .about = "Runs the full physics for one direction of gravity, without any harmonics, and "
              "writes the deformed surface: the reference that a basis is measured against.",
     .options = table,

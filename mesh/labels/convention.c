@@ -1,0 +1,283 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Whose a label is: by the convention of the segmenter, or by where it lies. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/labels/mask.h"
+
+/* What segmenters write: lungmask's R231 and LTRCLobes, TotalSegmentator's `total` since 2.0 and
+ * before. */
+static const struct {
+  const char *name;
+  uint16_t left[4], right[4]; /* ended by 0 */
+} conventions[] = {{"lungmask", {2}, {1}},
+                   {"lobes", {1, 2}, {3, 4, 5}},
+                   {"totalsegmentator", {10, 11}, {12, 13, 14}},
+                   {"totalsegmentator-v1", {13, 14}, {15, 16, 17}}};
+
+enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
+
+/* Adds to a sentence; what does not fit is left out. */
+SUPINE_PRINTF(3, 4)
+static void put(char *text, size_t size, const char *format, ...) {
+  const size_t used = strlen(text);
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(text + used, size - used, format, arguments);
+  va_end(arguments);
+}
+
+/* Centre of the labels of a side, mm; false where there is no voxel. */
+static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
+                      uint8_t wanted, double centre[3]) {
+  double count = 0.0;
+  double voxel[3] = {0.0, 0.0, 0.0};
+  for (size_t label = 1; label < LABELS_MAX; ++label) {
+    for (int a = 0; side[label] == wanted && a < 3; ++a) {
+      voxel[a] += (double)tally[label].sum[a];
+    }
+    count += side[label] == wanted ? (double)tally[label].count : 0.0;
+  }
+  for (int k = 0; k < 3; ++k) {
+    centre[k] = image->origin[k];
+    for (int a = 0; a < 3; ++a) {
+      centre[k] += voxel[a] / count * image->step[a][k];
+    }
+  }
+  return count > 0.0;
+}
+
+/* "1, 2 and 17 more" */
+static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
+                        size_t size) {
+  enum { SHOWN = 12 };
+  size_t shown = 0;
+  size_t more = 0;
+  text[0] = '\0';
+  for (size_t label = 1; label < LABELS_MAX; ++label) {
+    if (tally[label].count == 0 || (side != NULL && side[label] != wanted)) {
+      continue;
+    }
+    if (shown < SHOWN) {
+      put(text, size, "%s%zu", shown == 0 ? "" : ", ", label);
+      ++shown;
+    } else {
+      ++more;
+    }
+  }
+  if (more > 0) {
+    put(text, size, " and %zu more", more);
+  }
+}
+
+static void take(const uint16_t *labels, uint8_t value, uint8_t *side) {
+  for (; *labels != 0; ++labels) {
+    side[*labels] = value;
+  }
+}
+
+/* "10+11" up to a comma or the end; NULL where it is anything else. */
+static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
+  for (;; ++at) {
+    char *end;
+    const unsigned long label = strtoul(at, &end, 10);
+    if (*at < '0' || *at > '9' || label == 0 || label >= LABELS_MAX || side[label] != 0) {
+      return NULL;
+    }
+    side[label] = value;
+    at = end;
+    if (*at != '+') {
+      return *at == ',' || *at == '\0' ? at : NULL;
+    }
+  }
+}
+
+/* "left=10+11,right=12+13+14" */
+static bool read_own(const char *wanted, uint8_t *side) {
+  const char *at = wanted;
+  bool seen[2] = {false, false};
+  for (;;) {
+    const bool left = strncmp(at, "left=", 5) == 0;
+    if ((!left && strncmp(at, "right=", 6) != 0) || seen[left]) {
+      return false;
+    }
+    seen[left] = true;
+    at = read_sum(at + (left ? 5 : 6), left ? LABELS_LEFT : LABELS_RIGHT, side);
+    if (at == NULL || *at == '\0') {
+      return at != NULL;
+    }
+    ++at;
+  }
+}
+
+/* Are the labels that are there just those of a convention? */
+static bool is_convention(const labels_tally *tally, size_t convention) {
+  uint8_t *named = calloc(LABELS_MAX, 1);
+  bool same = named != NULL;
+  if (same) {
+    take(conventions[convention].left, 1, named);
+    take(conventions[convention].right, 1, named);
+  }
+  for (size_t label = 1; same && label < LABELS_MAX; ++label) {
+    same = (tally[label].count > 0) == (named[label] != 0);
+  }
+  free(named);
+  return same;
+}
+
+/* Without a word from the user. Two labels are two lungs, whoever numbered them. */
+static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
+                               const char **name) {
+  size_t present[2] = {0, 0};
+  size_t count = 0;
+  for (size_t label = 1; label < LABELS_MAX; ++label) {
+    if (tally[label].count > 0) {
+      present[count < 2 ? count : 1] = label;
+      ++count;
+    }
+  }
+  if (count == 1) {
+    side[present[0]] = LABELS_EITHER;
+    return true;
+  }
+  if (count == 2) {
+    double centre[2][3];
+    side[present[0]] = LABELS_LEFT;
+    side[present[1]] = LABELS_RIGHT;
+    (void)centre_of(image, tally, side, LABELS_LEFT, centre[0]);
+    (void)centre_of(image, tally, side, LABELS_RIGHT, centre[1]);
+    if (centre[0][0] < centre[1][0]) {
+      side[present[0]] = LABELS_RIGHT;
+      side[present[1]] = LABELS_LEFT;
+    }
+    *name = "their sides";
+    return true;
+  }
+  for (size_t c = 0; c < CONVENTIONS; ++c) {
+    if (is_convention(tally, c)) {
+      take(conventions[c].left, LABELS_LEFT, side);
+      take(conventions[c].right, LABELS_RIGHT, side);
+      *name = conventions[c].name;
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Sets sides as wanted; `name` is the convention's. */
+static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
+                            const char *wanted, uint8_t *side, const char **name,
+                            supine_error *error) {
+  char present[128];
+  list_labels(tally, NULL, 0, present, sizeof present);
+  if (present[0] == '\0') {
+    return supine_error_set(error, SUPINE_ERROR_MESH, "%s: every voxel is 0: the mask is empty",
+                            path);
+  }
+  if (wanted == NULL) {
+    return choose_by_presence(image, tally, side, name)
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_MESH,
+                                  "%s: which of its labels (%s) are lungs? Give --labels, as "
+                                  "left=10+11,right=12+13+14 or totalsegmentator",
+                                  path, present);
+  }
+  if (strcmp(wanted, "one") == 0) {
+    memset(side + 1, LABELS_EITHER, LABELS_MAX - 1);
+    return SUPINE_OK;
+  }
+  for (size_t c = 0; c < CONVENTIONS; ++c) {
+    if (strcmp(wanted, conventions[c].name) == 0) {
+      take(conventions[c].left, LABELS_LEFT, side);
+      take(conventions[c].right, LABELS_RIGHT, side);
+      *name = wanted;
+      return SUPINE_OK;
+    }
+  }
+  if (!read_own(wanted, side)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--labels takes one, lungmask, lobes, totalsegmentator, "
+                            "totalsegmentator-v1 or left=LABEL+...,right=LABEL+..., not '%s'",
+                            wanted);
+  }
+  return SUPINE_OK;
+}
+
+/* Both are there where both are named, and beside each other, the left one on the left. */
+static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
+                           const uint8_t *side, supine_error *error) {
+  static const char *const names[] = {"left", "right"};
+  static const uint8_t sides[] = {LABELS_LEFT, LABELS_RIGHT};
+  double centre[2][3];
+  bool there[2];
+  char present[128];
+  char alone[128];
+  list_labels(tally, NULL, 0, present, sizeof present);
+  for (size_t s = 0; s < 2; ++s) {
+    there[s] = centre_of(image, tally, side, sides[s], centre[s]);
+  }
+  for (size_t s = 0; s < 2; ++s) {
+    if (there[s] || memchr(side, sides[s], LABELS_MAX) == NULL) {
+      continue;
+    }
+    if (!there[1 - s]) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: its labels are %s: by --labels none of them is a lung", path,
+                              present);
+    }
+    list_labels(tally, side, sides[1 - s], alone, sizeof alone);
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: no voxel of the %s lung. If the %s one is meant to be alone, name "
+                            "its labels (%s) alone, as --labels %s=1+2",
+                            path, names[s], names[1 - s], alone, names[1 - s]);
+  }
+  if (!(there[0] && there[1])) {
+    return SUPINE_OK;
+  }
+  const double apart = centre[0][0] - centre[1][0];
+  if (apart < 0.0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: by its header the left lung lies %.0f mm to the right of the "
+                            "right one: the header is mirrored, or the labels are the other way "
+                            "round (--labels left=...,right=...)",
+                            path, -apart);
+  }
+  if (apart < fabs(centre[0][1] - centre[1][1]) || apart < fabs(centre[0][2] - centre[1][2])) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: labels %s do not lie beside each other, as two lungs do: name "
+                            "them with --labels left=...,right=..., or --labels one",
+                            path, present);
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_labels_choose(const char *path, const supine_image *image,
+                                   const labels_tally *tally, const char *wanted, uint8_t *side,
+                                   char taken[256], supine_error *error) {
+  const char *name = NULL;
+  char list[3][96];
+  memset(side, 0, LABELS_MAX);
+  supine_status status = choose(path, image, tally, wanted, side, &name, error);
+  status = status == SUPINE_OK ? check(path, image, tally, side, error) : status;
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
+    list_labels(tally, side, value, list[value - 1], sizeof list[0]);
+  }
+  taken[0] = '\0';
+  if (list[2][0] != '\0') {
+    put(taken, 256, "%s both lungs", list[2]);
+    return SUPINE_OK;
+  }
+  put(taken, 256, "%s%s%s%s%s", list[0], list[0][0] != '\0' ? " left" : "",
+      list[0][0] != '\0' && list[1][0] != '\0' ? "; " : "", list[1],
+      list[1][0] != '\0' ? " right" : "");
+  if (name != NULL) {
+    put(taken, 256, " (%s%s)", strcmp(name, "their sides") == 0 ? "by " : "as of ", name);
+  }
+  return SUPINE_OK;
+}

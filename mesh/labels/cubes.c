@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A mask averaged over cubes, in steps along its own axes, and made so that no two cubes of the
+ * inside, or of the outside, meet in an edge or a corner alone: then its surface is a manifold
+ * [Latecki1995]. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "mesh/labels/mask.h"
+
+enum { LAYERS = 2 }; /* of cubes around the mask */
+
+/* Share of the mask's voxels that a cube has along one axis, from `in` [outer, n, inner] into `out`
+ * [outer, m, inner]. A cube narrower than a voxel is one as wide: between centres that is linear
+ * interpolation. */
+static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
+                    float *out) {
+  const double width = fmax(1.0, ratio);
+  for (size_t o = 0; o < outer; ++o) {
+    for (size_t t = 0; t < m; ++t) {
+      const double middle = ratio * ((double)t - LAYERS + 0.5) - 0.5;
+      const double from = middle - 0.5 * width;
+      const double to = middle + 0.5 * width;
+      float *line = out + (o * m + t) * inner;
+      for (size_t x = 0; x < inner; ++x) {
+        line[x] = 0.0F;
+      }
+      const double first = fmax(0.0, floor(from + 0.5));
+      for (double i = first; i - 0.5 < to && i < (double)n; ++i) {
+        const double overlap = (fmin(to, i + 0.5) - fmax(from, i - 0.5)) / width;
+        const float *source = in + (o * n + (size_t)i) * inner;
+        for (size_t x = 0; x < inner && overlap > 0.0; ++x) {
+          line[x] += (float)overlap * source[x];
+        }
+      }
+    }
+  }
+}
+
+/* Rows of bytes averaged along the first axis, straight from the mask. */
+static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
+  const size_t n = mask->size[0];
+  const double width = fmax(1.0, ratio);
+  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
+    const uint8_t *at = mask->at + row * n;
+    for (size_t t = 0; t < m; ++t) {
+      const double middle = ratio * ((double)t - LAYERS + 0.5) - 0.5;
+      const double from = middle - 0.5 * width;
+      const double to = middle + 0.5 * width;
+      double sum = 0.0;
+      for (double i = fmax(0.0, floor(from + 0.5)); i - 0.5 < to && i < (double)n; ++i) {
+        sum += at[(size_t)i] != 0 ? fmin(to, i + 0.5) - fmax(from, i - 0.5) : 0.0;
+      }
+      out[row * m + t] = (float)(sum / width);
+    }
+  }
+}
+
+static const float half = 0.5F;
+/* Shares are rounded to so many parts, so that a half is a half on every processor. */
+static const float levels = 65536.0F;
+
+/* Of four cubes around an edge, two that face each other are inside alone: the emptier two's
+ * fuller one joins them. */
+static bool mend_edge(float *share, const size_t at[4]) {
+  const bool in[4] = {share[at[0]] >= half, share[at[1]] >= half, share[at[2]] >= half,
+                      share[at[3]] >= half};
+  if (in[0] != in[2] || in[1] != in[3] || in[0] == in[1]) {
+    return false;
+  }
+  const size_t a = at[in[0] ? 1 : 0];
+  const size_t b = at[in[0] ? 3 : 2];
+  share[share[a] >= share[b] ? a : b] = half;
+  return true;
+}
+
+/* Of eight cubes around a corner, two opposite ones are inside, or outside, alone. Inside: a path
+ * of two joins them; outside: one of them is filled. */
+static bool mend_corner(float *share, const size_t at[8]) {
+  unsigned inside = 0;
+  for (unsigned c = 0; c < 8; ++c) {
+    inside |= share[at[c]] >= half ? 1U << c : 0U;
+  }
+  for (unsigned c = 0; c < 4; ++c) {
+    const unsigned opposite = 7 - c;
+    const unsigned both = (1U << c) | (1U << opposite);
+    if (inside == both) {
+      share[at[c ^ 1U]] = half;
+      share[at[c ^ 3U]] = half;
+      return true;
+    }
+    if ((inside ^ 0xFFU) == both) {
+      share[at[c]] = half;
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Looks at every edge and corner; true where something was mended. */
+static bool mend(const size_t size[3], float *share) {
+  const size_t stride[3] = {1, size[0], size[0] * size[1]};
+  bool mended = false;
+  for (size_t k = 0; k + 1 < size[2]; ++k) {
+    for (size_t j = 0; j + 1 < size[1]; ++j) {
+      for (size_t i = 0; i + 1 < size[0]; ++i) {
+        const size_t cell = i + stride[1] * j + stride[2] * k;
+        size_t corner[8];
+        size_t in = 0;
+        for (size_t c = 0; c < 8; ++c) {
+          corner[c] = cell + (c & 1U) + (c >> 1U & 1U) * stride[1] + (c >> 2U) * stride[2];
+          in += share[corner[c]] >= half;
+        }
+        if (in < 2 || in > 6) {
+          continue;
+        }
+        for (size_t a = 0; a < 3; ++a) {
+          const size_t b = (a + 1) % 3;
+          const size_t c = (a + 2) % 3;
+          for (size_t side = 0; side < 2; ++side) {
+            const size_t from = cell + side * stride[a];
+            const size_t around[4] = {from, from + stride[b], from + stride[b] + stride[c],
+                                      from + stride[c]};
+            mended = mend_edge(share, around) || mended;
+          }
+        }
+        mended = mend_corner(share, corner) || mended;
+      }
+    }
+  }
+  return mended;
+}
+
+/* The cubes' own islands and cavities, which averaging may leave and mending close. */
+static supine_status one_piece(labels_cubes *cubes) {
+  labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
+  const size_t count = supine_labels_mask_count(&inside);
+  size_t pieces = 0;
+  size_t changed = 0;
+  inside.at = malloc(count);
+  supine_status status = inside.at == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
+    inside.at[i] = cubes->share[i] >= half;
+  }
+  status = status == SUPINE_OK ? supine_labels_keep_largest(&inside, &pieces, &changed) : status;
+  status = status == SUPINE_OK ? supine_labels_fill_cavities(&inside, &pieces, &changed) : status;
+  for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
+    const bool is = cubes->share[i] >= half;
+    cubes->share[i] = is == (inside.at[i] != 0) ? cubes->share[i] : is ? 0.0F : half;
+  }
+  supine_labels_mask_free(&inside);
+  return status;
+}
+
+supine_status supine_labels_cubes_create(const labels_mask *mask, double edge,
+                                         labels_cubes *cubes) {
+  const size_t *n = mask->size;
+  labels_cubes made = {.share = NULL};
+  for (int a = 0; a < 3; ++a) {
+    made.ratio[a] = edge / mask->spacing[a];
+    made.size[a] = (size_t)ceil((double)n[a] / made.ratio[a]) + (size_t)2 * LAYERS;
+    made.origin[a] = made.ratio[a] * (0.5 - LAYERS) - 0.5;
+  }
+  const size_t *m = made.size;
+  float *rows = malloc(m[0] * n[1] * n[2] * sizeof *rows);
+  float *planes = malloc(m[0] * m[1] * n[2] * sizeof *planes);
+  made.share = malloc(m[0] * m[1] * m[2] * sizeof *made.share);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (rows != NULL && planes != NULL && made.share != NULL) {
+    average_rows(mask, m[0], made.ratio[0], rows);
+    average(rows, n[2], n[1], m[0], m[1], made.ratio[1], planes);
+    average(planes, 1, n[2], m[0] * m[1], m[2], made.ratio[2], made.share);
+    for (size_t i = 0; i < m[0] * m[1] * m[2]; ++i) {
+      made.share[i] = rintf(levels * made.share[i]) / levels;
+    }
+    status = SUPINE_OK;
+  }
+  free(rows);
+  free(planes);
+  for (bool mended = true; mended && status == SUPINE_OK;) {
+    status = one_piece(&made);
+    mended = status == SUPINE_OK && mend(m, made.share);
+  }
+  if (status != SUPINE_OK) {
+    supine_labels_cubes_free(&made);
+    return status;
+  }
+  *cubes = made;
+  return SUPINE_OK;
+}
+
+void supine_labels_cubes_free(labels_cubes *cubes) {
+  free(cubes->share);
+  *cubes = (labels_cubes){.share = NULL};
+}

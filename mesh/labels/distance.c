@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Distances from every voxel to a set of voxels, exact: along the first axis by counting, along the
+ * others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
+ * [Felzenszwalb2012]. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "mesh/labels/mask.h"
+#include "sh/base/parallel.h"
+
+static const float far_away = 1e30F; /* mm^2: there is nothing in that row */
+
+typedef struct sweep {
+  const labels_mask *mask;
+  bool zero;
+  float *squares;
+  int axis;
+  size_t length; /* longest side */
+  double *space; /* of each thread, 3 x (length + 1) */
+} sweep;
+
+static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
+  const sweep *s = context;
+  const size_t size = s->mask->size[0];
+  const float step = (float)s->mask->spacing[0];
+  (void)thread;
+  for (size_t row = begin; row < end; ++row) {
+    const uint8_t *at = s->mask->at + row * size;
+    float *out = s->squares + row * size;
+    float last = INFINITY;
+    for (size_t i = 0; i < size; ++i) {
+      last = (at[i] == 0) == s->zero ? 0.0F : last + step;
+      out[i] = last;
+    }
+    last = INFINITY;
+    for (size_t i = size; i-- > 0;) {
+      last = (at[i] == 0) == s->zero ? 0.0F : last + step;
+      const float nearest = last < out[i] ? last : out[i];
+      out[i] = isinf(nearest) ? far_away : nearest * nearest;
+    }
+  }
+}
+
+/* One line of n values, `stride` apart; v: where parabolas stand, z: where each begins to be the
+ * lowest, f: the values. */
+static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
+                     double *f) {
+  size_t last = 0;
+  v[0] = 0.0;
+  z[0] = -INFINITY;
+  z[1] = INFINITY;
+  for (size_t q = 0; q < n; ++q) {
+    f[q] = (double)line[q * stride];
+  }
+  for (size_t q = 1; q < n; ++q) {
+    const double x = (double)q * step;
+    double meet = 0.0;
+    for (;; --last) {
+      const double other = v[last] * step;
+      meet = (f[q] + x * x - f[(size_t)v[last]] - other * other) / (2.0 * (x - other));
+      if (meet > z[last]) {
+        break;
+      }
+    }
+    ++last;
+    v[last] = (double)q;
+    z[last] = meet;
+    z[last + 1] = INFINITY;
+  }
+  last = 0;
+  for (size_t q = 0; q < n; ++q) {
+    const double x = (double)q * step;
+    while (z[last + 1] < x) {
+      ++last;
+    }
+    const double apart = x - v[last] * step;
+    line[q * stride] = (float)(apart * apart + f[(size_t)v[last]]);
+  }
+}
+
+static void along_lines(void *context, size_t begin, size_t end, size_t thread) {
+  const sweep *s = context;
+  const size_t *size = s->mask->size;
+  double *space = s->space + thread * 3 * (s->length + 2);
+  const size_t stride = s->axis == 1 ? size[0] : size[0] * size[1];
+  for (size_t line = begin; line < end; ++line) {
+    const size_t first = s->axis == 1 ? line / size[0] * size[0] * size[1] + line % size[0] : line;
+    envelope(s->squares + first, size[s->axis], stride, s->mask->spacing[s->axis], space,
+             space + s->length + 2, space + 2 * (s->length + 2));
+  }
+}
+
+supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares) {
+  enum { GRAIN = 256 };
+  const size_t *size = mask->size;
+  const size_t threads = supine_thread_count();
+  sweep s = {.mask = mask, .zero = zero, .squares = squares};
+  s.length = size[1] > size[2] ? size[1] : size[2];
+  s.space = malloc(threads * 3 * (s.length + 2) * sizeof *s.space);
+  if (s.space == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_parallel_for(size[1] * size[2], GRAIN, threads, along_rows, &s);
+  s.axis = 1;
+  supine_parallel_for(size[0] * size[2], GRAIN, threads, along_lines, &s);
+  s.axis = 2;
+  supine_parallel_for(size[0] * size[1], GRAIN, threads, along_lines, &s);
+  free(s.space);
+  return SUPINE_OK;
+}
+
+supine_status supine_labels_close(labels_mask *mask, double radius, size_t *added) {
+  const size_t count = supine_labels_mask_count(mask);
+  const float reach = (float)(radius * radius);
+  float *squares = malloc(count * sizeof *squares);
+  *added = 0;
+  if (squares == NULL || supine_labels_distance(mask, false, squares) != SUPINE_OK) {
+    free(squares);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < count; ++i) { /* 2: what is new */
+    mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
+  }
+  const supine_status status = supine_labels_distance(mask, true, squares);
+  for (size_t i = 0; i < count; ++i) {
+    const bool stays = mask->at[i] == 1 || (mask->at[i] == 2 && squares[i] > reach);
+    *added += stays && mask->at[i] == 2;
+    mask->at[i] = stays;
+  }
+  free(squares);
+  return status;
+}

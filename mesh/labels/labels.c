@@ -1,0 +1,352 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The whole way from a label map to surfaces. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/labels/mask.h"
+
+static const double least_edge = 0.2; /* mm: a hundredth of it would be a billion vertices */
+static const double most_edge = 20.0; /* of what is larger no lung is left */
+static const double most_closing = 20.0;
+static const double least_lung = 1.0; /* mL: anything less is no lung */
+
+enum { MARGIN = 2 };
+
+typedef struct work {
+  const char *path; /* the first, for messages */
+  const supine_labels_options *options;
+  supine_labels_report *report;
+  double edge;
+  supine_image image; /* until the mask is made of it */
+  labels_mask both;
+  size_t from[3]; /* voxel of the image that the mask's first is */
+  size_t cut[2];  /* voxels of either side at the image's border */
+} work;
+
+static supine_status advance(work *w, double fraction, supine_error *error) {
+  const supine_labels_options *options = w->options;
+  return options->progress == NULL || options->progress(options->progress_context, fraction)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
+                                "interrupted: nothing was written");
+}
+
+/* Do two images have the same voxels, to a hundredth of one over the whole image? */
+static bool same_frame(const supine_image *a, const supine_image *b) {
+  if (memcmp(a->size, b->size, sizeof a->size) != 0) {
+    return false;
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    double place[3];
+    double voxel[3];
+    for (int k = 0; k < 3; ++k) {
+      place[k] = b->origin[k];
+      for (int x = 0; x < 3; ++x) {
+        place[k] += (corner >> x & 1) * (double)(b->size[x] - 1) * b->step[x][k];
+      }
+    }
+    supine_image_locate(a, place, voxel);
+    for (int x = 0; x < 3; ++x) {
+      if (fabs(voxel[x] - (corner >> x & 1) * (double)(a->size[x] - 1)) > 0.01) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+/* Several masks as one map, whose labels are their numbers from 1; earlier ones go first. */
+static supine_status join_images(work *w, const char *const *paths, size_t count,
+                                 supine_error *error) {
+  const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
+  uint8_t *joined = calloc(voxels, 1);
+  if (joined == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", paths[0]);
+  }
+  supine_status status = SUPINE_OK;
+  for (size_t f = 0; f < count && status == SUPINE_OK; ++f) {
+    supine_image next = {0};
+    const supine_image *image = f == 0 ? &w->image : &next;
+    status = f == 0 ? SUPINE_OK : supine_image_read(paths[f], &next, error);
+    if (status == SUPINE_OK && !same_frame(&w->image, image)) {
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: its voxels are not those of %s: masks of one scan are wanted",
+                                paths[f], paths[0]);
+    }
+    for (size_t i = 0; i < voxels && status == SUPINE_OK; ++i) {
+      joined[i] =
+          joined[i] == 0 && supine_image_get(image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
+    }
+    supine_image_free(&next);
+  }
+  free(w->image.values);
+  w->image.values = joined;
+  w->image.voxel = SUPINE_VOXEL_U8;
+  return status;
+}
+
+/* The voxels of lungs, with a margin, as LABELS_LEFT, _RIGHT or _EITHER. */
+static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
+                               supine_error *error) {
+  labels_mask *both = &w->both;
+  const supine_image *image = &w->image;
+  size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
+  size_t high[3] = {0, 0, 0};
+  for (size_t label = 1; label < LABELS_MAX; ++label) {
+    for (int a = 0; side[label] != 0 && tally[label].count > 0 && a < 3; ++a) {
+      low[a] = tally[label].low[a] < low[a] ? tally[label].low[a] : low[a];
+      high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
+    }
+  }
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    both->size[a] = high[a] - low[a] + 1 + (size_t)2 * MARGIN;
+    both->spacing[a] = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    memcpy(both->step[a], s, sizeof both->step[a]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    both->origin[k] = image->origin[k];
+    for (int a = 0; a < 3; ++a) {
+      both->origin[k] += ((double)low[a] - MARGIN) * image->step[a][k];
+    }
+  }
+  both->at = calloc(supine_labels_mask_count(both), 1);
+  uint16_t *row = malloc(image->size[0] * sizeof *row);
+  if (both->at == NULL || row == NULL) {
+    free(row);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
+  }
+  for (size_t k = low[2]; k <= high[2]; ++k) {
+    for (size_t j = low[1]; j <= high[1]; ++j) {
+      double bad;
+      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* it went well before */
+      uint8_t *out = both->at + MARGIN +
+                     both->size[0] * (j - low[1] + MARGIN + both->size[1] * (k - low[2] + MARGIN));
+      for (size_t i = low[0]; i <= high[0]; ++i) {
+        out[i - low[0]] = side[row[i]];
+      }
+    }
+  }
+  free(row);
+  memcpy(w->from, low, sizeof low);
+  return SUPINE_OK;
+}
+
+/* Voxels of each side in the image's first and last layers: there the lung goes on. */
+static void count_cut(work *w, const size_t image_size[3]) {
+  const labels_mask *both = &w->both;
+  for (size_t k = MARGIN; k < both->size[2] - MARGIN; ++k) {
+    for (size_t j = MARGIN; j < both->size[1] - MARGIN; ++j) {
+      for (size_t i = MARGIN; i < both->size[0] - MARGIN; ++i) {
+        const size_t at[3] = {i - MARGIN + w->from[0], j - MARGIN + w->from[1],
+                              k - MARGIN + w->from[2]};
+        bool border = false;
+        for (int a = 0; a < 3; ++a) {
+          border = border || (image_size[a] > 1 && (at[a] == 0 || at[a] + 1 == image_size[a]));
+        }
+        const uint8_t value = both->at[i + both->size[0] * (j + both->size[1] * k)];
+        if (border && value != 0) {
+          ++w->cut[value - 1];
+        }
+      }
+    }
+  }
+}
+
+static supine_status read_map(work *w, const char *const *paths, size_t count,
+                              supine_error *error) {
+  supine_labels_report *report = w->report;
+  supine_status status = supine_image_read(paths[0], &w->image, error);
+  if (status == SUPINE_OK && count > 1) {
+    status = join_images(w, paths, count, error);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  memcpy(report->size, w->image.size, sizeof report->size);
+  for (int a = 0; a < 3; ++a) {
+    const double *s = w->image.step[a];
+    report->spacing[a] = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+  }
+  supine_labels_axes((const double(*)[3])w->image.step, report->axes, sizeof report->axes);
+  report->source = w->image.frame_source;
+  report->frames_differ = w->image.frames_differ;
+  labels_tally *tally = malloc(LABELS_MAX * sizeof *tally);
+  uint8_t *side = malloc(LABELS_MAX);
+  if (tally == NULL || side == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
+  }
+  status = status == SUPINE_OK ? advance(w, 0.2, error) : status;
+  status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
+  if (status == SUPINE_OK) {
+    status = supine_labels_choose(w->path, &w->image, tally, w->options->labels, side,
+                                  report->taken, error);
+  }
+  status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
+  status = status == SUPINE_OK ? make_mask(w, tally, side, error) : status;
+  supine_image_free(&w->image);
+  free(tally);
+  free(side);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
+    status = supine_labels_part(w->path, &w->both, &report->parted, error);
+  }
+  if (status == SUPINE_OK) {
+    count_cut(w, report->size);
+  }
+  return status;
+}
+
+/* Closing takes nothing of the other lung. */
+static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
+  long offset[3];
+  supine_labels_mask_offset(mask, both, offset);
+  for (long k = 0; k < (long)mask->size[2]; ++k) {
+    for (long j = 0; j < (long)mask->size[1]; ++j) {
+      for (long i = 0; i < (long)mask->size[0]; ++i) {
+        const long at[3] = {i + offset[0], j + offset[1], k + offset[2]};
+        if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= (long)both->size[0] ||
+            at[1] >= (long)both->size[1] || at[2] >= (long)both->size[2]) {
+          continue;
+        }
+        const uint8_t there =
+            both->at[(size_t)at[0] +
+                     both->size[0] * ((size_t)at[1] + both->size[1] * (size_t)at[2])];
+        if (there != 0 && there != value) {
+          mask->at[(size_t)i + mask->size[0] * ((size_t)j + mask->size[1] * (size_t)k)] = 0;
+        }
+      }
+    }
+  }
+}
+
+/* One piece, without cavities. */
+static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
+                           supine_labels_lung *lung) {
+  const double ml = supine_labels_voxel_ml(mask);
+  size_t voxels = 0;
+  supine_status status = SUPINE_OK;
+  if (w->options->close > 0.0) {
+    status = supine_labels_close(mask, w->options->close, &voxels);
+    leave_other(&w->both, value, mask);
+    lung->closed = ml * (double)voxels;
+  }
+  if (status == SUPINE_OK) {
+    status = supine_labels_keep_largest(mask, &lung->islands, &voxels);
+    lung->dropped = ml * (double)voxels;
+  }
+  if (status == SUPINE_OK) {
+    status = supine_labels_fill_cavities(mask, &lung->cavities, &voxels);
+    lung->filled = ml * (double)voxels;
+  }
+  voxels = 0;
+  for (size_t i = 0; i < supine_labels_mask_count(mask); ++i) {
+    voxels += mask->at[i];
+  }
+  lung->mask = ml * (double)voxels;
+  return status;
+}
+
+/* The net of one lung's cubes, smoothed and held to the mask, as a mesh. */
+static supine_status extract_surface(const work *w, const labels_mask *mask,
+                                     supine_labels_lung *lung, supine_mesh *mesh) {
+  labels_cubes cubes = {.share = NULL};
+  labels_net net = {0};
+  double(*before)[3] = NULL;
+  supine_status status = supine_labels_cubes_create(mask, w->edge, &cubes);
+  status = status == SUPINE_OK ? supine_labels_net_create(&cubes, &net) : status;
+  if (status == SUPINE_OK) {
+    before = malloc((net.count + 1) * sizeof *before);
+    status = before == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  }
+  if (status == SUPINE_OK && net.count > 0) {
+    memcpy(before, net.at, net.count * sizeof *before);
+    status = supine_labels_net_relax(&net);
+  }
+  if (status == SUPINE_OK) {
+    lung->held =
+        0.5 * fmax(w->edge, fmax(mask->spacing[0], fmax(mask->spacing[1], mask->spacing[2])));
+    lung->farthest =
+        supine_labels_net_hold(&net, (const double(*)[3])before, &cubes, mask, lung->held);
+    status = supine_labels_net_mesh(&net, &cubes, mask, mesh);
+  }
+  free(before);
+  supine_labels_net_free(&net);
+  supine_labels_cubes_free(&cubes);
+  return status;
+}
+
+static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
+                               supine_error *error) {
+  labels_mask mask;
+  const double least = fmin(w->both.spacing[0], fmin(w->both.spacing[1], w->both.spacing[2]));
+  const size_t margin = MARGIN + (size_t)ceil(w->options->close / least);
+  supine_status status = supine_labels_mask_extract(&w->both, value, margin, &mask);
+  if (status == SUPINE_OK && mask.at == NULL) {
+    return SUPINE_OK;
+  }
+  lung->side = value == LABELS_LEFT ? 1 : -1;
+  lung->cut = w->cut[value - 1];
+  status = status == SUPINE_OK ? clean(w, value, &mask, lung) : status;
+  if (status == SUPINE_OK && lung->mask < least_lung) {
+    status = supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: the largest piece of the %s lung holds %.2g mL: that is no lung",
+                              w->path, value == LABELS_LEFT ? "left" : "right", lung->mask);
+    supine_labels_mask_free(&mask);
+    return status;
+  }
+  status = status == SUPINE_OK ? extract_surface(w, &mask, lung, mesh) : status;
+  supine_labels_mask_free(&mask);
+  supine_topology topology = {0};
+  status = status == SUPINE_OK && mesh->triangle_count > 0
+               ? supine_mesh_topology_create(mesh, &topology)
+               : status;
+  lung->tunnels = topology.genus;
+  lung->surface = 1e-3 * supine_mesh_volume(mesh);
+  supine_mesh_topology_free(&topology);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "%s: no memory for the surface", w->path);
+  }
+  return mesh->triangle_count > 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: the %s lung is thinner than half of --edge %g everywhere: "
+                                "give a smaller edge",
+                                w->path, value == LABELS_LEFT ? "left" : "right", w->edge);
+}
+
+supine_status supine_labels_surfaces(const char *const *paths, size_t count,
+                                     const supine_labels_options *options, supine_mesh *surfaces,
+                                     supine_labels_report *report, supine_error *error) {
+  enum { FILES_MAX = 255 };
+  work w = {.path = paths[0], .options = options, .report = report};
+  w.edge = options->edge != 0.0 ? options->edge : SUPINE_LABELS_EDGE;
+  *report = (supine_labels_report){.lung_count = 0};
+  if (!(w.edge >= least_edge && w.edge <= most_edge) ||
+      !(options->close >= 0.0 && options->close <= most_closing) || count > FILES_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "an edge is %g to %g mm, a closing distance 0 to %g, and images at "
+                            "most %d",
+                            least_edge, most_edge, most_closing, FILES_MAX);
+  }
+  supine_status status = read_map(&w, paths, count, error);
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {
+    status = advance(&w, value == LABELS_LEFT ? 0.5 : 0.75, error);
+    supine_labels_lung *lung = &report->lung[report->lung_count];
+    supine_mesh *mesh = &surfaces[report->lung_count];
+    status = status == SUPINE_OK ? make_lung(&w, value, lung, mesh, error) : status;
+    report->lung_count += status == SUPINE_OK && lung->side != 0;
+  }
+  supine_image_free(&w.image);
+  supine_labels_mask_free(&w.both);
+  if (status == SUPINE_OK) {
+    supine_labels_anatomy(surfaces, report);
+    return advance(&w, 1.0, error);
+  }
+  supine_mesh_free(&surfaces[0]);
+  supine_mesh_free(&surfaces[1]);
+  return status;
+}

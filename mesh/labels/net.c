@@ -1,0 +1,266 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Surface nets: a vertex in each cell that the surface runs through, a quadrilateral across each
+ * edge between an inner and an outer cube [Gibson1998]. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/labels/mask.h"
+
+static const float half = 0.5F;
+
+typedef struct build {
+  const labels_cubes *cubes;
+  size_t stride[3];
+  uint32_t *vertex; /* [cubes] of the cell that begins at each, or LABELS_NONE */
+  labels_net *net;
+} build;
+
+/* Mean of where the surface crosses the cell's edges, 0 to 1; false where it does not. */
+static bool crossing(const build *b, size_t cell, double mean[3]) {
+  const float *share = b->cubes->share;
+  double sum[3] = {0.0, 0.0, 0.0};
+  size_t count = 0;
+  size_t inside = 0;
+  for (size_t c = 0; c < 8; ++c) {
+    inside += share[cell + (c & 1U) * b->stride[0] + (c >> 1U & 1U) * b->stride[1] +
+                    (c >> 2U) * b->stride[2]] >= half;
+  }
+  if (inside == 0 || inside == 8) { /* most cells */
+    return false;
+  }
+  for (size_t c = 0; c < 8; ++c) {
+    const size_t bit[3] = {c & 1U, c >> 1U & 1U, c >> 2U};
+    const size_t from =
+        cell + bit[0] * b->stride[0] + bit[1] * b->stride[1] + bit[2] * b->stride[2];
+    for (size_t a = 0; a < 3; ++a) {
+      if (bit[a] != 0) {
+        continue;
+      }
+      const float u = share[from];
+      const float v = share[from + b->stride[a]];
+      if ((u >= half) != (v >= half)) {
+        for (size_t k = 0; k < 3; ++k) {
+          sum[k] += k == a ? (double)((half - u) / (v - u)) : (double)bit[k];
+        }
+        ++count;
+      }
+    }
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    mean[k] = sum[k] / (double)count;
+  }
+  return true;
+}
+
+/* Numbers the cells; with `write`, fills the net's vertices. */
+static void find_vertices(build *b, bool write) {
+  const size_t *size = b->cubes->size;
+  labels_net *net = b->net;
+  net->count = 0;
+  for (size_t k = 0; k + 1 < size[2]; ++k) {
+    for (size_t j = 0; j + 1 < size[1]; ++j) {
+      for (size_t i = 0; i + 1 < size[0]; ++i) {
+        const size_t cell = i + b->stride[1] * j + b->stride[2] * k;
+        double mean[3];
+        if (!crossing(b, cell, mean)) {
+          continue;
+        }
+        if (write) {
+          b->vertex[cell] = (uint32_t)net->count;
+          memcpy(net->at[net->count], mean, sizeof mean);
+          net->cell[net->count][0] = (uint32_t)i;
+          net->cell[net->count][1] = (uint32_t)j;
+          net->cell[net->count][2] = (uint32_t)k;
+        }
+        ++net->count;
+      }
+    }
+  }
+}
+
+/* A quadrilateral around the edge from a cube along an axis, and neighbours along its sides. */
+static void add_quad(build *b, size_t cube, size_t a, bool write) {
+  labels_net *net = b->net;
+  const size_t u = (a + 1) % 3;
+  const size_t v = (a + 2) % 3;
+  const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
+                           cube - b->stride[u]};
+  /* From one cell to the next: along +u, +v, -u, -v. */
+  const size_t way[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
+  if (write) {
+    const bool outwards = b->cubes->share[cube] >= half;
+    for (size_t c = 0; c < 4; ++c) {
+      const uint32_t from = b->vertex[cells[c]];
+      const uint32_t to = b->vertex[cells[(c + 1) % 4]];
+      net->quad[net->quad_count][outwards ? c : 3 - c] = from;
+      net->neighbour[from][way[c]] = to;
+      net->neighbour[to][way[c] ^ 1U] = from;
+    }
+  }
+  ++net->quad_count;
+}
+
+static void find_quads(build *b, bool write) {
+  const size_t *size = b->cubes->size;
+  const float *share = b->cubes->share;
+  b->net->quad_count = 0;
+  for (size_t k = 1; k + 1 < size[2]; ++k) {
+    for (size_t j = 1; j + 1 < size[1]; ++j) {
+      for (size_t i = 1; i + 1 < size[0]; ++i) {
+        const size_t cube = i + b->stride[1] * j + b->stride[2] * k;
+        for (size_t a = 0; a < 3; ++a) {
+          if ((share[cube] >= half) != (share[cube + b->stride[a]] >= half)) {
+            add_quad(b, cube, a, write);
+          }
+        }
+      }
+    }
+  }
+}
+
+supine_status supine_labels_net_create(const labels_cubes *cubes, labels_net *net) {
+  labels_net made = {0};
+  const size_t count = cubes->size[0] * cubes->size[1] * cubes->size[2];
+  build b = {
+      .cubes = cubes, .stride = {1, cubes->size[0], cubes->size[0] * cubes->size[1]}, .net = &made};
+  find_vertices(&b, false);
+  find_quads(&b, false);
+  b.vertex = malloc(count * sizeof *b.vertex);
+  made.cell = malloc((made.count + 1) * sizeof *made.cell);
+  made.at = malloc((made.count + 1) * sizeof *made.at);
+  made.neighbour = malloc((made.count + 1) * sizeof *made.neighbour);
+  made.quad = malloc((made.quad_count + 1) * sizeof *made.quad);
+  if (b.vertex == NULL || made.cell == NULL || made.at == NULL || made.neighbour == NULL ||
+      made.quad == NULL || made.count >= INT32_MAX) {
+    free(b.vertex);
+    supine_labels_net_free(&made);
+    return SUPINE_ERROR_MEMORY;
+  }
+  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* LABELS_NONE */
+  find_vertices(&b, true);
+  find_quads(&b, true);
+  free(b.vertex);
+  *net = made;
+  return SUPINE_OK;
+}
+
+void supine_labels_net_free(labels_net *net) {
+  free(net->cell);
+  free(net->at);
+  free(net->neighbour);
+  free(net->quad);
+  *net = (labels_net){0};
+}
+
+/* A vertex in voxels of the mask. */
+static void in_voxels(const labels_net *net, const labels_cubes *cubes, size_t vertex,
+                      double voxel[3]) {
+  for (size_t a = 0; a < 3; ++a) {
+    voxel[a] =
+        cubes->origin[a] + cubes->ratio[a] * ((double)net->cell[vertex][a] + net->at[vertex][a]);
+  }
+}
+
+/* From a point in voxels to the nearest face between the mask and what is around it, mm: the
+ * nearest voxel of the other kind, looked for in boxes that grow. */
+static double distance_to_mask(const labels_mask *mask, const double voxel[3]) {
+  long middle[3];
+  double nearest = INFINITY;
+  const double least = fmin(mask->spacing[0], fmin(mask->spacing[1], mask->spacing[2]));
+  for (int a = 0; a < 3; ++a) {
+    const long last = (long)mask->size[a] - 1;
+    const long here = lround(voxel[a]);
+    middle[a] = here < 0 ? 0 : here > last ? last : here;
+  }
+  const size_t n0 = mask->size[0];
+  const size_t n1 = mask->size[1];
+  const bool kind =
+      mask->at[(size_t)middle[0] + n0 * ((size_t)middle[1] + n1 * (size_t)middle[2])] != 0;
+  for (long reach = 1; ((double)reach - 1.0) * least < nearest; ++reach) {
+    bool inside = false; /* is any of the box? */
+    for (long k = middle[2] - reach; k <= middle[2] + reach; ++k) {
+      for (long j = middle[1] - reach; j <= middle[1] + reach; ++j) {
+        const bool shell = labs(k - middle[2]) == reach || labs(j - middle[1]) == reach;
+        for (long i = middle[0] - reach; i <= middle[0] + reach; i += shell ? 1 : 2 * reach) {
+          if (i < 0 || j < 0 || k < 0 || i >= (long)n0 || j >= (long)n1 ||
+              k >= (long)mask->size[2]) {
+            continue;
+          }
+          inside = true;
+          if ((mask->at[(size_t)i + n0 * ((size_t)j + n1 * (size_t)k)] != 0) == kind) {
+            continue;
+          }
+          const double apart[3] = {fmax(0.0, fabs(voxel[0] - (double)i) - 0.5) * mask->spacing[0],
+                                   fmax(0.0, fabs(voxel[1] - (double)j) - 0.5) * mask->spacing[1],
+                                   fmax(0.0, fabs(voxel[2] - (double)k) - 0.5) * mask->spacing[2]};
+          nearest =
+              fmin(nearest, sqrt(apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]));
+        }
+      }
+    }
+    if (!inside) {
+      break;
+    }
+  }
+  return nearest;
+}
+
+double supine_labels_net_hold(labels_net *net, const double (*before)[3], const labels_cubes *cubes,
+                              const labels_mask *mask, double limit) {
+  enum { HALVINGS = 5 };
+  double farthest = 0.0;
+  for (size_t v = 0; v < net->count; ++v) {
+    double voxel[3];
+    in_voxels(net, cubes, v, voxel);
+    double distance = distance_to_mask(mask, voxel);
+    for (int step = 0; distance > limit && step <= HALVINGS; ++step) {
+      for (int a = 0; a < 3; ++a) {
+        net->at[v][a] = step == HALVINGS ? before[v][a] : 0.5 * (net->at[v][a] + before[v][a]);
+      }
+      in_voxels(net, cubes, v, voxel);
+      distance = distance_to_mask(mask, voxel);
+    }
+    farthest = fmax(farthest, distance);
+  }
+  return farthest;
+}
+
+static double square_between(const double *a, const double *b) {
+  return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+         (a[2] - b[2]) * (a[2] - b[2]);
+}
+
+supine_status supine_labels_net_mesh(const labels_net *net, const labels_cubes *cubes,
+                                     const labels_mask *mask, supine_mesh *mesh) {
+  const double *u = mask->step[0];
+  const double *v = mask->step[1];
+  const double *w = mask->step[2];
+  const bool turned = u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+                          u[2] * (v[0] * w[1] - v[1] * w[0]) <
+                      0.0;
+  supine_mesh made = {.vertex_count = net->count, .triangle_count = 2 * net->quad_count};
+  made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
+  made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);
+  if (made.vertices == NULL || made.triangles == NULL) {
+    supine_mesh_free(&made);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < net->count; ++i) {
+    double voxel[3];
+    in_voxels(net, cubes, i, voxel);
+    supine_labels_mask_place(mask, voxel, made.vertices + 3 * i);
+  }
+  for (size_t q = 0; q < net->quad_count; ++q) { /* cut along the shorter diagonal */
+    uint32_t c[4];
+    for (size_t k = 0; k < 4; ++k) {
+      c[k] = net->quad[q][turned ? 3 - k : k];
+    }
+    const bool first = square_between(made.vertices + 3 * c[0], made.vertices + 3 * c[2]) <=
+                       square_between(made.vertices + 3 * c[1], made.vertices + 3 * c[3]);
+    const uint32_t corners[6] = {c[0], c[1], first ? c[2] : c[3], first ? c[0] : c[1], c[2], c[3]};
+    memcpy(made.triangles + 6 * q, corners, sizeof corners);
+  }
+  *mesh = made;
+  return SUPINE_OK;
+}

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Two lungs in one mask. Where they touch, the mask is worn down until it falls into two pieces
+ * beside each other; each voxel then belongs to the nearer piece. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/labels/mask.h"
+
+/* Lungs of one chest are of one order of size. */
+static const double least_share = 0.1;
+/* Necks between lungs are no wider; what is left of a lung by then is its core. */
+static const double widest_neck = 40.0; /* mm */
+
+typedef struct pair {
+  uint32_t piece[2];
+  double centre[2][3]; /* mm, in the order of size */
+} pair;
+
+/* The two largest pieces, if they lie beside each other; the left one first. */
+static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
+  uint32_t top[2] = {0, 0};
+  for (uint32_t r = 0; r < pieces->run_count; ++r) {
+    if (pieces->piece[r].count > pieces->piece[top[0]].count) {
+      top[1] = top[0];
+      top[0] = r;
+    } else if (r != top[0] &&
+               (top[1] == top[0] || pieces->piece[r].count > pieces->piece[top[1]].count)) {
+      top[1] = r;
+    }
+  }
+  const double counts[2] = {(double)pieces->piece[top[0]].count,
+                            (double)pieces->piece[top[1]].count};
+  if (top[0] == top[1] || counts[1] < least_share * counts[0]) {
+    return false;
+  }
+  for (int p = 0; p < 2; ++p) {
+    const labels_piece *piece = &pieces->piece[top[p]];
+    const double voxel[3] = {piece->sum[0] / counts[p], piece->sum[1] / counts[p],
+                             piece->sum[2] / counts[p]};
+    found->piece[p] = top[p];
+    supine_labels_mask_place(mask, voxel, found->centre[p]);
+  }
+  const double apart = found->centre[0][0] - found->centre[1][0];
+  if (apart < 0.0) {
+    found->piece[0] = top[1];
+    found->piece[1] = top[0];
+  }
+  return fabs(apart) > fabs(found->centre[0][1] - found->centre[1][1]) &&
+         fabs(apart) > fabs(found->centre[0][2] - found->centre[1][2]);
+}
+
+/* Only what is deeper than this; mm. */
+static void wear(const labels_mask *both, const float *squares, double depth, uint8_t *worn) {
+  const size_t count = supine_labels_mask_count(both);
+  for (size_t i = 0; i < count; ++i) {
+    worn[i] = both->at[i] != 0 && (depth == 0.0 || sqrt((double)squares[i]) > depth);
+  }
+}
+
+/* The voxels of the pair, 1 and 2; all others 0. */
+static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
+                      uint8_t *marks) {
+  memset(marks, 0, supine_labels_mask_count(mask));
+  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
+    for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
+      const labels_run *run = &pieces->run[r];
+      const uint8_t mark = run->parent == found->piece[0]   ? LABELS_LEFT
+                           : run->parent == found->piece[1] ? LABELS_RIGHT
+                                                            : 0;
+      memset(marks + row * mask->size[0] + run->begin, mark, run->end - run->begin);
+    }
+  }
+}
+
+/* Every voxel goes to the nearer of the marked pieces. `squares` is space for distances. */
+static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
+  const size_t count = supine_labels_mask_count(both);
+  labels_mask one = *both;
+  float *other = malloc(count * sizeof *other);
+  one.at = malloc(count);
+  supine_status status = other == NULL || one.at == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {
+    for (size_t i = 0; i < count; ++i) {
+      one.at[i] = marks[i] == value;
+    }
+    status = supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other);
+  }
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    both->at[i] = both->at[i] == 0 ? 0 : squares[i] <= other[i] ? LABELS_LEFT : LABELS_RIGHT;
+  }
+  free(one.at);
+  free(other);
+  return status;
+}
+
+supine_status supine_labels_part(const char *path, labels_mask *both, double *neck,
+                                 supine_error *error) {
+  const size_t count = supine_labels_mask_count(both);
+  const double step = fmax(both->spacing[0], fmax(both->spacing[1], both->spacing[2]));
+  labels_mask worn = *both;
+  float *squares = malloc(count * sizeof *squares);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  bool parted = false;
+  worn.at = malloc(count);
+  *neck = 0.0;
+  if (squares == NULL || worn.at == NULL) {
+    goto cleanup;
+  }
+  status = SUPINE_OK;
+  bool all = false; /* in the two pieces */
+  for (double depth = 0.0; status == SUPINE_OK && !parted && 2.0 * depth <= widest_neck;
+       depth += step) {
+    labels_pieces pieces = {0};
+    pair found;
+    if (depth == step) { /* most lungs have fallen apart before */
+      status = supine_labels_distance(both, true, squares);
+    }
+    wear(both, squares, depth, worn.at);
+    status = status == SUPINE_OK ? supine_labels_pieces_find(&worn, false, &pieces) : status;
+    parted = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
+    if (parted) {
+      *neck = 2.0 * depth;
+      all = depth == 0.0 && pieces.piece_count == 2;
+      mark_pair(both, &pieces, &found, worn.at);
+    }
+    supine_labels_pieces_free(&pieces);
+  }
+  if (parted && all) {
+    memcpy(both->at, worn.at, count);
+  } else if (parted) {
+    status = share_out(both, worn.at, squares);
+  }
+cleanup:
+  free(squares);
+  free(worn.at);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "%s: no memory to part %zu voxels", path, count);
+  }
+  return parted ? SUPINE_OK
+                : supine_error_set(error, SUPINE_ERROR_MESH,
+                                   "%s: one lung, or two that cannot be parted: nothing falls into "
+                                   "two pieces beside each other, however much is worn off. Of one "
+                                   "lung, name the side: --labels left=LABEL or right=LABEL",
+                                   path);
+}

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Pieces of voxels that share faces, by runs along the rows: islands and cavities. */
+#include <stdlib.h>
+
+#include "mesh/labels/mask.h"
+
+static uint32_t root(labels_run *run, uint32_t i) {
+  while (run[i].parent != i) {
+    run[i].parent = run[run[i].parent].parent;
+    i = run[i].parent;
+  }
+  return i;
+}
+
+/* The earlier of the two is the piece's. */
+static void unite(labels_run *run, uint32_t a, uint32_t b) {
+  a = root(run, a);
+  b = root(run, b);
+  run[a > b ? a : b].parent = a > b ? b : a;
+}
+
+/* Unites the runs of two rows that overlap. */
+static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t b_end) {
+  while (a < a_end && b < b_end) {
+    if (run[a].begin < run[b].end && run[b].begin < run[a].end) {
+      unite(run, (uint32_t)a, (uint32_t)b);
+    }
+    if (run[a].end < run[b].end) {
+      ++a;
+    } else {
+      ++b;
+    }
+  }
+}
+
+/* Runs of one row into `run`, or their number alone where that is NULL. */
+static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
+  size_t count = 0;
+  for (size_t i = 0; i < size;) {
+    const size_t begin = i;
+    const bool wanted = (at[i] == 0) == zero;
+    while (i < size && ((at[i] == 0) == zero) == wanted) {
+      ++i;
+    }
+    if (wanted) {
+      if (run != NULL) {
+        run[count] = (labels_run){(uint32_t)begin, (uint32_t)i, 0};
+      }
+      ++count;
+    }
+  }
+  return count;
+}
+
+/* Every run knows its piece, and each piece its size. */
+static void measure(const labels_mask *mask, labels_pieces *pieces) {
+  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
+    for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
+      labels_run *run = &pieces->run[r];
+      run->parent = root(pieces->run, (uint32_t)r);
+      labels_piece *piece = &pieces->piece[run->parent];
+      const double length = run->end - run->begin;
+      pieces->piece_count += piece->count == 0;
+      piece->count += run->end - run->begin;
+      piece->sum[0] += length * 0.5 * (run->begin + run->end - 1.0);
+      piece->sum[1] += length * (double)(row % mask->size[1]);
+      piece->sum[2] += length * (double)(row / mask->size[1]);
+    }
+  }
+}
+
+supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces) {
+  const size_t rows = mask->size[1] * mask->size[2];
+  labels_pieces found = {.row = malloc((rows + 1) * sizeof(size_t))};
+  if (found.row == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  found.row[0] = 0;
+  for (size_t row = 0; row < rows; ++row) {
+    found.row[row + 1] =
+        found.row[row] + runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero, NULL);
+  }
+  found.run_count = found.row[rows];
+  found.run = malloc((found.run_count + 1) * sizeof *found.run);
+  found.piece = calloc(found.run_count + 1, sizeof *found.piece);
+  if (found.run == NULL || found.piece == NULL || found.run_count >= UINT32_MAX) {
+    supine_labels_pieces_free(&found);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t row = 0; row < rows; ++row) {
+    (void)runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero,
+                      found.run + found.row[row]);
+    for (size_t r = found.row[row]; r < found.row[row + 1]; ++r) {
+      found.run[r].parent = (uint32_t)r;
+    }
+    if (row % mask->size[1] > 0) {
+      unite_rows(found.run, found.row[row - 1], found.row[row], found.row[row], found.row[row + 1]);
+    }
+    if (row >= mask->size[1]) {
+      const size_t below = row - mask->size[1];
+      unite_rows(found.run, found.row[below], found.row[below + 1], found.row[row],
+                 found.row[row + 1]);
+    }
+  }
+  measure(mask, &found);
+  *pieces = found;
+  return SUPINE_OK;
+}
+
+void supine_labels_pieces_free(labels_pieces *pieces) {
+  free(pieces->row);
+  free(pieces->run);
+  free(pieces->piece);
+  *pieces = (labels_pieces){0};
+}
+
+/* Sets the voxels of all pieces but one. */
+static size_t change_others(labels_mask *mask, const labels_pieces *pieces, uint32_t kept,
+                            uint8_t value) {
+  size_t changed = 0;
+  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
+    for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
+      const labels_run *run = &pieces->run[r];
+      for (uint32_t i = run->begin; run->parent != kept && i < run->end; ++i) {
+        mask->at[row * mask->size[0] + i] = value;
+        ++changed;
+      }
+    }
+  }
+  return changed;
+}
+
+supine_status supine_labels_keep_largest(labels_mask *mask, size_t *islands, size_t *dropped) {
+  labels_pieces pieces = {0};
+  const supine_status status = supine_labels_pieces_find(mask, false, &pieces);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  uint32_t largest = 0;
+  for (size_t r = 1; r < pieces.run_count; ++r) {
+    largest = pieces.piece[r].count > pieces.piece[largest].count ? (uint32_t)r : largest;
+  }
+  *islands = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
+  *dropped = change_others(mask, &pieces, largest, 0);
+  supine_labels_pieces_free(&pieces);
+  return SUPINE_OK;
+}
+
+supine_status supine_labels_fill_cavities(labels_mask *mask, size_t *cavities, size_t *filled) {
+  labels_pieces pieces = {0};
+  const supine_status status = supine_labels_pieces_find(mask, true, &pieces);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  *cavities = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
+  *filled = change_others(mask, &pieces, 0, 1); /* the first run is of the margin */
+  supine_labels_pieces_free(&pieces);
+  return SUPINE_OK;
+}

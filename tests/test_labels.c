@@ -1,0 +1,742 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Label maps into surfaces: what comes back of lungs that are known, whose conventions are
+ * understood, what is said of what was done, and maps that are none. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+#include "mesh/labels/labels.h"
+#include "mesh/labels/mask.h"
+#include "precompute/inside/surface.h"
+#include "precompute/phantom/phantom.h"
+
+#include "labels_helpers.h"
+#include "sh_helpers.h"
+
+static char folder[] = "/tmp/supine-labels-XXXXXX";
+
+static const char *in_folder(const char *name) {
+  static char path[8][96];
+  static size_t next;
+  next = (next + 1) % 8;
+  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
+  return path[next];
+}
+
+static int setup(void **state) {
+  (void)state;
+  return mkdtemp(folder) != NULL ? 0 : -1;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  char command[64];
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c) */
+}
+
+static size_t voxels(const supine_image *image) {
+  return image->size[0] * image->size[1] * image->size[2];
+}
+
+static size_t count_label(const supine_image *image, uint8_t label) {
+  size_t count = 0;
+  for (size_t i = 0; i < voxels(image); ++i) {
+    count += ((const uint8_t *)image->values)[i] == label;
+  }
+  return count;
+}
+
+typedef struct made {
+  supine_mesh surface[2];
+  supine_labels_report report;
+} made;
+
+static made surfaces_of(const char *const *paths, size_t count,
+                        const supine_labels_options *options) {
+  made out = {0};
+  supine_error error;
+  if (supine_labels_surfaces(paths, count, options, out.surface, &out.report, &error) !=
+      SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return out;
+}
+
+/* Writes the image under a name, and makes surfaces of the file. */
+static made surfaces_of_image(const supine_image *image, const char *name,
+                              const supine_labels_options *options) {
+  const char *path = in_folder(name);
+  supine_error error;
+  if (supine_image_write(path, image, NULL, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return surfaces_of(&path, 1, options);
+}
+
+static void release(made *out) {
+  supine_mesh_free(&out->surface[0]);
+  supine_mesh_free(&out->surface[1]);
+}
+
+static void check_same(const made *a, const made *b) {
+  assert_int_equal(a->report.lung_count, b->report.lung_count);
+  for (size_t lung = 0; lung < a->report.lung_count; ++lung) {
+    const supine_mesh *p = &a->surface[lung];
+    const supine_mesh *q = &b->surface[lung];
+    assert_int_equal(p->vertex_count, q->vertex_count);
+    assert_int_equal(p->triangle_count, q->triangle_count);
+    assert_memory_equal(p->vertices, q->vertices, 3 * p->vertex_count * sizeof(double));
+    assert_memory_equal(p->triangles, q->triangles, 3 * p->triangle_count * sizeof(uint32_t));
+  }
+}
+
+static void check_closed(const supine_mesh *mesh) {
+  supine_topology topology = {0};
+  assert_int_equal(supine_mesh_topology_create(mesh, &topology), SUPINE_OK);
+  assert_true(topology.closed);
+  assert_int_equal(topology.component_count, 1);
+  assert_true(topology.genus >= 0);
+  supine_mesh_topology_free(&topology);
+  assert_true(supine_mesh_volume(mesh) > 0.0);
+}
+
+/* Distance of a map's surfaces from the true one, RMS. */
+static double rms_from(const supine_inside_surface *truth, const made *out) {
+  enum { EVERY = 29 };
+  double sum = 0.0;
+  double count = 0.0;
+  for (size_t lung = 0; lung < 2; ++lung) {
+    supine_inside_place place = {.depth = 0.0};
+    for (size_t i = 0; i < out->surface[lung].vertex_count; i += EVERY) {
+      place = supine_inside_surface_find(truth, out->surface[lung].vertices + 3 * i, NULL);
+      sum += place.depth * place.depth;
+      count += 1.0;
+    }
+  }
+  return sqrt(sum / count);
+}
+
+/* The acceptance of the whole: voxels of 1, 2, 3 mm bring the lungs back within 0.5, 1 and 2 % of
+ * volume and half a voxel RMS. */
+static void test_labels_phantom_comes_back(void **state) {
+  (void)state;
+  supine_mesh phantom = {0};
+  supine_inside_surface *truth = NULL;
+  assert_int_equal(supine_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
+  assert_int_equal(supine_inside_surface_create(phantom.vertices, phantom.triangle_count,
+                                                phantom.triangles, &truth, NULL),
+                   SUPINE_OK);
+  const size_t half = phantom.triangle_count / 2; /* the left lung's come first */
+  const double share[] = {0.005, 0.01, 0.02};
+  for (int h = 1; h <= 3; ++h) {
+    const double spacing[3] = {h, h, h};
+    const supine_labels_options options = {.labels = NULL};
+    supine_image image = helper_image_over(&phantom, spacing);
+    helper_voxelise(&phantom, 0, half, 2, &image);
+    helper_voxelise(&phantom, half, phantom.triangle_count, 1, &image);
+    made out = surfaces_of_image(&image, "phantom.nii.gz", &options);
+    assert_int_equal(out.report.lung_count, 2);
+    assert_int_equal(out.report.lung[0].side, 1);
+    assert_int_equal(out.report.apex, 1);
+    assert_int_equal(out.report.back, 1);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      const supine_mesh part = {phantom.vertex_count, phantom.vertices, half,
+                                phantom.triangles + (lung == 0 ? 0 : 3 * half)};
+      const double wanted = 1e-3 * supine_mesh_volume(&part);
+      const supine_labels_lung *is = &out.report.lung[lung];
+      check_closed(&out.surface[lung]);
+      assert_true(fabs(is->surface - wanted) < share[h - 1] * wanted);
+      assert_true(fabs(is->surface - 1e-3 * supine_mesh_volume(&out.surface[lung])) <
+                  1e-9 * wanted);
+      assert_true(is->farthest <= is->held);
+      assert_int_equal(is->tunnels, 0);
+      assert_int_equal(is->cut, 0);
+    }
+    const double rms = rms_from(truth, &out);
+    printf("%d mm: %.3f mm RMS, %+.2f and %+.2f mL of the mask\n", h, rms,
+           out.report.lung[0].surface - out.report.lung[0].mask,
+           out.report.lung[1].surface - out.report.lung[1].mask);
+    assert_true(rms < 0.5 * h);
+    release(&out);
+    supine_image_free(&image);
+  }
+  supine_inside_surface_destroy(truth);
+  supine_mesh_free(&phantom);
+}
+
+/* Relabels 1 (right) and 2 (left) by height, from the feet up, and by side. */
+static supine_image relabelled(const supine_image *from, const uint8_t left[2],
+                               const uint8_t right[3]) {
+  supine_image image = *from;
+  uint8_t *at = malloc(voxels(from));
+  image.values = at;
+  for (size_t i = 0; i < voxels(from); ++i) {
+    const uint8_t was = ((const uint8_t *)from->values)[i];
+    const size_t k = i / from->size[0] / from->size[1];
+    const size_t two = k * 2 / from->size[2];
+    const size_t three = k * 3 / from->size[2];
+    at[i] = was == 0 ? 0 : was == 2 ? left[two] : right[three];
+  }
+  return image;
+}
+
+static void test_labels_conventions_same_lungs(void **state) {
+  (void)state;
+  static const struct {
+    uint8_t left[2], right[3];
+    const char *options[3]; /* that are the same, ended by NULL after the first */
+    const char *said;
+  } maps[] = {
+      {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
+      {{1, 1}, {2, 2, 2}, {NULL, "left=1,right=2", NULL}, "1 left; 2 right (by their sides)"},
+      {{7, 7}, {9, 9, 9}, {NULL, "right=9,left=7", NULL}, "7 left; 9 right"},
+      {{2, 1}, {5, 4, 3}, {NULL, "lobes", NULL}, "1, 2 left; 3, 4, 5 right (as of lobes)"},
+      {{11, 10}, {14, 13, 12}, {NULL, "totalsegmentator", NULL}, "10, 11 left; 12, 13, 14 right"},
+      {{14, 13}, {17, 16, 15}, {NULL, "totalsegmentator-v1", NULL}, "13, 14 left"},
+      {{1, 1}, {1, 1, 1}, {NULL, "one", NULL}, "1 both lungs"},
+      {{6, 3}, {1, 2, 5}, {"one", "left=3+6,right=1+2+5", NULL}, "both lungs"},
+  };
+  supine_image image = helper_two_lungs(4.0);
+  const supine_labels_options plain = {.edge = 5.0};
+  made wanted = surfaces_of_image(&image, "wanted.nrrd", &plain);
+  assert_int_equal(wanted.report.lung_count, 2);
+  for (size_t m = 0; m < sizeof maps / sizeof *maps; ++m) {
+    supine_image map = relabelled(&image, maps[m].left, maps[m].right);
+    for (size_t o = 0; o < 3 && (o == 0 || maps[m].options[o] != NULL); ++o) {
+      const supine_labels_options options = {.labels = maps[m].options[o], .edge = 5.0};
+      made out = surfaces_of_image(&map, "map.nrrd", &options);
+      check_same(&out, &wanted);
+      if (o == 0 && strstr(out.report.taken, maps[m].said) == NULL) {
+        fail_msg("'%s' does not say '%s'", out.report.taken, maps[m].said);
+      }
+      release(&out);
+    }
+    supine_image_free(&map);
+  }
+  release(&wanted);
+  supine_image_free(&image);
+}
+
+/* All of a TotalSegmentator map, other organs among it; and a file a lobe. */
+static void test_labels_other_organs_and_files_of_lobes(void **state) {
+  (void)state;
+  static const uint8_t left[2] = {11, 10};
+  static const uint8_t right[3] = {14, 13, 12};
+  supine_image image = helper_two_lungs(4.0);
+  supine_image map = relabelled(&image, left, right);
+  const supine_labels_options plain = {.edge = 5.0};
+  const supine_labels_options named = {.labels = "totalsegmentator", .edge = 5.0};
+  made wanted = surfaces_of_image(&map, "wanted.nrrd", &plain);
+  const char *paths[5];
+  for (uint8_t lobe = 0; lobe < 5; ++lobe) {
+    char name[32];
+    supine_image mask = map;
+    uint8_t *at = malloc(voxels(&map));
+    for (size_t i = 0; i < voxels(&map); ++i) {
+      at[i] = ((const uint8_t *)map.values)[i] == 10 + lobe;
+    }
+    mask.values = at;
+    (void)snprintf(name, sizeof name, "lobe%u.nrrd", lobe);
+    paths[lobe] = in_folder(name);
+    assert_int_equal(supine_image_write(paths[lobe], &mask, NULL, NULL), SUPINE_OK);
+    supine_image_free(&mask);
+  }
+  made out = surfaces_of(paths, 5, &plain);
+  check_same(&out, &wanted);
+  release(&out);
+  ((uint8_t *)map.values)[0] = 51;
+  ((uint8_t *)map.values)[1] = 5;
+  out = surfaces_of_image(&map, "organs.nrrd", &named);
+  check_same(&out, &wanted);
+  release(&out);
+  image.size[0] -= 1;
+  assert_int_equal(supine_image_write(paths[4], &image, NULL, NULL), SUPINE_OK);
+  supine_error error;
+  assert_int_equal(supine_labels_surfaces(paths, 5, &plain, out.surface, &out.report, &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_non_null(strstr(error.message, "lobe4.nrrd"));
+  image.size[0] += 1;
+  release(&wanted);
+  supine_image_free(&map);
+  supine_image_free(&image);
+}
+
+/* A lung alone has to be named. */
+static void test_labels_one_lung_named(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(4.0);
+  const supine_labels_options left = {.labels = "left=2", .edge = 5.0};
+  const supine_labels_options both = {.edge = 5.0};
+  made wanted = surfaces_of_image(&image, "both.nrrd", &both);
+  made out = surfaces_of_image(&image, "one.nrrd", &left);
+  assert_int_equal(out.report.lung_count, 1);
+  assert_int_equal(out.report.lung[0].side, 1);
+  assert_string_equal(out.report.taken, "2 left");
+  wanted.report.lung_count = 1;
+  check_same(&out, &wanted);
+  release(&out);
+  release(&wanted);
+  supine_image_free(&image);
+}
+
+static void box_set(supine_image *image, const size_t low[3], const size_t high[3], uint8_t value) {
+  for (size_t k = low[2]; k < high[2]; ++k) {
+    for (size_t j = low[1]; j < high[1]; ++j) {
+      for (size_t i = low[0]; i < high[0]; ++i) {
+        ((uint8_t *)image->values)[i + image->size[0] * (j + image->size[1] * k)] = value;
+      }
+    }
+  }
+}
+
+static void test_labels_touching_lungs_parted(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(4.0);
+  const size_t left = count_label(&image, 2);
+  const size_t right = count_label(&image, 1);
+  for (size_t i = 0; i < voxels(&image); ++i) {
+    ((uint8_t *)image.values)[i] = ((uint8_t *)image.values)[i] != 0;
+  }
+  /* a bridge of 5 x 4 voxels across the midline, at x 0, and what it adds */
+  const size_t low[3] = {image.size[0] / 2 - 5, image.size[1] / 2 - 2, image.size[2] / 2 - 2};
+  const size_t high[3] = {image.size[0] / 2 + 4, image.size[1] / 2 + 3, image.size[2] / 2 + 2};
+  box_set(&image, low, high, 1);
+  const double added = (double)(count_label(&image, 1) - left - right) * 0.064;
+  const supine_labels_options options = {.edge = 4.0};
+  made out = surfaces_of_image(&image, "touch.nrrd", &options);
+  assert_int_equal(out.report.lung_count, 2);
+  assert_true(out.report.parted >= 16.0 && out.report.parted <= 24.0);
+  /* the bridge is shared out, and nothing of the lungs changes sides but by it */
+  assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
+              out.report.lung[0].mask <= 0.064 * (double)left + added);
+  assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask -
+                   0.064 * (double)(left + right) - added) < 1e-9);
+  assert_int_equal(out.report.lung[0].islands + out.report.lung[1].islands, 0);
+  release(&out);
+  supine_image_free(&image);
+}
+
+static void test_labels_islands_cavities_gaps_counted(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(4.0);
+  const double voxel = 0.064;
+  const double left = voxel * (double)count_label(&image, 2);
+  const size_t middle[3] = {(size_t)((66.0 - image.origin[0]) / 4.0), image.size[1] / 2,
+                            image.size[2] / 2};
+  /* three cavities of 8, 1 and 1 voxels, two of which meet at an edge alone */
+  for (size_t c = 0; c < 3; ++c) {
+    const size_t low[3] = {middle[0] + (c == 2 ? 1 : 4 * c) - 2, middle[1] + (c == 2 ? 1 : 0),
+                           middle[2] + (c == 0 ? 4 : 0)};
+    const size_t high[3] = {low[0] + (c == 0 ? 2 : 1), low[1] + (c == 0 ? 2 : 1),
+                            low[2] + (c == 0 ? 2 : 1)};
+    box_set(&image, low, high, 0);
+  }
+  /* an island of 12 voxels in a corner, of the right lung */
+  box_set(&image, (const size_t[3]){1, 1, 1}, (const size_t[3]){4, 3, 3}, 1);
+  const supine_labels_options options = {.edge = 5.0};
+  made out = surfaces_of_image(&image, "holes.nrrd", &options);
+  const supine_labels_lung *lung = out.report.lung;
+  assert_int_equal(lung[0].cavities, 3);
+  assert_true(fabs(lung[0].filled - 10.0 * voxel) < 1e-9);
+  assert_int_equal(lung[0].islands, 0);
+  assert_true(fabs(lung[0].mask - left) < 1e-6);
+  assert_int_equal(lung[1].islands, 1);
+  assert_true(fabs(lung[1].dropped - 12.0 * voxel) < 1e-9);
+  assert_int_equal(lung[1].cavities, 0);
+  release(&out);
+  /* a hollow with a channel to the outside is no cavity: said, until it is closed */
+  const size_t hollow_low[3] = {middle[0] - 3, middle[1] - 3, middle[2] - 3};
+  const size_t hollow_high[3] = {middle[0] + 4, middle[1] + 4, middle[2] + 4};
+  box_set(&image, hollow_low, hollow_high, 0);
+  const size_t channel_low[3] = {middle[0], 0, middle[2]};
+  const size_t channel_high[3] = {middle[0] + 1, image.size[1], middle[2] + 1};
+  box_set(&image, channel_low, channel_high, 0);
+  const supine_labels_options fine = {.edge = 3.0};
+  out = surfaces_of_image(&image, "channel.nrrd", &fine);
+  assert_int_equal(out.report.lung[0].tunnels, 1); /* in at the front, out at the back */
+  assert_true(left - out.report.lung[0].mask > 300.0 * voxel);
+  release(&out);
+  const supine_labels_options closing = {.edge = 3.0, .close = 4.5};
+  out = surfaces_of_image(&image, "channel.nrrd", &closing);
+  assert_int_equal(out.report.lung[0].tunnels, 0);
+  assert_int_equal(out.report.lung[0].cavities, 1);
+  assert_true(out.report.lung[0].closed > 0.0);
+  assert_true(fabs(left - out.report.lung[0].mask) < 0.01 * left);
+  release(&out);
+  supine_image_free(&image);
+}
+
+/* Every flip of the axes says what it is, and a map that lies about them is found out. */
+static void test_labels_anatomy_against_the_header(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(4.0);
+  const supine_labels_options options = {.labels = "one", .edge = 5.0};
+  for (int flips = 0; flips < 8; ++flips) {
+    static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
+    char wanted[64];
+    supine_image map = image;
+    for (int a = 0; a < 3; ++a) { /* the header alone: the voxels stay where they are */
+      const bool flip = (flips >> a & 1) != 0;
+      map.step[a][a] = flip ? -4.0 : 4.0;
+      map.origin[a] = flip ? image.origin[a] + 4.0 * (double)(image.size[a] - 1) : image.origin[a];
+    }
+    made out = surfaces_of_image(&map, "flip.nrrd", &options);
+    (void)snprintf(wanted, sizeof wanted, "i to the %s, j to the %s, k to the %s",
+                   ways[0][flips & 1], ways[1][flips >> 1 & 1], ways[2][flips >> 2 & 1]);
+    assert_string_equal(out.report.axes, wanted);
+    assert_string_equal(out.report.source, "space directions");
+    assert_int_equal(out.report.apex, (flips & 4) != 0 ? -1 : 1);
+    /* deepest at the back: turned round by one of the two flips, as upside down is */
+    assert_int_equal(out.report.back, (flips >> 1 & 1) != (flips >> 2 & 1) ? -1 : 1);
+    assert_int_equal(out.report.lung[0].surface > out.report.lung[1].surface, flips & 1);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      check_closed(&out.surface[lung]); /* outwards in left-handed maps too */
+    }
+    release(&out);
+  }
+  /* with sides named, a mirrored header is refused */
+  supine_image map = image;
+  map.step[0][0] = -4.0;
+  const supine_labels_options named = {.labels = "lungmask"};
+  const char *path = in_folder("mirrored.nrrd");
+  supine_error error;
+  made out = {0};
+  assert_int_equal(supine_image_write(path, &map, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
+                   SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "mirrored"));
+  supine_image_free(&image);
+}
+
+static void test_labels_cut_at_the_border_counted(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(4.0);
+  const size_t layer = image.size[0] * image.size[1];
+  size_t cut[2] = {0, 0};
+  supine_image part = image;
+  part.size[2] -= 20;
+  part.values = (uint8_t *)image.values + 20 * layer;
+  for (size_t i = 0; i < layer; ++i) {
+    const uint8_t value = ((const uint8_t *)part.values)[i];
+    cut[0] += value == 2;
+    cut[1] += value == 1;
+  }
+  assert_true(cut[0] > 0 && cut[1] > 0);
+  const supine_labels_options options = {.edge = 5.0};
+  made out = surfaces_of_image(&part, "cut.nrrd", &options);
+  assert_int_equal(out.report.lung[0].cut, cut[0]);
+  assert_int_equal(out.report.lung[1].cut, cut[1]);
+  check_closed(&out.surface[0]);
+  release(&out);
+  supine_image_free(&image);
+}
+
+/* The distance that is reported, against all faces of the mask. */
+static double farthest_of(const supine_image *image, uint8_t label, const supine_mesh *mesh) {
+  const uint8_t *at = image->values;
+  double farthest = 0.0;
+  for (size_t v = 0; v < mesh->vertex_count; ++v) {
+    double voxel[3];
+    supine_image_locate(image, mesh->vertices + 3 * v, voxel);
+    double nearest[2] = {INFINITY, INFINITY}; /* to voxels outside and in */
+    for (size_t i = 0; i < voxels(image); ++i) {
+      const size_t index[3] = {i % image->size[0], i / image->size[0] % image->size[1],
+                               i / image->size[0] / image->size[1]};
+      double square = 0.0;
+      for (int a = 0; a < 3; ++a) {
+        const double apart =
+            fmax(0.0, fabs(voxel[a] - (double)index[a]) - 0.5) * fabs(image->step[a][a]);
+        square += apart * apart;
+      }
+      nearest[at[i] == label] = fmin(nearest[at[i] == label], square);
+    }
+    farthest = fmax(farthest, fmax(nearest[0], nearest[1]));
+  }
+  return sqrt(farthest);
+}
+
+static void test_labels_farthest_is_true(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(13.0);
+  image.step[2][2] = 17.0;
+  const double edges[] = {9.0, 13.0, 19.0};
+  for (size_t e = 0; e < 3; ++e) {
+    const supine_labels_options options = {.edge = edges[e]};
+    made out = surfaces_of_image(&image, "far.nrrd", &options);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      const supine_labels_lung *is = &out.report.lung[lung];
+      const double wanted = farthest_of(&image, lung == 0 ? 2 : 1, &out.surface[lung]);
+      assert_true(fabs(is->farthest - wanted) < 1e-9);
+      assert_true(fabs(is->held - 0.5 * fmax(17.0, edges[e])) < 1e-12);
+      assert_true(is->farthest <= is->held);
+      assert_true(fabs(is->mask - 2.873 * (double)count_label(&image, lung == 0 ? 2 : 1)) < 1e-6);
+    }
+    release(&out);
+  }
+  supine_image_free(&image);
+}
+
+/* Whatever the mask, the surface is one closed manifold. */
+static void test_labels_noise_closed_manifold(void **state) {
+  (void)state;
+  uint64_t seed = 7;
+  for (int trial = 0; trial < 6; ++trial) {
+    const double density = 0.35 + 0.11 * trial;
+    supine_image image = {.size = {31, 17, 16},
+                          .origin = {-60.0, 0.0, 0.0},
+                          .step = {{4.0, 0.0, 0.0}, {0.0, 4.0, 0.0}, {0.0, 0.0, 4.0}},
+                          .voxel = SUPINE_VOXEL_U8,
+                          .channels = 1};
+    uint8_t *at = calloc(voxels(&image), 1);
+    image.values = at;
+    for (size_t i = 0; i < voxels(&image); ++i) {
+      const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
+      at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
+    }
+    /* as it is; averaged over eight; interpolated */
+    const double edges[] = {4.0, 8.0, 2.7};
+    for (size_t e = 0; e < 3; ++e) {
+      const supine_labels_options options = {.edge = edges[e]};
+      const char *path = in_folder("noise.nrrd");
+      made out = {0};
+      assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+      const supine_status status =
+          supine_labels_surfaces(&path, 1, &options, out.surface, &out.report, NULL);
+      if (status == SUPINE_OK) {
+        check_closed(&out.surface[0]);
+        check_closed(&out.surface[1]);
+      } else { /* too thin for the larger cubes */
+        assert_int_equal(status, SUPINE_ERROR_MESH);
+        assert_true(density < 0.5);
+      }
+      release(&out);
+    }
+    supine_image_free(&image);
+  }
+}
+
+/* Distances against all pairs, in boxes that are no cubes. */
+static void test_distance_against_all_pairs(void **state) {
+  (void)state;
+  uint64_t seed = 11;
+  labels_mask mask = {.size = {9, 13, 7}, .spacing = {0.7, 1.3, 2.9}};
+  const size_t count = supine_labels_mask_count(&mask);
+  float squares[9 * 13 * 7];
+  mask.at = malloc(count);
+  for (int trial = 0; trial < 4; ++trial) {
+    for (size_t i = 0; i < count; ++i) {
+      mask.at[i] = random_signed(&seed) > 0.9 - 0.5 * trial;
+    }
+    for (int zero = 0; zero < 2; ++zero) {
+      assert_int_equal(supine_labels_distance(&mask, zero != 0, squares), SUPINE_OK);
+      for (size_t i = 0; i < count; ++i) {
+        double nearest = INFINITY;
+        for (size_t j = 0; j < count; ++j) {
+          const double apart[3] = {0.7 * ((double)(i % 9) - (double)(j % 9)),
+                                   1.3 * ((double)(i / 9 % 13) - (double)(j / 9 % 13)),
+                                   2.9 * ((double)(i / 117) - (double)(j / 117))};
+          if ((mask.at[j] == 0) == (zero != 0)) {
+            nearest =
+                fmin(nearest, apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]);
+          }
+        }
+        assert_true(fabs((double)squares[i] - nearest) < 1e-5 * (1.0 + nearest));
+      }
+    }
+  }
+  free(mask.at);
+}
+
+static void refused(const char *name, const supine_labels_options *options, supine_status status,
+                    const char *said) {
+  const char *path = in_folder(name);
+  made out = {0};
+  supine_error error = {SUPINE_OK, ""};
+  assert_int_equal(supine_labels_surfaces(&path, 1, options, out.surface, &out.report, &error),
+                   status);
+  if (strstr(error.message, said) == NULL) {
+    fail_msg("'%s' does not say '%s'", error.message, said);
+  }
+  assert_null(out.surface[0].vertices);
+  assert_null(out.surface[1].vertices);
+}
+
+static void test_labels_bad_maps_refused(void **state) {
+  (void)state;
+  const supine_labels_options plain = {.edge = 5.0};
+  supine_image image = helper_two_lungs(4.0);
+  uint8_t *at = image.values;
+  const char *path = in_folder("bad.nrrd");
+  static const struct {
+    const char *labels;
+    supine_status status;
+    const char *said;
+  } wrong[] = {
+      {"both", SUPINE_ERROR_ARGUMENT, "not 'both'"},
+      {"left=", SUPINE_ERROR_ARGUMENT, "not 'left='"},
+      {"left=1,left=2", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=1,right=1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=1+", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=0", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
+      {"left=1,right=2", SUPINE_ERROR_MESH, "mirrored"},
+      {"left=2,right=3", SUPINE_ERROR_MESH, "no voxel of the right lung"},
+      {"totalsegmentator", SUPINE_ERROR_MESH, "are 1, 2: by --labels none"},
+      {"left=9", SUPINE_ERROR_MESH, "none of them is a lung"},
+  };
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    const supine_labels_options options = {.labels = wrong[i].labels};
+    refused("bad.nrrd", &options, wrong[i].status, wrong[i].said);
+  }
+  const supine_labels_options edges[] = {
+      {.edge = 0.1}, {.edge = 30.0}, {.edge = NAN}, {.close = -1.0}, {.close = 1e3}};
+  for (size_t i = 0; i < sizeof edges / sizeof *edges; ++i) {
+    refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "an edge is");
+  }
+  refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
+  refused("map.mha", &plain, SUPINE_ERROR_FORMAT, ".nrrd");
+
+  at[0] = 3; /* which three are lungs? */
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "which of its labels (1, 2, 3)");
+  at[0] = 0;
+  for (size_t i = 0; i < voxels(&image); ++i) { /* one lung, not said to be */
+    at[i] = at[i] == 2 ? 2 : 0;
+  }
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "one lung");
+  for (size_t i = 0; i < voxels(&image); ++i) { /* halves above each other are no two lungs */
+    at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
+  }
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "do not lie beside each other");
+  memset(at, 0, voxels(&image));
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "the mask is empty");
+  at[5000] = 1;
+  at[5030] = 2;
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "that is no lung");
+  /* sheets of one voxel are nothing to cubes of 20 mm */
+  const supine_labels_options coarse = {.edge = 20.0};
+  box_set(&image, (const size_t[3]){5, 5, 5}, (const size_t[3]){6, 40, 50}, 1);
+  box_set(&image, (const size_t[3]){60, 5, 5}, (const size_t[3]){61, 40, 50}, 2);
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
+  supine_image_free(&image);
+}
+
+static void test_labels_voxels_that_are_none_refused(void **state) {
+  (void)state;
+  static const struct {
+    supine_image_voxel voxel;
+    double value;
+    const char *said;
+  } wrong[] = {{SUPINE_VOXEL_F32, 0.37, "no label: labels are whole"},
+               {SUPINE_VOXEL_F64, NAN, "no label"},
+               {SUPINE_VOXEL_F32, INFINITY, "no label"},
+               {SUPINE_VOXEL_I16, -850.0, "the CT itself"},
+               {SUPINE_VOXEL_I32, 65536.0, "no label"}};
+  const supine_labels_options plain = {.edge = 5.0};
+  supine_image image = helper_two_lungs(4.0);
+  for (size_t w = 0; w < sizeof wrong / sizeof *wrong; ++w) {
+    supine_image map = image;
+    map.voxel = wrong[w].voxel;
+    map.values = calloc(voxels(&image), supine_image_voxel_size(map.voxel));
+    for (size_t i = 0; i < voxels(&image); ++i) {
+      supine_image_set(&map, i, supine_image_get(&image, i));
+    }
+    assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
+    const char *path = in_folder("none.nrrd");
+    made out = surfaces_of(&path, 1, &plain); /* whole numbers are labels in any type */
+    assert_int_equal(out.report.lung_count, 2);
+    release(&out);
+    supine_image_set(&map, voxels(&image) - 1, wrong[w].value);
+    assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
+    refused("none.nrrd", &plain, SUPINE_ERROR_FORMAT, wrong[w].said);
+    supine_image_free(&map);
+  }
+  supine_image_free(&image);
+}
+
+/* Damaged files, of which the image reader's own test has more. */
+static void test_labels_damaged_files_refused(void **state) {
+  (void)state;
+  const supine_labels_options plain = {.edge = 5.0};
+  supine_image image = helper_two_lungs(8.0);
+  assert_int_equal(supine_image_write(in_folder("whole.nii.gz"), &image, NULL, NULL), SUPINE_OK);
+  FILE *file = fopen(in_folder("whole.nii.gz"), "rb");
+  unsigned char bytes[1 << 16];
+  const size_t size = fread(bytes, 1, sizeof bytes, file);
+  (void)fclose(file);
+  assert_true(size > 100 && size < sizeof bytes);
+  file = fopen(in_folder("short.nii.gz"), "wb");
+  (void)fwrite(bytes, 1, size - size / 3, file);
+  (void)fclose(file);
+  refused("short.nii.gz", &plain, SUPINE_ERROR_FORMAT, "short.nii.gz");
+  file = fopen(in_folder("huge.nrrd"), "w");
+  (void)fputs("NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 10000 10000 10000\nspace "
+              "directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: gzip\n\n",
+              file);
+  (void)fclose(file);
+  refused("huge.nrrd", &plain, SUPINE_ERROR_FORMAT, "more than");
+  supine_image_free(&image);
+}
+
+/* Asks to stop at one call after another until the work gets through. */
+static bool stop_at(void *context, double fraction) {
+  long *left = context;
+  assert_true(fraction >= 0.0 && fraction <= 1.0);
+  return (*left)-- > 0;
+}
+
+static void test_labels_interrupted_anywhere_leaves_nothing(void **state) {
+  (void)state;
+  supine_image image = helper_two_lungs(8.0);
+  assert_int_equal(supine_image_write(in_folder("stop.nrrd"), &image, NULL, NULL), SUPINE_OK);
+  long calls = 0;
+  for (;; ++calls) {
+    long left = calls;
+    const supine_labels_options options = {
+        .edge = 8.0, .progress = stop_at, .progress_context = &left};
+    const char *path = in_folder("stop.nrrd");
+    made out = {0};
+    const supine_status status =
+        supine_labels_surfaces(&path, 1, &options, out.surface, &out.report, NULL);
+    release(&out);
+    if (status == SUPINE_OK) {
+      break;
+    }
+    assert_int_equal(status, SUPINE_ERROR_INTERRUPTED);
+    assert_true(calls < 100);
+  }
+  assert_true(calls >= 4);
+  supine_image_free(&image);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_distance_against_all_pairs),
+      cmocka_unit_test(test_labels_phantom_comes_back),
+      cmocka_unit_test(test_labels_conventions_same_lungs),
+      cmocka_unit_test(test_labels_other_organs_and_files_of_lobes),
+      cmocka_unit_test(test_labels_one_lung_named),
+      cmocka_unit_test(test_labels_touching_lungs_parted),
+      cmocka_unit_test(test_labels_islands_cavities_gaps_counted),
+      cmocka_unit_test(test_labels_anatomy_against_the_header),
+      cmocka_unit_test(test_labels_cut_at_the_border_counted),
+      cmocka_unit_test(test_labels_farthest_is_true),
+      cmocka_unit_test(test_labels_noise_closed_manifold),
+      cmocka_unit_test(test_labels_bad_maps_refused),
+      cmocka_unit_test(test_labels_voxels_that_are_none_refused),
+      cmocka_unit_test(test_labels_damaged_files_refused),
+      cmocka_unit_test(test_labels_interrupted_anywhere_leaves_nothing),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a label map's lungs are, by nibabel, by VTK and by supine: all 8 flips of the axes, axes in
+another order, and oblique ones, by sform and by qform.
+
+    test_labels_orientation.py SUPINE
+"""
+import os
+import subprocess
+import sys
+import tempfile
+
+try:
+    import nibabel
+    import numpy
+    import vtk
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+except ImportError:
+    print("skipped: this python has no vtk or nibabel")
+    sys.exit(77)
+
+supine = sys.argv[1]
+SPACING = (5.0, 4.0, 6.0)
+SIZE = (58, 46, 40)
+RAS_TO_LPS = numpy.diag([-1.0, -1.0, 1.0, 1.0])
+faults = 0
+
+
+def made_map():
+    """lungmask's labels in a frame along RAS: the right lung is the larger; both are wider at the
+    feet and reach deepest at the back."""
+    affine = numpy.diag([*SPACING, 1.0])
+    affine[:3, 3] = [-141.3, -85.7, -113.9]
+    index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
+    x, y, z = numpy.moveaxis(index @ affine[:3, :3] + affine[:3, 3], -1, 0)
+    narrow = 1 - 0.2 * z / 100
+    half = numpy.where(x > 0, 58, 53)  # RAS: + is the right
+    inside = ((abs(x) - 66) / (half * narrow)) ** 2 + ((y - 0.25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
+    return numpy.where(inside, numpy.where(x > 0, 1, 2), 0).astype(numpy.uint8), affine
+
+
+def turned(labels, affine, order, flips):
+    """The same lungs in the same place, stored along other axes."""
+    change = numpy.zeros((4, 4))
+    change[3, 3] = 1
+    for new, old in enumerate(order):
+        change[old, new] = -1 if flips[new] else 1
+        change[old, 3] = labels.shape[old] - 1 if flips[new] else change[old, 3]
+    labels = labels.transpose(order)
+    for axis in range(3):
+        labels = numpy.flip(labels, axis) if flips[axis] else labels
+    return labels, affine @ change
+
+
+def rotation(angles):
+    a, b, c = angles
+    x = [[1, 0, 0], [0, numpy.cos(a), -numpy.sin(a)], [0, numpy.sin(a), numpy.cos(a)]]
+    y = [[numpy.cos(b), 0, numpy.sin(b)], [0, 1, 0], [-numpy.sin(b), 0, numpy.cos(b)]]
+    z = [[numpy.cos(c), -numpy.sin(c), 0], [numpy.sin(c), numpy.cos(c), 0], [0, 0, 1]]
+    return numpy.array(x) @ y @ z
+
+
+def centres(labels, affine):
+    """Centre and volume of each label's voxels, LPS: left first."""
+    out = []
+    for label in (2, 1):
+        voxels = numpy.argwhere(labels == label)
+        centre = RAS_TO_LPS @ affine @ numpy.append(voxels.mean(0), 1)
+        out.append((centre[:3], len(voxels) * abs(numpy.linalg.det(affine[:3, :3])) / 1000))
+    return out
+
+
+def by_vtk(path):
+    """The same by VTK's reader, whose matrices take mm along the image's axes."""
+    reader = vtk.vtkNIFTIImageReader()
+    reader.SetFileName(path)
+    reader.Update()
+    image = reader.GetOutput()
+    matrix = reader.GetSFormMatrix() or reader.GetQFormMatrix()
+    affine = numpy.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+    affine[:, :3] *= image.GetSpacing()
+    values = vtk_to_numpy(image.GetPointData().GetScalars())
+    return centres(values.reshape(image.GetDimensions()[::-1]).transpose(2, 1, 0), affine)
+
+
+def by_supine(path, folder):
+    """Centre and volume of each surface, from the file that --surfaces-out leaves."""
+    out = os.path.join(folder, "surfaces.ply")
+    result = subprocess.run([supine, "solve", path, "--labels", "lungmask", "--edge", "5",
+                             "--posture", "prone", "--surfaces-out", out,
+                             "-o", os.path.join(folder, "prone.ply")],
+                            capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        return None, result.stdout + result.stderr
+    reader = vtk.vtkPLYReader()
+    reader.SetFileName(out)
+    parts = vtk.vtkPolyDataConnectivityFilter()
+    parts.SetInputConnection(reader.GetOutputPort())
+    parts.SetExtractionModeToSpecifiedRegions()
+    found = []
+    for part in range(2):
+        parts.InitializeSpecifiedRegionList()
+        parts.AddSpecifiedRegion(part)
+        clean = vtk.vtkCleanPolyData()
+        clean.SetInputConnection(parts.GetOutputPort())
+        mass = vtk.vtkMassProperties()
+        mass.SetInputConnection(clean.GetOutputPort())
+        mass.Update()
+        data = clean.GetOutput()
+        p = numpy.array([[data.GetPoint(data.GetCell(c).GetPointId(k)) for k in range(3)]
+                         for c in range(data.GetNumberOfCells())])
+        origin = p.mean((0, 1))
+        six = numpy.einsum("ij,ij->i", p[:, 0] - origin,
+                           numpy.cross(p[:, 1] - origin, p[:, 2] - origin))
+        centre = ((p - origin).sum(1) * six[:, None]).sum(0) / 4 / six.sum() + origin
+        found.append((centre, six.sum() / 6000))  # signed: outwards
+    return sorted(found, key=lambda f: -f[0][0]), result.stdout
+
+
+def check(name, labels, affine, folder, form):
+    global faults
+    path = os.path.join(folder, name + ".nii.gz")
+    image = nibabel.Nifti1Image(labels, affine)
+    image.set_sform(affine if form == "sform" else None, 1 if form == "sform" else 0)
+    image.set_qform(affine if form == "qform" else None, 1 if form == "qform" else 0)
+    nibabel.save(image, path)
+    back = nibabel.load(path)
+    wanted = centres(numpy.asarray(back.dataobj), back.affine)
+    ours, said = by_supine(path, folder)
+    # Whatever axes the map is stored along, the lungs are not upside down; oblique ones lean.
+    if ours is None or ("the header's axes hold" not in said and not name.startswith("oblique")):
+        faults += 1
+        print(f"{name}: refused\n{said}")
+        return
+    for other, reader in ((ours, "supine"), (by_vtk(path), "vtk")):
+        for (a, va), (b, vb) in zip(wanted, other):
+            # a tenth of a voxel, and one in a hundred of volume: what half a voxel of surface can do
+            if numpy.abs(a - b).max() > 0.1 * max(SPACING) or abs(va - vb) > 0.01 * va:
+                faults += 1
+                print(f"{name}: nibabel {a} {va:.1f} mL, {reader} {b} {vb:.1f} mL")
+
+
+labels, affine = made_map()
+with tempfile.TemporaryDirectory() as folder:
+    checked = 0
+    for flips in numpy.ndindex(2, 2, 2):
+        form = "sform" if sum(flips) % 2 else "qform"
+        check("flip" + "".join(map(str, flips)), *turned(labels, affine, (0, 1, 2), flips), folder,
+              form)
+        checked += 1
+    for order, flips in (((2, 0, 1), (0, 1, 0)), ((1, 2, 0), (1, 0, 1))):
+        check("order" + "".join(map(str, order)), *turned(labels, affine, order, flips), folder,
+              "sform")
+        checked += 1
+    for form in ("sform", "qform"):
+        oblique = numpy.eye(4)
+        oblique[:3, :3] = rotation((0.21, -0.13, 0.17))
+        check("oblique_" + form, *turned(labels, oblique @ affine, (0, 1, 2), (1, 0, 1)), folder,
+              form)
+        checked += 1
+print(f"{checked} maps, {faults} faults")
+sys.exit(1 if faults else 0)
