@@ -38,9 +38,11 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Writes the basis; its modes are 0.5 + 0.1 k + 0.3 y, so that every direction but one moves all.
+/* Writes the basis, scanned so many mL from its surface in some posture (NULL: as it is); its
+ * modes are 0.5 + 0.1 k + 0.3 y, so that every direction but one moves all.
  */
-static inline void helper_write_basis(const char *path, size_t frequency, size_t lungs) {
+static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
+                                              const char *scan_gravity, const char *scan_volume) {
   supine_mesh mesh[2] = {helper_lump(frequency, 71.3, 3), helper_lump(frequency, -72.9, 4)};
   const size_t n = lungs * mesh[0].vertex_count;
   const size_t m = lungs * mesh[0].triangle_count;
@@ -96,10 +98,13 @@ static inline void helper_write_basis(const char *path, size_t frequency, size_t
                                       {"version", "1"},
                                       {"kind", "vector"},
                                       {"lungs", lungs == 2 ? "left,right" : "left"},
-                                      {"a key of tomorrow", "kept"}};
+                                      {"a key of tomorrow", "kept"},
+                                      {"scan_gravity", scan_gravity},
+                                      {"scan_volume_ml", scan_volume}};
+  const size_t metadata_count = sizeof metadata / sizeof *metadata - (scan_volume == NULL ? 2 : 0);
   supine_error error;
   if (supine_writer_safetensors_write(path, tensors, sizeof tensors / sizeof *tensors, metadata,
-                                      sizeof metadata / sizeof *metadata, &error) != SUPINE_OK) {
+                                      metadata_count, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   free(vertices);
@@ -108,6 +113,10 @@ static inline void helper_write_basis(const char *path, size_t frequency, size_t
   free(lung);
   supine_mesh_free(&mesh[0]);
   supine_mesh_free(&mesh[1]);
+}
+
+static inline void helper_write_basis(const char *path, size_t frequency, size_t lungs) {
+  helper_write_scanned_basis(path, frequency, lungs, NULL, NULL);
 }
 
 /* Opens with the file's own numbers. */

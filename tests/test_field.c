@@ -112,6 +112,70 @@ static void test_field_nodes_cells_and_border(void **state) {
   supine_field_free(&field);
 }
 
+/* Of a scan below full inflation the field counts from the scan: at its own state nothing moves,
+ * and at another a point goes where it goes as content. */
+static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
+  (void)state;
+  supine_inside_shells below;
+  supine_inside_report report;
+  supine_inside_content points = {.count = 1, .part_count = 1};
+  const supine_inside_options options = {0};
+  supine_field field;
+  supine_error error;
+  supine_basis *surface_kept = surface;
+  supine_basis *grid_kept = grid;
+  helper_write_scanned_basis(in_folder("scanned"), 10, 2, "0.6,0.8,0", "-900");
+  surface = helper_open(in_folder("scanned"));
+  make_grid(8.0);
+  grid = helper_open(in_folder("grid"));
+  if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  const double own[2] = {below.scan_scale, below.scan_scale};
+  assert_int_equal(supine_field_create(grid, below.scan_weights, own, 60.0, &field, &error),
+                   SUPINE_OK);
+  const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
+  for (size_t i = 0; i < 3 * count; ++i) { /* rounding of float32 positions */
+    assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
+  }
+  supine_field_free(&field);
+  /* a node inside, as a point */
+  assert_int_equal(supine_field_create(grid, weights, scales, 60.0, &field, &error), SUPINE_OK);
+  size_t node = count / 2;
+  while (!field.inside[node]) {
+    ++node;
+  }
+  double place[3];
+  for (int k = 0; k < 3; ++k) {
+    const size_t *n = field.nodes.size;
+    place[k] = field.nodes.origin[k] + (double)(node % n[0]) * field.nodes.step[0][k] +
+               (double)(node / n[0] % n[1]) * field.nodes.step[1][k] +
+               (double)(node / n[0] / n[1]) * field.nodes.step[2][k];
+  }
+  uint32_t part = 0;
+  char names[] = "node";
+  points.points = place;
+  points.part = &part;
+  points.names = names;
+  assert_int_equal(
+      supine_inside_embed(&below, &points, &options, in_folder("point"), &report, &error),
+      SUPINE_OK);
+  supine_basis *point = helper_open(in_folder("point"));
+  float xyz[3];
+  supine_deform(point, weights, scales, xyz);
+  for (size_t k = 0; k < 3; ++k) {
+    assert_close((double)xyz[k] - place[k],
+                 (double)((const float *)field.nodes.values)[3 * node + k], 1e-4);
+  }
+  supine_basis_close(point);
+  supine_field_free(&field);
+  supine_inside_shells_free(&below);
+  supine_basis_close(surface);
+  supine_basis_close(grid);
+  surface = surface_kept;
+  grid = grid_kept;
+}
+
 static void test_field_inverse_composes_to_less_than_a_tenth(void **state) {
   (void)state;
   supine_field field = made_field();
@@ -361,6 +425,7 @@ static void test_field_malformed_grids_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_field_nodes_cells_and_border),
+      cmocka_unit_test(test_field_of_a_scan_below_full_counts_from_it),
       cmocka_unit_test(test_field_inverse_composes_to_less_than_a_tenth),
       cmocka_unit_test(test_resample_landmarks_land_where_the_points_do),
       cmocka_unit_test(test_plastimatch_warps_by_the_inverse_field),

@@ -333,6 +333,97 @@ static void test_embed_points_of_the_surface_move_with_it(void **state) {
   supine_inside_content_free(&content);
 }
 
+/* Content of a scan that was not at full inflation: it is where the scan had it, at the scan's own
+ * state it comes back there, and on the scan's surface it moves with it. */
+static void test_embed_of_a_scan_below_full_inflation(void **state) {
+  (void)state;
+  enum { COUNT = 400 };
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/scanned", folder);
+  helper_write_scanned_basis(path, 10, 2, "0.6,0.8,0", "-900");
+  supine_basis *scanned = helper_open(path);
+  supine_inside_shells moved_shells;
+  const supine_inside_shells unmoved = shells;
+  supine_error error;
+  if (supine_inside_shells_create(scanned, &moved_shells, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  const size_t n = supine_basis_get_info(scanned)->vertex_count;
+  const double weights[HELPER_MODES] = {0.7, -0.9, 1.1};
+  const double scales[2] = {0.8, -0.6};
+  const double own[2] = {moved_shells.scan_scale, moved_shells.scan_scale};
+  float *surface_moved = malloc(3 * n * sizeof *surface_moved);
+  float *surface_scanned = malloc(3 * n * sizeof *surface_scanned);
+  supine_deform(scanned, weights, scales, surface_moved);
+  supine_deform(scanned, moved_shells.scan_weights, own, surface_scanned);
+  shells = moved_shells;
+  /* half of the points on the surface, half inside */
+  supine_inside_content content = made_points(COUNT, 0.3, 0.95, 5);
+  double target[3 * COUNT];
+  double farthest = 0.0;
+  uint64_t seed = 21;
+  for (size_t i = 0; i < COUNT; i += 2) {
+    const supine_inside_shell *shell = &shells.shell[i / 2 % 2];
+    size_t corner[3];
+    double weight[3];
+    random_surface_point(shell, &seed, content.points + 3 * i, corner, weight);
+    for (size_t k = 0; k < 3; ++k) {
+      double there = 0.0;
+      target[3 * i + k] = 0.0;
+      for (size_t c = 0; c < 3; ++c) {
+        const size_t at = 3 * (shell->begin + corner[c]) + k;
+        target[3 * i + k] += weight[c] * (double)surface_moved[at];
+        there += weight[c] * (double)surface_scanned[at];
+        farthest = fmax(farthest, fabs((double)supine_basis_get_info(scanned)->vertices[at] -
+                                       (double)surface_scanned[at]));
+      }
+      assert_close(content.points[3 * i + k], there, 1e-4); /* the scan's, not the file's */
+    }
+  }
+  assert_true(farthest > 10.0); /* mm from the file's surface to the scan's */
+  (void)embed(&content, false, 0);
+  supine_basis *inside = helper_open(inside_path);
+  const uint32_t *part = supine_basis_tensor(inside, "part")->data;
+  float xyz[3 * COUNT];
+  supine_deform(inside, weights, scales, xyz);
+  for (size_t i = 0; i < COUNT; ++i) {
+    const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
+    assert_true(part[i] % 2 == 1 || distance(got, target + 3 * (size_t)part[i]) < 0.01);
+  }
+  supine_deform(inside, moved_shells.scan_weights, own, xyz);
+  for (size_t i = 0; i < COUNT; ++i) { /* back where it was given, to float32 */
+    const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
+    assert_true(distance(got, content.points + 3 * (size_t)part[i]) < 1e-4);
+  }
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+  shells = unmoved;
+  supine_inside_shells_free(&moved_shells);
+  supine_basis_close(scanned);
+  free(surface_moved);
+  free(surface_scanned);
+}
+
+static void test_shells_of_a_scan_that_cannot_be_found_refused(void **state) {
+  (void)state;
+  char path[80];
+  supine_inside_shells none;
+  supine_error error;
+  (void)snprintf(path, sizeof path, "%s/far", folder);
+  static const struct {
+    const char *gravity, *volume;
+    supine_status status;
+  } wrong[] = {{"0,1", "-900", SUPINE_ERROR_FORMAT},
+               {"0,0,0", "-900", SUPINE_ERROR_FORMAT},
+               {"0,1,0", "-1e300", SUPINE_ERROR_NUMERICAL}};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    helper_write_scanned_basis(path, 6, 2, wrong[i].gravity, wrong[i].volume);
+    supine_basis *far = helper_open(path);
+    assert_int_equal(supine_inside_shells_create(far, &none, &error), wrong[i].status);
+    supine_basis_close(far);
+  }
+}
+
 static void test_embed_file_shares_weights_volume_and_metadata(void **state) {
   (void)state;
   supine_inside_content content = made_points(40, 0.2, 0.9, 2);
@@ -584,6 +675,8 @@ int main(void) {
       cmocka_unit_test(test_biharmonic_points_in_a_plane_refused),
       cmocka_unit_test(test_embed_affine_exact_quadratic_near),
       cmocka_unit_test(test_embed_points_of_the_surface_move_with_it),
+      cmocka_unit_test(test_embed_of_a_scan_below_full_inflation),
+      cmocka_unit_test(test_shells_of_a_scan_that_cannot_be_found_refused),
       cmocka_unit_test(test_embed_file_shares_weights_volume_and_metadata),
       cmocka_unit_test(test_embed_points_of_one_lung_file_has_both),
       cmocka_unit_test(test_embed_outside_counted_and_clamped),

@@ -108,6 +108,12 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
                  content->grid.size[2]);
   }
   (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
+  if (shells->scan_scale != 0.0) {
+    (void)printf(
+        "taken to be where the scan was, %.0f mL below full inflation; the file holds it at "
+        "full inflation\n",
+        info->scan_volume);
+  }
   if (report->centres < report->surface) {
     (void)printf("interpolated from %zu of %zu vertices; at the others that leaves %.2g %% of the "
                  "motion,\nwhich is added near the surface\n",

@@ -61,9 +61,6 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
       e->group[at] = (unsigned char)lung;
       e->part[at] = e->content->part[i];
       e->depth[at] = (float)depth;
-      for (size_t k = 0; k < 3; ++k) {
-        e->vertices[3 * at + k] = (float)e->content->points[3 * i + k];
-      }
       ++at;
       ++report->in_lung[lung];
       report->outside += depth < 0.0;
@@ -90,6 +87,21 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
     motion[r] = 0.0;
     for (size_t k = 0; k < 3; ++k) {
       motion[r] += place->barycentric[k] * displacement[corner[k] * e->columns + r];
+    }
+  }
+}
+
+/* From where the scan had the points [begin, end) to where full inflation has them. */
+static void take_back(embedding *e, size_t begin, size_t end, const double *values) {
+  const size_t modes = e->columns / 3;
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double *row = values + (i - begin) * e->columns + axis * modes;
+      double moved = 0.0;
+      for (size_t k = 0; k < modes; ++k) {
+        moved += e->shells->scan_scale * e->shells->scan_weights[k] * row[k];
+      }
+      e->vertices[3 * i + axis] = (float)(e->content->points[3 * e->order[i] + axis] - moved);
     }
   }
 }
@@ -139,6 +151,7 @@ static supine_status move_block(embedding *e, const supine_inside_shell *shell,
   for (size_t i = 0; i < count * e->columns; ++i) {
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
+  take_back(e, begin, end, values);
   return SUPINE_OK;
 }
 

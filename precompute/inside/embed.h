@@ -10,7 +10,10 @@
  *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / depth < 1
  *
  * with q the surface's point nearest to x and s(q) its motion, linear in its triangle: what is on
- * the surface moves with it exactly, although the centres of b are some of its vertices. */
+ * the surface moves with it exactly, although the centres of b are some of its vertices.
+ *
+ * Content is given where the scan has it, and x, q are there. The file holds it at full inflation,
+ * as it does every surface: x less u at the scan's weights and scale. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
@@ -45,7 +48,7 @@ typedef struct supine_inside_report {
  * what every basis has, tensors
  *
  *     part   U32 [N]  which name a point goes by; of a grid, its node
- *     depth  F32 [N]  mm below the surface, negative outside
+ *     depth  F32 [N]  mm below the surface in the scan, negative outside
  *     names  U8 [.]   the parts' names, separated by newlines (not of a grid)
  *     grid   F64 [4, 3] origin and the three steps, mm; grid_size U32 [3] (of a grid)
  *

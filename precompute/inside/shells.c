@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The surfaces of a basis, lung by lung. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "precompute/inside/shells.h"
@@ -16,7 +17,8 @@ static double mean_edge(const supine_inside_shell *shell) {
   return sum / (double)(3 * shell->triangle_count);
 }
 
-static supine_status create_shell(const supine_basis_info *info, size_t lung,
+/* @param scanned  [N, 3] the basis's vertices where the scan had them */
+static supine_status create_shell(const supine_basis_info *info, const float *scanned, size_t lung,
                                   supine_inside_shell *shell, supine_error *error) {
   const size_t begin = info->lung_begin[lung];
   const size_t end = info->lung_begin[lung + 1];
@@ -29,7 +31,7 @@ static supine_status create_shell(const supine_basis_info *info, size_t lung,
                             shell->vertex_count);
   }
   for (size_t i = 0; i < 3 * shell->vertex_count; ++i) {
-    shell->vertices[i] = (double)info->vertices[3 * begin + i];
+    shell->vertices[i] = (double)scanned[3 * begin + i];
   }
   for (size_t t = 0; t < info->triangle_count; ++t) {
     const uint32_t *corner = info->triangles + 3 * t;
@@ -69,6 +71,25 @@ static bool separate(const supine_basis_info *info) {
   return true;
 }
 
+/* Weights and scale that lead from the file's surface to the scan. */
+static supine_status find_scan(supine_inside_shells *shells, supine_error *error) {
+  const supine_basis *basis = shells->basis;
+  const double volume = supine_basis_get_info(basis)->scan_volume;
+  const char *text = supine_basis_metadata(basis, "scan_gravity");
+  double g[3];
+  if (volume == 0.0) {
+    return SUPINE_OK;
+  }
+  if (text == NULL || sscanf(text, "%lf,%lf,%lf", &g[0], &g[1], &g[2]) != 3 || /* NOLINT */
+      supine_basis_weights(basis, g, shells->scan_weights) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis was scanned %g mL from full inflation, but does not say in "
+                            "which posture (scan_gravity): make it anew",
+                            volume);
+  }
+  return supine_basis_scale(basis, shells->scan_weights, volume, &shells->scan_scale, error);
+}
+
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -83,10 +104,29 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "a triangle of the basis joins two lungs: make the basis anew");
   }
-  supine_status status = SUPINE_OK;
-  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
-    status = create_shell(info, lung, &shells->shell[lung], error);
+  float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
+  supine_status status = scanned != NULL
+                             ? find_scan(shells, error)
+                             : supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                                "no memory for %zu vertices", info->vertex_count);
+  if (status == SUPINE_OK) {
+    double scales[SUPINE_LUNGS_MAX];
+    for (size_t lung = 0; lung < shells->count; ++lung) {
+      scales[lung] = shells->scan_scale;
+    }
+    supine_deform(basis, shells->scan_weights, scales, scanned);
   }
+  for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
+    if (!isfinite(scanned[i])) {
+      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the scan, %g mL from full inflation, is out of reach of the basis",
+                                info->scan_volume);
+    }
+  }
+  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
+    status = create_shell(info, scanned, lung, &shells->shell[lung], error);
+  }
+  free(scanned);
   if (status != SUPINE_OK) {
     supine_inside_shells_free(shells);
   }

@@ -14,7 +14,7 @@
 typedef struct supine_inside_shell {
   size_t begin; /**< the basis's first vertex of it */
   size_t vertex_count;
-  double *vertices; /**< [vertex_count, 3] mm */
+  double *vertices; /**< [vertex_count, 3] mm, where the scan had them */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3], vertices counted from `begin` */
   double edge;         /**< mean length of an edge, mm */
@@ -25,11 +25,18 @@ typedef struct supine_inside_shells {
   const supine_basis *basis; /**< kept by the caller */
   size_t count;              /**< lungs, G */
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
+  /** The scan's own state, in which content is given: a scan below full inflation is at these
+   * weights [K] and this scale of the file's surface; 0: that is the scan. */
+  double scan_weights[SUPINE_MODES_MAX], scan_scale;
 } supine_inside_shells;
 
-/** @param shells  written; supine_inside_shells_free releases it
+/** Takes the lungs' surfaces to where they were scanned: at metadata "scan_gravity" and the
+ * scan's volume.
+ * @param shells  written; supine_inside_shells_free releases it
  * @retval SUPINE_ERROR_MESH    a lung without a triangle
- * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
+ * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface; or it does
+ *         not say in which posture it was scanned
+ * @retval SUPINE_ERROR_NUMERICAL  its volumes do not reach the scan's
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);

@@ -64,15 +64,47 @@ static void state_words(const supine_basis *basis, char *words, size_t size) {
   }
 }
 
+/* How many of what is inside each lung, and how deep. */
+static void print_content(const supine_basis *basis, const char *content) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_tensor *tensor = supine_basis_tensor(basis, "depth");
+  const bool well = tensor != NULL && tensor->dtype == SUPINE_F32 && tensor->rank == 1 &&
+                    tensor->shape[0] == info->vertex_count;
+  const float *depth = well ? tensor->data : NULL;
+  size_t outside = 0;
+  (void)printf("  %zu %s", info->vertex_count,
+               strcmp(content, "grid") == 0   ? "nodes"
+               : strcmp(content, "mesh") == 0 ? "vertices and points"
+                                              : "points");
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)printf("%s%zu %s", lung == 0 ? ": " : ", ",
+                 info->lung_begin[lung + 1] - info->lung_begin[lung], info->lung_names[lung]);
+  }
+  for (size_t i = 0; depth != NULL && i < info->vertex_count; ++i) {
+    outside += depth[i] < 0.0F;
+  }
+  if (depth != NULL) {
+    (void)printf("; %zu of them outside", outside);
+  }
+  (void)printf("; %zu triangles; %s\n", info->triangle_count,
+               info->has_volume ? "volumes are the lungs'" : "no volumes");
+}
+
 static void print_text(const char *path, const supine_basis *basis, const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  const char *content = supine_basis_metadata(basis, "content");
   char state[64];
   state_words(basis, state, sizeof state);
-  (void)printf("%s: basis of %zu lung%s (%s), %s field\n", path, info->lung_count,
+  (void)printf("%s: basis of %s%s%zu lung%s (%s), %s field\n", path, content != NULL ? content : "",
+               content != NULL ? " inside " : "", info->lung_count,
                info->lung_count == 1 ? "" : "s", text_of(basis, "lungs"),
                info->vector ? "vector" : "scalar");
-  (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
-               info->has_volume ? "closed: volumes are exact" : "open: no volumes");
+  if (content != NULL) {
+    print_content(basis, content);
+  } else {
+    (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
+                 info->has_volume ? "closed: volumes are exact" : "open: no volumes");
+  }
   (void)printf(
       "  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
       info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
@@ -84,15 +116,15 @@ static void print_text(const char *path, const supine_basis *basis, const double
     }
   }
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
-    (void)printf("\nError against the full fields, on %s directions%s:\n"
-                 "             RMS   95th percentile   largest\n"
-                 "  %%   %10s   %15s   %7s   of the RMS displacement\n",
-                 text_of(basis, "error_directions"),
-                 supine_basis_metadata(basis, "error_method") != NULL
-                     ? ", each predicted from the others"
-                     : " that no grid used",
-                 text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
-                 text_of(basis, "error_max_percent"));
+    (void)printf(
+        "\nError%s against the full fields, on %s directions%s:\n"
+        "             RMS   95th percentile   largest\n"
+        "  %%   %10s   %15s   %7s   of the RMS displacement\n",
+        content != NULL ? " of the lungs' surface" : "", text_of(basis, "error_directions"),
+        supine_basis_metadata(basis, "error_method") != NULL ? ", each predicted from the others"
+                                                             : " that no grid used",
+        text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
+        text_of(basis, "error_max_percent"));
     if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
       (void)printf("  mm  %10s   %15s   %7s   %s\n", text_of(basis, "error_rms_mm"),
                    text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"), state);
@@ -101,6 +133,9 @@ static void print_text(const char *path, const supine_basis *basis, const double
   if (supine_basis_metadata(basis, turned_over) != NULL) {
     (void)printf("\nTriangles that are turned over %s, in the worst of six postures: %s %%\n",
                  state, text_of(basis, turned_over));
+  }
+  if (info->triangle_count == 0) {
+    return; /* energy is the surface's */
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;

@@ -116,10 +116,20 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   }
 }
 
+static void place_node(const supine_image *nodes, size_t i, double place[3]) {
+  const double at[3] = {(double)(i % nodes->size[0]), (double)(i / nodes->size[0] % nodes->size[1]),
+                        (double)(i / nodes->size[0] / nodes->size[1])};
+  for (int k = 0; k < 3; ++k) {
+    place[k] = nodes->origin[k] + at[0] * nodes->step[0][k] + at[1] * nodes->step[1][k] +
+               at[2] * nodes->step[2][k];
+  }
+}
+
 supine_status supine_field_create(const supine_basis *basis, const double *weights,
                                   const double *scales, double fade, supine_field *field,
                                   supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
   supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
   const uint32_t *part = NULL;
   const float *depth = NULL;
@@ -139,8 +149,13 @@ supine_status supine_field_create(const supine_basis *basis, const double *weigh
     supine_field_free(&made);
   } else {
     supine_displace_range(basis, weights, scales, 0, n, moved);
-    for (size_t i = 0; i < n; ++i) {
-      memcpy(u + 3 * (size_t)part[i], moved + 3 * i, 3 * sizeof *u);
+    for (size_t i = 0; i < n; ++i) { /* from the scan's node, which full inflation may have moved */
+      double node[3];
+      place_node(&made.nodes, part[i], node);
+      for (size_t k = 0; k < 3; ++k) {
+        u[3 * (size_t)part[i] + k] =
+            (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
+      }
       known[part[i]] = 1;
       made.inside[part[i]] = depth[i] > 0.0F;
     }
