@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole commands with each allocation, and each call that makes a file, failing in turn.
+
+    faults.py PROGRAM LIBFAULTS [EACH] [WORD]
+
+The n-th call fails in the n-th run, for every n; with EACH above 0, only so many spread over each
+command (tests take few, the campaign takes all with 0). WORD: only commands in which it stands.
+
+Each run has to end with the whole outputs, or with an exit code above 0, a message that gives the
+reason, and nothing left: no file, no part of one, no block of memory (of what a run without faults
+gives back). Never by a signal, nor by running on for more than a minute.
+"""
+import filecmp
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+# Made once, without faults; the commands run in a folder where these are.
+BEFORE = """
+phantom --vertices 100 -o lungs.ply
+phantom --vertices 100 -o lungs.stl
+phantom --vertices 100 -o lungs.obj
+precompute lungs.ply --band 2 -o lungs.safetensors
+solve lungs.ply --posture supine --reach 10 --scale 5 -o state.ply
+solve lungs.ply --posture prone --reach 10 --scale 5 -o other.ply
+solve lungs.ply --posture left --reach 10 --scale 5 -o third.ply
+embed lungs.safetensors points.csv -o points.safetensors
+embed lungs.safetensors --grid 60 -o grid.safetensors
+fit --landmarks pairs.csv --law affine -o patient.json
+pv fit samples.csv -o patient.pv.csv
+"""
+
+# What is tried; outputs go into the folder out.
+COMMANDS = """
+phantom --vertices 100 -o out/a.ply
+phantom --vertices 100 -o out/a.obj
+precompute lungs.ply --band 2 -o out/a.safetensors
+precompute lungs.stl --band 2 --law paper --modes harmonics -o out/a.safetensors
+precompute lungs.obj --band 2 --law paper --soften 1 -o out/a.safetensors
+precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned supine:-500 -o out/a.safetensors
+precompute lungs.ply --fields fields.csv -o out/a.safetensors
+precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
+solve lungs.ply --posture prone -o out/a.vtp
+solve lungs.ply --unit-force 3 -o out/a.csv
+fit --landmarks pairs.csv -o out/a.json
+fit lungs.ply state.ply -o out/a.json
+validate lungs.safetensors --state state.ply --posture supine
+validate patient.json --landmarks pairs.csv --json
+embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors
+embed lungs.safetensors image.nrrd -o out/a.safetensors
+embed lungs.safetensors --grid 60 -o out/a.safetensors
+info lungs.safetensors
+info lungs.safetensors --json
+deform lungs.safetensors --posture prone -o out/a.ply
+deform lungs.safetensors --posture prone --volume rest+300 -o out/a.vtp
+deform points.safetensors --allow-folds --posture prone -o out/a.csv
+deform grid.safetensors --allow-folds --posture prone --inverse --field-out out/a.nrrd
+deform grid.safetensors --allow-folds --posture prone --image image.nrrd -o out/a.nrrd
+compare lungs.safetensors --postures supine,prone
+compare lungs.safetensors --postures supine,prone --json
+compare lungs.safetensors --postures supine,prone --csv out/a.csv
+compare lungs.safetensors --postures supine,prone -o out/a.html
+compare points.safetensors --postures supine,prone
+breathe lungs.safetensors --posture prone --fps 1 -o out/a.pvd
+breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.csv -o out/a.safetensors
+render lungs.safetensors --posture supine --size 300x200 -o out/a.png
+export lungs.safetensors -o out/a.html
+export lungs.safetensors -o out/a.glb
+export lungs.safetensors -o out/a.glb --profile 8,clamp-safe --quantise --animate
+pv show patient.pv.csv
+pv fit samples.csv -o out/a.csv
+pv fit samples.csv --json
+bench lungs.safetensors --vertices 1000 --repeats 1
+stream lungs.safetensors --listen 127.0.0.1:0 --seconds 0.05 --volume rest
+"""
+
+REASONS = {
+    "memory": r"memory|patient.json:-?\d+:",  # jansson's reader does not tell a lack of it apart
+    "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
+            "Cannot allocate|short|truncated|changed",
+}
+# These use a display driver, fonts, or a web server, whose own allocations are theirs to survive.
+ALSO = {"memory": "gsl,jansson", "file": ""}
+LIMIT = 60  # s
+
+
+class Trial:
+    def __init__(self, program, library, folder):
+        self.program, self.library, self.folder = program, library, folder
+        self.out = folder / "out"
+        self.report = folder / "report"
+        self.environment = {**os.environ, "SUPINE_THREADS": "1", "LIBGL_ALWAYS_SOFTWARE": "1",
+                            "FAULT_REPORT": str(self.report), "OPENBLAS_NUM_THREADS": "1"}
+
+    def run(self, arguments, kind=None, nth=None):
+        """The exit code, what was said on both streams, calls seen, failed, blocks not given back."""
+        shutil.rmtree(self.out, ignore_errors=True)
+        self.out.mkdir()
+        self.report.unlink(missing_ok=True)
+        environment = dict(self.environment)
+        if kind is not None:
+            environment.update(LD_PRELOAD=str(self.library), FAULT_KIND=kind, FAULT_ALSO=ALSO[kind])
+        if nth is not None:
+            environment["FAULT_NTH"] = str(nth)
+        try:
+            done = subprocess.run([self.program, *arguments], cwd=self.folder, env=environment,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=LIMIT,
+                                  check=False)
+        except subprocess.TimeoutExpired:
+            return None, b"", "", (0, 0, 0)
+        seen = tuple(map(int, self.report.read_text().split())) if self.report.exists() else None
+        return done.returncode, done.stdout, done.stderr.decode(errors="replace"), seen
+
+    def left(self):
+        return sorted(p for p in self.out.rglob("*") if p.is_file())
+
+
+def same_files(folder, kept):
+    names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
+    return names == sorted(p.relative_to(kept) for p in kept.rglob("*") if p.is_file()) and all(
+        filecmp.cmp(folder / name, kept / name, shallow=False) for name in names)
+
+
+def what_is_wrong(trial, kind, kept, whole, result):
+    """Why this run is not what it has to be, or ''."""
+    code, said, words, seen = result
+    if code is None:
+        return "ran on"
+    if code < 0:
+        return f"signal {-code}"
+    if seen is None:
+        return "no report: it did not exit in order"
+    if code == 0:
+        if not same_files(trial.out, kept):
+            return "said success with other outputs"
+        if whole[1] is not None and said != whole[1]:
+            return "said success and something else"
+    else:
+        if not re.search(REASONS[kind], words):
+            return f"exit code {code} without the reason: {words.strip()!r}"
+        if trial.left() or list(trial.out.iterdir()):
+            return "left " + ", ".join(p.name for p in trial.out.iterdir())
+    if seen[2] > whole[3][2]:
+        return f"{seen[2] - whole[3][2]} blocks were not given back (exit code {code})"
+    return ""
+
+
+def steady(trial, arguments, kind):
+    """A run without faults; what it prints is None where a second one prints something else."""
+    first = trial.run(arguments, kind)
+    code, said, words, seen = trial.run(arguments, kind)
+    return code, said if said == first[1] else None, words, seen
+
+
+def samples(folder):
+    """Inputs that no command makes."""
+    (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
+    (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
+        f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))
+    (folder / "fields.csv").write_text("gx,gy,gz,file\n0,1,0,state.ply\n0,-1,0,other.ply\n"
+                                       "1,0,0,third.ply\n")
+    (folder / "image.nrrd").write_text(
+        "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 6 6 5\nspace directions: "
+        "(60,0,0) (0,60,0) (0,0,60)\nspace origin: (-150,-340,-260)\nencoding: ascii\n\n"
+        + " ".join(str(i % 7) for i in range(180)) + "\n")
+    made = random.Random(7)
+    rows = []
+    for _ in range(30):
+        x, y, z = made.uniform(-160, 150), made.uniform(-320, -75), made.uniform(-250, 20)
+        rows.append(f"{x},{y},{z},{1.05 * x},{0.98 * y + 2},{1.1 * z - 1}\n")
+    (folder / "pairs.csv").write_text("x,y,z,to_x,to_y,to_z\n" + "".join(rows))
+
+
+def main():
+    program, library = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+    each = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    word = sys.argv[4] if len(sys.argv) > 4 else ""
+    faults = dict.fromkeys(REASONS, 0)
+    wrong = []
+    with tempfile.TemporaryDirectory() as name:
+        trial = Trial(program, library, Path(name))
+        samples(trial.folder)
+        for line in BEFORE.split("\n"):
+            if line and trial.run(line.split())[0] != 0:
+                sys.exit(f"{line}: {trial.run(line.split())[2]}")
+        kept = trial.folder / "kept"
+        for line in filter(lambda text: text and word in text, COMMANDS.split("\n")):
+            for kind in REASONS:
+                whole = steady(trial, line.split(), kind)
+                if whole[0] == 3:
+                    print(f"skipped, not built: {line}")
+                    break
+                if whole[0] != 0:
+                    sys.exit(f"{line}: {whole[0]}, {whole[2]}")
+                shutil.rmtree(kept, ignore_errors=True)
+                shutil.copytree(trial.out, kept)
+                count = whole[3][0]
+                step = max(1, count // each) if each > 0 else 1
+                tried = found = 0
+                for nth in range(hash_of(line) % step, count, step):
+                    result = trial.run(line.split(), kind, nth)
+                    fault = what_is_wrong(trial, kind, kept, whole, result)
+                    tried += 1
+                    if fault:
+                        found += 1
+                        wrong.append(f"{line}: {kind} {nth}: {fault}")
+                        print("WRONG " + wrong[-1], flush=True)
+                faults[kind] += tried
+                print(f"{kind:6} {tried:5} of {count:5} failed, {found} wrong: {line}", flush=True)
+    print(", ".join(f"{count} {kind} faults" for kind, count in faults.items())
+          + f": {len(wrong)} wrong")
+    sys.exit(1 if wrong else 0)
+
+
+def hash_of(text):
+    """Where a command's sample begins: the same in every run, not the same for every command."""
+    return sum(text.encode())
+
+
+if __name__ == "__main__":
+    main()
