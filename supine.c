@@ -2,13 +2,16 @@
 /* The program: picks the command. */
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <gsl/gsl_errno.h>
+#include <jansson.h>
 
 #include <supine/version.h>
 
 #include "runtime/options/command.h"
+#include "sh/base/output.h"
 
 static void print_help(void) {
   (void)puts("supine - lungs that deform with gravity, in real time\n"
@@ -56,8 +59,35 @@ static int unknown_command(const char *name) {
   return SUPINE_EXIT_USAGE;
 }
 
+/* A value that JSON lacks for want of memory would be missing in silence, and GSL tells a lack of
+ * it only to its handler: both end the program here, and unfinished outputs with it. */
+static _Noreturn void end_without_memory(void) {
+  supine_output_abandon_all();
+  (void)fputs("supine: out of memory\n", stderr);
+  exit(SUPINE_EXIT_NUMERICAL);
+}
+
+static void *allocate_json(size_t size) {
+  void *memory = malloc(size);
+  if (memory == NULL) {
+    end_without_memory();
+  }
+  return memory;
+}
+
+/* Every other error is in what the function returned. */
+static void hear_gsl(const char *reason, const char *file, int line, int code) {
+  (void)reason;
+  (void)file;
+  (void)line;
+  if (code == GSL_ENOMEM) {
+    end_without_memory();
+  }
+}
+
 int main(int argc, char **argv) {
-  (void)gsl_set_error_handler_off();
+  (void)gsl_set_error_handler(hear_gsl);
+  json_set_alloc_funcs(allocate_json, free);
   supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();

@@ -191,6 +191,10 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
     if (status == SUPINE_OK) {
       status = supine_physics_volume_forms_mix(&p->column_forms, field->mix, field->mode_count,
                                                &p->forms);
+      if (status != SUPINE_OK) {
+        (void)supine_error_set(error, status, "no memory for volume forms of %zu modes",
+                               field->mode_count);
+      }
     }
     return status;
   }

@@ -304,6 +304,46 @@ static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void 
   supine_lungs_free(&lungs);
 }
 
+/* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width that
+ * is nearest the midline, on either side. */
+static void test_collapse_fixed_point_is_the_hilum(void **state) {
+  (void)state;
+  supine_lungs lungs = lumps();
+  const size_t n = lungs.mesh.vertex_count;
+  const double *p = lungs.mesh.vertices;
+  const double share[2] = {0.3, 0.6};
+  double *rest = malloc(3 * n * sizeof *rest);
+  supine_tissue_rest(&lungs, share, rest);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double sign = lung == 0 ? 1.0 : -1.0; /* outwards */
+    double inner = INFINITY;
+    double outer = -INFINITY;
+    for (size_t i = lungs.lung_begin[lung]; i < lungs.lung_begin[lung + 1]; ++i) {
+      inner = fmin(inner, sign * p[3 * i]);
+      outer = fmax(outer, sign * p[3 * i]);
+    }
+    double mean[3] = {0.0, 0.0, 0.0};
+    double count = 0.0;
+    for (size_t i = lungs.lung_begin[lung]; i < lungs.lung_begin[lung + 1]; ++i) {
+      if (sign * p[3 * i] <= inner + 0.25 * (outer - inner)) {
+        count += 1.0;
+        for (size_t k = 0; k < 3; ++k) {
+          mean[k] += p[3 * i + k];
+        }
+      }
+    }
+    const double length = cbrt(share[lung]);
+    const size_t any = lungs.lung_begin[lung] + 5;
+    assert_true(count > 20.0);
+    for (size_t k = 0; k < 3; ++k) {
+      const double fixed = (rest[3 * any + k] - length * p[3 * any + k]) / (1.0 - length);
+      assert_close(fixed, mean[k] / count, 1e-9);
+    }
+  }
+  free(rest);
+  supine_lungs_free(&lungs);
+}
+
 static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void **state) {
   (void)state;
   supine_lungs lungs = {0};
@@ -353,6 +393,7 @@ int main(void) {
       cmocka_unit_test_setup(test_lesion_bad_numbers_refused, healthy),
       cmocka_unit_test_setup(test_collapse_rest_and_breath_are_its_share_in_every_direction,
                              healthy),
+      cmocka_unit_test_setup(test_collapse_fixed_point_is_the_hilum, healthy),
       cmocka_unit_test_setup(test_collapse_draws_towards_the_midline_within_the_healthy_box,
                              healthy),
       cmocka_unit_test_setup(test_collapse_bad_arguments_refused, healthy),

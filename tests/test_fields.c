@@ -259,6 +259,47 @@ static void test_fit_real_lung_stated_error_is_found_on_other_directions(void **
   supine_lungs_free(&real);
 }
 
+/* Band 1 and noise, and of band 2 as much as `amount` says: what leaving one out misses by band 2,
+ * in parts of what it misses by band 1; and the band that is kept. */
+static double gain_of_band_2(double amount, size_t *band) {
+  enum { COUNT = 60 };
+  double directions[3 * COUNT];
+  uint64_t seed = 23;
+  for (size_t d = 0; d < COUNT; ++d) {
+    random_direction(&seed, directions + 3 * d);
+  }
+  supine_fields fields = band_limited_fields(1, COUNT, directions);
+  supine_fields more = band_limited_fields(2, COUNT, directions);
+  const supine_fit_options options = {.band = -1, .modes = 0};
+  supine_compression field;
+  supine_fit_report report;
+  for (size_t i = 0; i < 3 * COUNT * fields.vertex_count; ++i) {
+    fields.displacement[i] += amount * more.displacement[i] + random_signed(&seed);
+  }
+  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  supine_projection_compression_free(&field);
+  supine_fields_free(&fields);
+  supine_fields_free(&more);
+  *band = report.band;
+  return report.error[2] / report.error[1];
+}
+
+/* A higher band has to leave a hundredth less than the lower one does. */
+static void test_fit_band_that_gains_less_than_a_hundredth_is_not_kept(void **state) {
+  (void)state;
+  static const double wanted[] = {0.995, 0.985};
+  for (size_t i = 0; i < 2; ++i) {
+    double range[2] = {0.0, 2.0};
+    size_t band = 0;
+    for (int step = 0; step < 20; ++step) {
+      const double middle = 0.5 * (range[0] + range[1]);
+      range[gain_of_band_2(middle, &band) > wanted[i] ? 0 : 1] = middle;
+    }
+    assert_close(gain_of_band_2(range[1], &band), wanted[i], 1e-3);
+    assert_int_equal(band, 1 + i);
+  }
+}
+
 static void test_fit_scalar_states_what_it_loses(void **state) {
   (void)state;
   supine_fields fields = physics_fields(&lungs, 12, 3, 0.0);
@@ -440,6 +481,15 @@ static void test_load_tensors_checked(void **state) {
   assert_close(fields.directions[5], -1.0, 0.0);
   assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
   supine_fields_free(&fields);
+  displacement[3 * n + 3] = 0.25F;
+  displacement[3 * n + 5] = 0.75F;
+  const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_load(path, &lungs, &ras, &fields, NULL), SUPINE_OK);
+  assert_close(fields.displacement[3 * n + 3], -2.5, 0.0);
+  assert_close(fields.displacement[3 * n + 4], -5.0, 0.0);
+  assert_close(fields.displacement[3 * n + 5], 7.5, 0.0);
+  supine_fields_free(&fields);
   displacement[3 * n + 4] = NAN;
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
@@ -458,6 +508,7 @@ int main(void) {
       cmocka_unit_test(test_fit_leave_one_out_equals_fitting_without),
       cmocka_unit_test(test_fit_stated_error_is_found_on_other_directions),
       cmocka_unit_test(test_fit_real_lung_stated_error_is_found_on_other_directions),
+      cmocka_unit_test(test_fit_band_that_gains_less_than_a_hundredth_is_not_kept),
       cmocka_unit_test(test_fit_scalar_states_what_it_loses),
       cmocka_unit_test(test_fit_vector_volumes_exact),
       cmocka_unit_test(test_fit_few_directions_say_what_they_reach),

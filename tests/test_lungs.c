@@ -95,6 +95,26 @@ static void test_lungs_one_file_midline_is_inner_face(void **state) {
   }
 }
 
+/* X runs from the midline outwards on either side: from the first vertex of each lung to its last.
+ */
+static void test_lungs_box_of_either_lung_counts_outwards(void **state) {
+  (void)state;
+  supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
+  supine_lungs lungs = {0};
+  assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(lungs.lung_count, 2);
+  for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
+    const double outer = i < lungs.lung_begin[1] ? lungs.maximum[0] : lungs.minimum[0];
+    double box[3];
+    supine_lungs_box_coordinates(&lungs, i, box);
+    assert_close(box[0], (lungs.mesh.vertices[3 * i] - lungs.midline) / (outer - lungs.midline),
+                 1e-14);
+  }
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&lumps[0]);
+  supine_mesh_free(&lumps[1]);
+}
+
 static void test_lungs_given_midline_decides(void **state) {
   (void)state;
   supine_mesh lump = helper_lump(5, 90.0, 3);
@@ -372,6 +392,7 @@ int main(void) {
       cmocka_unit_test(test_lungs_two_files_any_order_left_first),
       cmocka_unit_test(test_lungs_interleaved_file_is_grouped),
       cmocka_unit_test(test_lungs_one_file_midline_is_inner_face),
+      cmocka_unit_test(test_lungs_box_of_either_lung_counts_outwards),
       cmocka_unit_test(test_lungs_given_midline_decides),
       cmocka_unit_test(test_lungs_inward_are_turned_round_and_told),
       cmocka_unit_test(test_lungs_half_inward_is_not_closed),

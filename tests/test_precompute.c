@@ -13,6 +13,7 @@
 #include "precompute/phantom/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "precompute/projection/compression.h"
 #include "sh/grid.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
@@ -63,8 +64,10 @@ static double reach; /* of the bases made from here on; 0: the paper's */
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = band, .modes = modes, .held_out = held_out};
+  supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
+                                       .band = band,
+                                       .modes = modes,
+                                       .held_out = held_out};
   options.model.force.soften = soften;
   options.model.reach = reach;
   supine_precompute_report report;
@@ -492,6 +495,51 @@ static double turned_over_at_run_time(double volume) {
   return worst;
 }
 
+/* Only prone is emptied: what is turned over there is found, though no other posture turns any. */
+static void test_turned_over_looks_at_all_six_postures(void **state) {
+  (void)state;
+  supine_lungs lungs = phantom(1500);
+  const size_t n = lungs.mesh.vertex_count;
+  const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  const double full = 1e-3 * supine_mesh_volume(&lungs.mesh);
+  double *directions = malloc(3 * n * sizeof *directions);
+  supine_projection projection;
+  supine_compression field;
+  supine_volume_forms forms = {0};
+  assert_int_equal(supine_physics_directions(&lungs, &model.direction, directions, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_projection_linear(&lungs, &model, 3, &projection, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_compress_harmonics(&projection, &field, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_compression_volume_forms(&field, &lungs, model.share,
+                                                              directions, &forms, NULL),
+                   SUPINE_OK);
+  for (int g = 0; g < 6; ++g) {
+    /* Volumes that change by `part` of the lungs at one end of an axis, by 0 at the other and by
+     * half of it between: bands 0 and 1, whose functions are 0.2821 and 0.4886 along the axis. */
+    static const size_t term[3] = {3, 1, 2};
+    const double part = -0.95 * full;
+    const double sign = g < 3 ? 1.0 : -1.0;
+    double resting[9] = {0.5 * part / 0.28209479177387814};
+    resting[term[g % 3]] = sign * 0.5 * part / 0.48860251190291992;
+    const supine_state state_of = {resting, 0.0};
+    const supine_state even = {NULL, 0.5 * part};
+    double share = 0.0;
+    double least = 0.0;
+    assert_int_equal(
+        supine_accuracy_turned_over(&lungs, directions, &field, &forms, &state_of, &share),
+        SUPINE_OK);
+    assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, &even, &least),
+                     SUPINE_OK);
+    print_message("posture %d: %.4f turned over, %.4f\n", g, share, least);
+    assert_true(share > least + 0.01);
+  }
+  supine_physics_volume_forms_free(&forms);
+  supine_projection_compression_free(&field);
+  supine_projection_free(&projection);
+  free(directions);
+  supine_lungs_free(&lungs);
+}
+
 static void test_precompute_turned_over_is_what_the_run_time_turns(void **state) {
   (void)state;
   supine_lungs lungs = phantom(3000);
@@ -537,8 +585,10 @@ static void test_precompute_interrupted_or_unwritable_leaves_old_file(void **sta
   (void)state;
   supine_lungs lungs = phantom(500);
   (void)make_basis(&lungs, 3, 0, 0.0, 0);
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 16, .progress = stop_halfway};
+  supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
+                                       .band = 7,
+                                       .modes = 16,
+                                       .progress = stop_halfway};
   supine_error error;
   options.model.force.soften = 0.5;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error),
@@ -587,6 +637,7 @@ int main(void) {
       cmocka_unit_test(test_precompute_real_lungs_volumes_exact_in_every_direction),
       cmocka_unit_test(test_precompute_default_law_keeps_four_modes),
       cmocka_unit_test(test_precompute_open_surface_has_no_volume),
+      cmocka_unit_test(test_turned_over_looks_at_all_six_postures),
       cmocka_unit_test(test_precompute_turned_over_is_what_the_run_time_turns),
       cmocka_unit_test(test_precompute_reach_keeps_a_fine_real_surface_whole),
       cmocka_unit_test(test_precompute_interrupted_or_unwritable_leaves_old_file),

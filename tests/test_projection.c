@@ -53,6 +53,33 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
+/* The rule is fine enough for the kinks of the lowest and highest vertex: a rule of many times the
+ * directions gives the same functions, but for what is far below any error that a basis states. */
+static void test_linear_rule_is_fine_enough_for_the_kinks(void **state) {
+  enum { FINE = 512 };
+  static const size_t bands[] = {1, 15};
+  static const double most[] = {5e-5, 2e-5}; /* 3.5e-5 and 1e-5 are what they are */
+  for (size_t b = 0; b < 2; ++b) {
+    const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+    const size_t terms = supine_sh_count(bands[b]);
+    supine_projection made;
+    supine_projection fine;
+    assert_int_equal(supine_projection_linear(*state, &model, bands[b], &made, NULL), SUPINE_OK);
+    assert_int_equal(
+        supine_projection_linear_rule(*state, &model, bands[b], FINE, FINE + 1, &fine, NULL),
+        SUPINE_OK);
+    double missed = 0.0;
+    double all = 0.0;
+    for (size_t i = 0; i < made.rank * terms; ++i) {
+      missed += pow(made.functions[i] - fine.functions[i], 2.0);
+      all += pow(fine.functions[i], 2.0);
+    }
+    assert_true(sqrt(missed / all) < most[b]);
+    supine_projection_free(&made);
+    supine_projection_free(&fine);
+  }
+}
+
 /* Both routes are sums of the same solves: they agree to rounding where they use the same rule. */
 static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
   const supine_lungs *lungs = *state;
@@ -327,6 +354,7 @@ int main(void) {
       cmocka_unit_test(test_smooth_route_is_exact_where_stiffness_does_not_turn),
       cmocka_unit_test(test_smooth_route_agrees_with_a_grid),
       cmocka_unit_test(test_smooth_route_refuses_what_no_polynomial_follows),
+      cmocka_unit_test(test_linear_rule_is_fine_enough_for_the_kinks),
       cmocka_unit_test(test_modes_equal_dense_decomposition),
       cmocka_unit_test(test_modes_end_where_rounding_begins),
       cmocka_unit_test(test_tally_percentile_is_the_edge_above),

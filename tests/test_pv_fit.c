@@ -390,6 +390,89 @@ static void test_fit_dip_judged_against_noise(void **state) {
                    SUPINE_OK);
 }
 
+/* Where the limb is flat, and neighbours that are up and down by the noise let no rise be expected.
+ */
+static size_t dip_at(size_t count) {
+  return (count - 3) / 2 * 2;
+}
+
+/* A dip of `share` of the range at one of `count` samples with noise of +- `noise` shares, turn by
+ * turn. */
+static supine_status fit_dip(size_t count, double noise, double share, supine_pv_curve *curve,
+                             double *pressures, double *volumes) {
+  const size_t at = dip_at(count);
+  model_sample(count, pressures, volumes);
+  const double span = volumes[count - 1] - volumes[0];
+  for (size_t j = 1; j + 1 < count; ++j) {
+    volumes[j] += (j % 2 == 0 ? 1.0 : -1.0) * noise * span;
+  }
+  volumes[at] = volumes[at - 1] - share * span;
+  return supine_breath_fit(count, pressures, volumes, NULL, NULL, 0.95, curve, NULL, NULL);
+}
+
+static double least_refused_dip(size_t count, double noise, supine_pv_curve *kept, double *p,
+                                double *v) {
+  double range[2] = {0.0, 0.5};
+  assert_int_equal(fit_dip(count, noise, range[1], kept, p, v), SUPINE_ERROR_FORMAT);
+  for (int step = 0; step < 30; ++step) {
+    const double middle = 0.5 * (range[0] + range[1]);
+    supine_pv_curve curve;
+    range[fit_dip(count, noise, middle, &curve, p, v) == SUPINE_OK ? 0 : 1] = middle;
+  }
+  assert_int_equal(fit_dip(count, noise, range[0], kept, p, v), SUPINE_OK);
+  return range[0];
+}
+
+/* Greatest less least of the samples, which falls are shares of. */
+static double span_of(const double *v, size_t count) {
+  double least = v[0];
+  double greatest = v[0];
+  for (size_t j = 1; j < count; ++j) {
+    least = fmin(least, v[j]);
+    greatest = fmax(greatest, v[j]);
+  }
+  return greatest - least;
+}
+
+/* How far the dip falls below the one before and the rise that its neighbours let one expect.
+ */
+static double fall_of(const double *v, size_t count) {
+  const size_t at = dip_at(count);
+  const double expected = fmax(0.0, (v[at + 1] - v[at - 2]) / 3.0);
+  return (v[at - 1] - v[at] + expected) / span_of(v, count);
+}
+
+/* Few samples may fall by 8 % of the range, many by 15 %, and by no more than 7 sqrt(2) times the
+ * noise, 1.4826 of the median residual; 15 samples are many. */
+static void test_fit_falls_are_allowed_up_to_the_stated_limits(void **state) {
+  (void)state;
+  double p[SAMPLES];
+  double v[SAMPLES];
+  supine_pv_curve curve;
+  (void)least_refused_dip(14, 0.02, &curve, p, v);
+  assert_near(fall_of(v, 14), 0.08, 1e-6);
+  (void)least_refused_dip(15, 0.02, &curve, p, v);
+  assert_near(fall_of(v, 15), 0.15, 1e-6);
+  (void)least_refused_dip(SAMPLES, 0.001, &curve, p, v);
+  double fitted[SAMPLES];
+  double residual[SAMPLES];
+  const double span = span_of(v, SAMPLES);
+  assert_int_equal(supine_breath_curve_evaluate(&curve, SAMPLES, p, fitted, NULL, NULL), SUPINE_OK);
+  for (size_t j = 0; j < SAMPLES; ++j) {
+    residual[j] = fabs(fitted[j] - v[j]) / span;
+    for (size_t k = j; k > 0 && residual[k] < residual[k - 1]; --k) { /* in order */
+      const double swap = residual[k];
+      residual[k] = residual[k - 1];
+      residual[k - 1] = swap;
+    }
+  }
+  const double sigma =
+      1.4826 * residual[SAMPLES / 2] * sqrt((double)SAMPLES / (SAMPLES - SUPINE_PV_CONTROLS - 2));
+  const double fall = fall_of(v, SAMPLES);
+  assert_true(fall < 0.1); /* of the noise, not of the range */
+  assert_near(fall, 7.0 * sqrt(2.0) * sigma, 1e-4 * fall);
+}
+
 static void test_fit_confidence_outside_refused(void **state) {
   (void)state;
   double p[SAMPLES];
@@ -415,6 +498,7 @@ int main(void) {
       cmocka_unit_test(test_fit_result_is_a_minimum),
       cmocka_unit_test(test_fit_bad_samples_name_the_line),
       cmocka_unit_test(test_fit_falling_limb_names_its_line),
+      cmocka_unit_test(test_fit_falls_are_allowed_up_to_the_stated_limits),
       cmocka_unit_test(test_fit_dip_judged_against_noise),
       cmocka_unit_test(test_fit_confidence_outside_refused),
   };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* patient.json, written and read. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -275,7 +276,8 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
   json_error_t where;
   FILE *file = fopen(path, "rb");
   if (file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open", path);
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
+                            strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
   }
   json_t *root = json_loadf(file, 0, &where);
   (void)fclose(file);

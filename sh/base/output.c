@@ -224,8 +224,9 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
   struct stat made;
   errno = 0;
   const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
-  const bool regular = fstat(stream->descriptor, &made) == 0 && S_ISREG(made.st_mode);
-  if (!flushed || stream->code != 0 || (regular && fsync(stream->descriptor) != 0)) {
+  const bool known = fstat(stream->descriptor, &made) == 0;
+  const bool regular = known && S_ISREG(made.st_mode);
+  if (!flushed || stream->code != 0 || !known || (regular && fsync(stream->descriptor) != 0)) {
     errno = stream->code != 0 ? stream->code : errno == 0 ? EIO : errno;
     return output_fail(output, error, "cannot write");
   }
