@@ -40,7 +40,7 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   return mesh;
 }
 
-/* Loads surfaces of ../shared/data as one model; false where they are not there. */
+/* Loads real surfaces (README.md) as one model; false where they are not there. */
 static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
                                      supine_lungs *lungs) {
   supine_mesh meshes[2] = {0};

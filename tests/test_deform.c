@@ -402,6 +402,9 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
       for (size_t j = 0; j < count; ++j) {
         random_frame(basis, &random, weights + j * modes, scales + 2 * j);
       }
+      for (size_t i = 0; i < 3 * count * (end - begin); ++i) {
+        xyz[i] = 1e30F; /* nowhere, where nothing is written */
+      }
       supine_deform_batch(basis, count, weights, scales, begin, end, xyz);
       for (size_t j = 0; j < count; ++j) {
         fixture_deform(o.f, weights + j * modes, scales + 2 * j, exact);
@@ -432,6 +435,30 @@ static void test_deform_batch_each_orientation_within_stated_error(void **state)
   check_batch(90, 5, true, 5, 0, 90);
   check_batch(90, 255, false, 18, 1, 90);
   check_batch(90, 256, true, 3, 1, 90); /* one widened tile outgrows the block */
+}
+
+/* Five modes in the sixteen slots of a GPU's vertex: what is there before does not stay. */
+static void test_gl_pack_slots_without_a_mode_are_zero(void **state) {
+  (void)state;
+  enum { VERTICES = 40, MODES = 5 };
+  opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
+  float attributes[VERTICES * SUPINE_GL_FLOATS];
+  float uniforms[SUPINE_GL_MODES];
+  double weights[MODES] = {0.3, -0.7, 1.9, 0.4, -2.2};
+  memset(attributes, 0x77, sizeof attributes);
+  memset(uniforms, 0x77, sizeof uniforms);
+  assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, weights, 2.0, uniforms), SUPINE_OK);
+  for (size_t k = 0; k < SUPINE_GL_MODES; ++k) {
+    assert_true(uniforms[k] == (k < MODES ? (float)(2.0 * weights[k]) : 0.0F));
+    for (size_t i = 0; i < VERTICES; ++i) {
+      assert_true(attributes[SUPINE_GL_FLOATS * i + 6 + k] ==
+                  (k < MODES ? o.f->coefficient[MODES * i + k] : 0.0F));
+    }
+  }
+  supine_basis_close(basis);
+  drop(&o);
 }
 
 static void test_normals_bipyramid_area_weighted(void **state) {
@@ -493,6 +520,7 @@ int main(void) {
       cmocka_unit_test(test_displace_range_rest_added_is_deform),
       cmocka_unit_test(test_step_many_steps_reach_the_volume),
       cmocka_unit_test(test_deform_batch_each_orientation_within_stated_error),
+      cmocka_unit_test(test_gl_pack_slots_without_a_mode_are_zero),
       cmocka_unit_test(test_normals_bipyramid_area_weighted),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Real lungs, where they are there: their numbers as ../shared/data/README.md gives them. */
+/* Real lungs, where they are there: their numbers as README.md here has them. */
 #include <math.h>
 
 #include "mesh_samples.h"
