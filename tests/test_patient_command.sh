@@ -82,6 +82,11 @@ refused 1 'knows its own posture only' validate points.json --landmarks pairs.cs
 refused 1 'what to fit to' fit rest.ply
 refused 1 'is the one that was fitted' fit --landmarks pairs.csv --third supine:pairs.csv
 refused 2 'the same as the one at rest' fit rest.ply rest.ply
+for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
+  '--direction normal' '--scanned full' '--resting prone=0.5'; do
+  refused 1 "leave ${beside%% *} out" precompute rest.ply --patient points.json $beside \
+    -o x.safetensors
+done
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \

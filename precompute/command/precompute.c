@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine precompute: lung surfaces in, basis file out. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -216,10 +217,6 @@ static supine_status take_patient(const supine_lungs *lungs, request *wanted, ch
   if (status != SUPINE_OK) {
     return status;
   }
-  if (model->model.direction.model != SUPINE_DIRECTION_BOX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--patient brings its own directions: leave --direction out");
-  }
   model->vectors = malloc(3 * lungs->mesh.vertex_count * sizeof *model->vectors);
   *text = supine_patient_text(&record, NULL, NULL);
   if (model->vectors == NULL || *text == NULL) {
@@ -245,6 +242,33 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
+/* Constants beside a patient's: which of the two is meant? Only before loading, which fills in what
+ * was not given. */
+static int check_patient(const request *wanted) {
+  const supine_model_options *options = &wanted->model;
+  const supine_model *model = &options->model;
+  const supine_resting usual = supine_reference_resting_default();
+  const struct {
+    bool given;
+    const char *option;
+  } brought[] = {{options->law_choice != SUPINE_LAW_COUNT, "law"},
+                 {!isnan(model->force.base), "base"},
+                 {!isnan(model->force.gain), "gain"},
+                 {!isnan(model->force.box[0]), "box-force"},
+                 {!isnan(model->direction.c[0]), "constants"},
+                 {model->direction.model != SUPINE_DIRECTION_BOX, "direction"},
+                 {options->has_scan, "scanned"},
+                 {memcmp(&options->resting, &usual, sizeof usual) != 0, "resting"}};
+  for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
+    if (brought[i].given) {
+      return supine_options_usage(
+          name, "--patient brings its own law, force and scan: leave --%s out%s", brought[i].option,
+          strcmp(brought[i].option, "gain") == 0 ? ", or give it to 'supine fit'" : "");
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
+
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   supine_lungs lungs = {0};
@@ -254,7 +278,9 @@ static int run(void *chosen, const supine_arguments *given) {
     return supine_options_usage(
         name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
   }
-  int result = wanted->fields != NULL ? check_fields(wanted->fields, wanted->path) : SUPINE_EXIT_OK;
+  int result = wanted->fields != NULL    ? check_fields(wanted->fields, wanted->path)
+               : wanted->patient != NULL ? check_patient(wanted)
+                                         : SUPINE_EXIT_OK;
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
                                        wanted->fields != NULL || wanted->patient != NULL, &lungs);
