@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(equilibrium supine_precompute supine_phantom supine_mesh_read supine_gsl umfpack)
+supine_test(inverse supine_precompute supine_phantom supine_mesh_read)
 supine_test(force supine_precompute supine_phantom supine_mesh_read)
 supine_test(lit_angles supine_precompute supine_phantom supine_mesh_read supine_gsl)
 supine_test(postures supine_precompute supine_phantom supine_mesh_read supine_gsl)

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The equilibrium backwards: the force comes back from its catch, and slopes by stiffness are those
+ * of differences; over the paper's links and over links with a reach. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "precompute/physics/inverse.h"
+#include "precompute/physics/model.h"
+
+#include "lungs_helpers.h"
+
+static const double exact = 1e-13; /* relative residual: with a reach doubles reach no less */
+
+typedef struct fixture {
+  supine_lungs lungs;
+  supine_network *network[2]; /* without and with a reach */
+  supine_equilibrium *equilibrium[2];
+  double *stiffness, *force, *goal, *lesions;
+} fixture;
+
+static int setup(void **state) {
+  fixture *f = calloc(1, sizeof *f);
+  uint64_t seed = 4099;
+  supine_mesh lump = helper_lump(4, 60.0, 77);
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &f->lungs, NULL), SUPINE_OK);
+  const size_t n = lump.vertex_count;
+  f->stiffness = malloc(n * sizeof(double));
+  f->force = malloc(n * sizeof(double));
+  f->goal = malloc(n * sizeof(double));
+  f->lesions = malloc(n * sizeof(double));
+  for (size_t i = 0; i < n; ++i) {
+    f->stiffness[i] = 0.3 + 3.0 * helper_random(&seed);
+    f->force[i] = 0.5 + helper_random(&seed);
+    f->goal[i] = 2.0 * helper_random(&seed);
+    f->lesions[i] = 1.0 + (double)(i % 7 == 0) * helper_random(&seed);
+  }
+  for (int k = 0; k < 2; ++k) {
+    supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+    model.reach = k == 0 ? 0.0 : 17.3;
+    model.lesions = f->lesions;
+    assert_int_equal(supine_physics_model_network(&f->lungs, &model, &f->network[k]), SUPINE_OK);
+    assert_int_equal(supine_physics_equilibrium_create(f->network[k], 1, 1, &f->equilibrium[k]),
+                     SUPINE_OK);
+  }
+  supine_mesh_free(&lump);
+  *state = f;
+  return 0;
+}
+
+static int teardown(void **state) {
+  fixture *f = *state;
+  for (int k = 0; k < 2; ++k) {
+    supine_physics_equilibrium_destroy(f->equilibrium[k]);
+    supine_physics_network_destroy(f->network[k]);
+  }
+  free(f->stiffness);
+  free(f->force);
+  free(f->goal);
+  free(f->lesions);
+  supine_lungs_free(&f->lungs);
+  free(f);
+  return 0;
+}
+
+static void solve(const fixture *f, int k, const double *stiffness, double *caught) {
+  assert_int_equal(supine_physics_equilibrium_set_stiffness(f->equilibrium[k], stiffness, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_solve(f->equilibrium[k], 1, f->force, exact, false,
+                                                    caught, NULL, NULL),
+                   SUPINE_OK);
+}
+
+static void test_force_comes_back_from_its_catch(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->lungs.mesh.vertex_count;
+  double *caught = malloc(n * sizeof *caught);
+  double *force = malloc(n * sizeof *force);
+  for (int k = 0; k < 2; ++k) {
+    for (int even = 0; even < 2; ++even) {
+      const double *stiffness = even == 1 ? NULL : f->stiffness;
+      solve(f, k, stiffness, caught);
+      assert_int_equal(supine_physics_inverse_force(f->network[k], stiffness, caught, force, NULL),
+                       SUPINE_OK);
+      assert_true(helper_difference(n, caught, f->force) > 0.01); /* something was passed on */
+      assert_true(helper_difference(n, force, f->force) < 1e3 * exact);
+    }
+  }
+  free(caught);
+  free(force);
+}
+
+/* J = half the sum of (F - goal)^2. */
+static double cost(const fixture *f, int k, const double *stiffness, double *caught) {
+  double sum = 0.0;
+  solve(f, k, stiffness, caught);
+  for (size_t i = 0; i < f->lungs.mesh.vertex_count; ++i) {
+    sum += 0.5 * pow(caught[i] - f->goal[i], 2.0);
+  }
+  return sum;
+}
+
+static void test_slopes_are_those_of_differences(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->lungs.mesh.vertex_count;
+  static const double step = 1e-4; /* fourth order: 1e-16 of curvature, 1e-9 of rounding */
+  double *caught = malloc(n * sizeof *caught);
+  double *slope = malloc(n * sizeof *slope);
+  double *gradient = malloc(n * sizeof *gradient);
+  double *varied = malloc(n * sizeof *varied);
+  for (int k = 0; k < 2; ++k) {
+    double largest = 0.0;
+    double sum = 0.0;
+    (void)cost(f, k, f->stiffness, caught);
+    for (size_t i = 0; i < n; ++i) {
+      slope[i] = caught[i] - f->goal[i];
+    }
+    assert_int_equal(supine_physics_inverse_gradient(f->network[k], f->equilibrium[k], f->stiffness,
+                                                     caught, slope, exact, gradient, NULL),
+                     SUPINE_OK);
+    for (size_t i = 0; i < n; ++i) {
+      largest = fmax(largest, fabs(gradient[i]));
+      sum += gradient[i];
+    }
+    assert_true(fabs(sum) < 1e-12 * (double)n * largest);
+    for (size_t v = 3; v < n; v += 11) {
+      static const double weights[4] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0};
+      double difference = 0.0;
+      for (int j = 0; j < 4; ++j) {
+        memcpy(varied, f->stiffness, n * sizeof *varied);
+        varied[v] *= exp(step * (j < 2 ? j - 2 : j - 1));
+        difference += weights[j] * cost(f, k, varied, caught) / step;
+      }
+      if (!(fabs(gradient[v] - difference) < 1e-6 * largest)) {
+        fail_msg("vertex %zu, links %d: %.12g by the adjoint, %.12g by differences", v, k,
+                 gradient[v], difference);
+      }
+    }
+  }
+  free(caught);
+  free(slope);
+  free(gradient);
+  free(varied);
+}
+
+static void test_impossible_stiffness_is_refused(void **state) {
+  const fixture *f = *state;
+  const size_t n = f->lungs.mesh.vertex_count;
+  double *out = malloc(n * sizeof *out);
+  double *bad = malloc(n * sizeof *bad);
+  supine_error error;
+  memcpy(bad, f->stiffness, n * sizeof *bad);
+  bad[5] = 0.0;
+  assert_int_equal(supine_physics_inverse_force(f->network[1], bad, f->force, out, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "vertex 5"));
+  assert_int_equal(supine_physics_inverse_gradient(f->network[1], f->equilibrium[1], bad, f->force,
+                                                   f->force, 0.0, out, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  bad[5] = 1.0;
+  memcpy(out, f->force, n * sizeof *out);
+  out[1] = NAN; /* as a slope */
+  assert_int_equal(supine_physics_inverse_gradient(f->network[1], f->equilibrium[1], bad, f->force,
+                                                   out, 0.0, out, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  free(out);
+  free(bad);
+}
+
+int main(void) {
+  static const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_force_comes_back_from_its_catch, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_slopes_are_those_of_differences, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_impossible_stiffness_is_refused, setup, teardown)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
