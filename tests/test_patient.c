@@ -383,7 +383,10 @@ static void test_record_survives_text(void **state) {
     patient.polynomial[k] = 0.1 * (double)k - 1.0 / 3.0;
   }
   patient.motion[1] = 1.0 / 7.0;
-  const supine_patient_record before = record_of(&patient);
+  supine_patient_record before = record_of(&patient);
+  before.stiffness = (supine_patient_stiffness){
+      .count = {0, 2},
+      .mode = {{{0}}, {{1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7}, {-0.2, {7.0, 8.0, 9.0}, 40.0}}}};
   supine_patient_record after;
   supine_error error;
   char *text = supine_patient_text(&before, NULL, "test");
@@ -399,11 +402,16 @@ static void test_record_survives_text(void **state) {
                       sizeof before.patient.polynomial);
   assert_memory_equal(before.patient.motion, after.patient.motion, sizeof before.patient.motion);
   assert_memory_equal(&before.force, &after.force, offsetof(supine_force_law, soften));
+  assert_int_equal(after.stiffness.count[0], 0);
+  assert_int_equal(after.stiffness.count[1], 2);
+  assert_memory_equal(before.stiffness.mode[1], after.stiffness.mode[1],
+                      2 * sizeof before.stiffness.mode[1][0]);
   assert_string_equal(after.rest.volume, "rest");
   assert_string_equal(after.state.posture, "supine");
   assert_true(after.held_out == 4.25 && after.explained == 0.81 && after.points == 300);
   /* Each part of it missing is named. */
-  static const char *const parts[] = {"frame", "law", "force", "rest", "motion", "format"};
+  static const char *const parts[] = {"frame",  "law",    "force",    "rest",
+                                      "motion", "format", "radius_mm"};
   for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
     char key[32];
     char *spoiled = strdup(text);

@@ -38,6 +38,19 @@ awk -v a="$(number rms_mm valid.json)" -v b="$(number rms_mm valid.json 5)" \
 "$supine" deform surface.safetensors --posture left --volume 300 -o left.ply >/dev/null ||
   fail "no other posture"
 
+# A stiff part comes back, goes into the basis, and the basis lies on the state.
+"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+  --constants 5,2.2,9,1.1,20,1.4 --scale 30 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
+  fail "solve with a lesion"
+"$supine" fit rest.ply stiff.ply --expandability -o stiff.json >fit.txt || fail "fit a lesion"
+grep -q 'kept; stiffness from' fit.txt || fail "no stiffness kept"
+grep -q 'left lung: [23].[0-9]* times as stiff' fit.txt || fail "not told: $(cat fit.txt)"
+grep -q 'correlation with height along gravity' fit.txt || fail "no force"
+"$supine" precompute rest.ply --patient stiff.json --reach 10 -o stiff.safetensors >/dev/null ||
+  fail "precompute with stiffness"
+"$supine" validate stiff.safetensors --state stiff.ply --json >valid.json || fail "validate stiff"
+near "$(number rms_mm valid.json)" 0 0.2 || fail "stiff: $(number rms_mm valid.json) mm apart"
+
 # Landmarks: vertices of the two, every fourth, with half a millimetre of noise.
 vertices() { # FILE: x y z of its vertices
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
@@ -87,6 +100,10 @@ for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--consta
   refused 1 "leave ${beside%% *} out" precompute rest.ply --patient points.json $beside \
     -o x.safetensors
 done
+refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
+  --expandability linear:z:0.5:1.5 -o x.safetensors
+refused 1 'is of surfaces' fit --landmarks pairs.csv --expandability
+refused 1 'the affine law has no force' fit rest.ply stiff.ply --law affine --expandability
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \

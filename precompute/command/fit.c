@@ -14,7 +14,7 @@ static const char name[] = "fit";
 
 typedef struct request {
   const char *path, *landmarks, *name;
-  bool reverse, translation, rigid, has_law, has_midline, has_gain, json;
+  bool reverse, translation, rigid, has_law, has_midline, has_gain, expandability, json;
   int law;
   double midline, gain, reach;
   supine_mesh_load_options load;
@@ -102,6 +102,11 @@ static const supine_option table[] = {
     {"reach", 0, "MM",
      "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
      .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+    {"expandability", 0, NULL,
+     "of surfaces: finds how stiff which parts are, as well, by up to twenty smooth regions a "
+     "lung; kept "
+     "where blocks that it has not seen come nearer. Takes a minute or so",
+     FILLS(expandability)},
     {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
@@ -153,6 +158,43 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
     (void)puts("a small distance between surfaces does not prove the motion of what is in them:\n"
                "  surfaces 5 mm apart have had points 14 mm off. Landmarks tell: --landmarks");
   }
+}
+
+static void print_expandability(const supine_patient_expand_report *expand,
+                                const supine_patient_stiffness *stiffness) {
+  if (expand->tried) {
+    (void)printf("expandability: the surfaces come to %.2f mm RMS with it, %.2f without; held out "
+                 "%.2f and %.2f:\n  ",
+                 expand->fitted[1], expand->fitted[0], expand->held_out[1], expand->held_out[0]);
+    if (expand->kept) {
+      (void)printf("kept; stiffness from %.2f to %.2f times its mean:\n", expand->softest,
+                   expand->stiffest);
+      for (size_t side = 0; side < 2; ++side) {
+        for (size_t k = 0; k < stiffness->count[side]; ++k) {
+          const supine_patient_mode *mode = &stiffness->mode[side][k];
+          (void)printf("  %s lung: %.2f times as stiff within %.0f mm of %.0f,%.0f,%.0f, even "
+                       "beyond %.0f mm\n",
+                       side == 0 ? "left" : "right", exp(mode->value), 0.5 * mode->radius,
+                       mode->centre[0], mode->centre[1], mode->centre[2], mode->radius);
+        }
+      }
+    } else {
+      (void)puts("no nearer to what it had not seen, and so not kept: stiffness stays even");
+    }
+  }
+}
+
+static void print_applied(const supine_patient_surface_fit *found) {
+  const supine_patient_applied *applied = &found->applied;
+  const double *c = found->patient.powers + 3;
+  (void)printf("the force that the displacement shows, back through the operator, means of %zu "
+               "blocks:\n"
+               "  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
+               "(18) leaves %.0f %%\n"
+               "  c7 to c9 of that force %.2f %.2f %.2f, of the displacement %.2f %.2f %.2f\n",
+               applied->blocks, applied->correlation, 100.0 * applied->spread,
+               100.0 * applied->left, applied->slopes[0], applied->slopes[1], applied->slopes[2],
+               c[0], c[1], c[2]);
 }
 
 static void print_gain(const supine_patient_record *record, const supine_patient_gain *found,
@@ -227,19 +269,29 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
 static supine_status fit_surfaces(const request *wanted, const supine_arguments *given,
                                   const supine_patient_pairs *pairs,
                                   const supine_patient_fit_options *options,
-                                  supine_patient *patient, supine_patient_fit_report *report,
-                                  supine_patient_surface_report *surface, supine_error *error) {
+                                  supine_patient_surface_fit *found, supine_error *error) {
   supine_lungs rest = {0};
   supine_lungs state = {0};
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
   supine_status status = load_lungs(wanted, given->operand[0], &rest, error);
   if (status == SUPINE_OK) {
     status = load_lungs(wanted, given->operand[1], &state, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_fit_surface(&rest, &state.mesh, &model, pairs, options, patient, report,
-                                        surface, error);
+    supine_patient_surface_task task = {.rest = &rest,
+                                        .state = &state.mesh,
+                                        .model = &model,
+                                        .landmarks = pairs,
+                                        .options = *options,
+                                        .expandability = wanted->expandability,
+                                        .progress = supine_options_progress_step,
+                                        .progress_context = &progress};
+    memcpy(task.gravity, wanted->state.gravity, sizeof task.gravity);
+    supine_options_signals_catch(true);
+    status = supine_patient_fit_surface(&task, found, error);
+    supine_options_progress_end(&progress);
   }
   supine_lungs_free(&rest);
   supine_lungs_free(&state);
@@ -248,8 +300,7 @@ static supine_status fit_surfaces(const request *wanted, const supine_arguments 
 
 static supine_status fit_landmarks(const request *wanted, const supine_patient_pairs *pairs,
                                    const supine_patient_fit_options *options,
-                                   supine_patient *patient, supine_patient_fit_report *report,
-                                   supine_error *error) {
+                                   supine_patient_surface_fit *found, supine_error *error) {
   const supine_patient_frame frame = supine_patient_frame_of_points(
       pairs->count, pairs->from, wanted->has_midline ? &wanted->midline : NULL);
   supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
@@ -258,8 +309,8 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
                             pairs->count);
   }
   supine_patient_rows_of_pairs(&frame, pairs, rows);
-  const supine_status status =
-      supine_patient_fit(&frame, rows, pairs->count, 3, options, patient, report, error);
+  const supine_status status = supine_patient_fit(&frame, rows, pairs->count, 3, options,
+                                                  &found->patient, &found->report, error);
   free(rows);
   return status;
 }
@@ -285,8 +336,9 @@ static supine_status find_gain(const request *wanted, supine_patient_record *rec
 }
 
 static void keep(const request *wanted, const supine_arguments *given,
-                 const supine_patient_fit_report *report, supine_patient_record *record) {
-  const supine_patient_law law = record->patient.law;
+                 const supine_patient_surface_fit *found, supine_patient_record *record) {
+  const supine_patient_fit_report *report = &found->report;
+  const supine_patient_law law = found->patient.law;
   const supine_patient_scores *held = &report->held_out;
   const char *source = wanted->landmarks != NULL ? wanted->landmarks : given->operand[1];
   const char *slash = strrchr(source, '/');
@@ -294,6 +346,10 @@ static void keep(const request *wanted, const supine_arguments *given,
                  wanted->name != NULL ? wanted->name
                  : slash != NULL      ? slash + 1
                                       : source);
+  record->patient = found->patient;
+  record->stiffness = found->stiffness;
+  record->expand = found->expand;
+  record->applied = found->applied;
   record->rest = wanted->rest;
   record->state = wanted->state;
   record->from_surface = given->count > 0;
@@ -308,9 +364,8 @@ static void keep(const request *wanted, const supine_arguments *given,
 }
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
-                         supine_patient_record *record, supine_patient_fit_report *report,
-                         supine_patient_surface_report *surface, supine_patient_gain *gain,
-                         supine_error *error) {
+                         supine_patient_surface_fit *found, supine_patient_record *record,
+                         supine_patient_gain *gain, supine_error *error) {
   const supine_patient_fit_options options = {.law_given = wanted->has_law,
                                               .law = (supine_patient_law)wanted->law,
                                               .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
@@ -326,18 +381,17 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
     }
   }
   if (status == SUPINE_OK) {
-    status = given->count > 0
-                 ? fit_surfaces(wanted, given, pairs.count > 0 ? &pairs : NULL, &options,
-                                &record->patient, report, surface, error)
-                 : fit_landmarks(wanted, &pairs, &options, &record->patient, report, error);
+    status = given->count > 0 ? fit_surfaces(wanted, given, pairs.count > 0 ? &pairs : NULL,
+                                             &options, found, error)
+                              : fit_landmarks(wanted, &pairs, &options, found, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, given, report, record);
+    keep(wanted, given, found, record);
     if (wanted->third_path != NULL) {
       status = find_gain(wanted, record, gain, error);
     }
     if (status == SUPINE_OK && wanted->path != NULL) {
-      status = supine_patient_write(wanted->path, record, report, given->made_by, error);
+      status = supine_patient_write(wanted->path, record, &found->report, given->made_by, error);
     }
   }
   supine_patient_pairs_free(&pairs);
@@ -347,26 +401,33 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
 static int run(void *chosen, const supine_arguments *given) {
   const request *wanted = chosen;
   supine_patient_record record = {0};
-  supine_patient_fit_report report;
-  supine_patient_surface_report surface = {0};
+  supine_patient_surface_fit found = {0};
   supine_patient_gain gain = {0};
   supine_error error;
   if (given->count == 1 || (given->count == 0 && wanted->landmarks == NULL)) {
     return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
                                       "and the one in the other state, or both");
   }
-  if (fit(wanted, given, &record, &report, &surface, &gain, &error) != SUPINE_OK) {
+  if (wanted->expandability && given->count == 0) {
+    return supine_options_usage(name, "--expandability is of surfaces: name the one at rest and "
+                                      "the one in the other state");
+  }
+  if (fit(wanted, given, &found, &record, &gain, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   if (wanted->json) {
-    char *text = supine_patient_text(&record, &report, given->made_by);
+    char *text = supine_patient_text(&record, &found.report, given->made_by);
     (void)puts(text != NULL ? text : "{}");
     free(text);
   } else {
     if (given->count > 0) {
-      print_surface(&surface, wanted->landmarks != NULL);
+      print_surface(&found.surface, wanted->landmarks != NULL);
     }
-    print_text(&record, &report, wanted);
+    print_text(&record, &found.report, wanted);
+    if (given->count > 0) {
+      print_expandability(&found.expand, &found.stiffness);
+      print_applied(&found);
+    }
     print_gain(&record, wanted->third_path != NULL ? &gain : NULL, wanted->has_gain);
   }
   return supine_options_finish(name);

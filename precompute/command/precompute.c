@@ -223,6 +223,20 @@ static supine_status take_patient(const supine_lungs *lungs, request *wanted, ch
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
                             lungs->mesh.vertex_count);
   }
+  if (supine_patient_is_uneven(&record)) {
+    if (model->stiffness != NULL) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s brings its own stiffness: leave --expandability out",
+                              wanted->patient);
+    }
+    model->stiffness = malloc(lungs->mesh.vertex_count * sizeof *model->stiffness);
+    if (model->stiffness == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              lungs->mesh.vertex_count);
+    }
+    supine_patient_stiffness_of(&record.stiffness, lungs, model->stiffness);
+    model->model.stiffness = model->stiffness;
+  }
   status = supine_patient_directions(&record, lungs, &model->model, model->vectors, error);
   model->model.direction.model = SUPINE_DIRECTION_VECTORS;
   model->model.direction.vectors = model->vectors;

@@ -59,16 +59,10 @@ void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PAT
 static supine_status deal(study *s, size_t seed, supine_error *error) {
   const size_t blocks = supine_patient_rows_block(s->frame, s->rows, s->row_count, seed + 1);
   size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
-  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  if (blocks == 0 || fold_of == NULL || random == NULL) {
+  if (blocks == 0 || fold_of == NULL ||
+      supine_patient_rows_deal(blocks, FOLDS, 1000 + seed, fold_of) != SUPINE_OK) {
     free(fold_of);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu blocks", blocks);
-  }
-  gsl_rng_set(random, 1000 + seed);
-  for (size_t b = 0; b < blocks; ++b) {
-    const size_t other = gsl_rng_uniform_int(random, b + 1);
-    fold_of[b] = fold_of[other];
-    fold_of[other] = b % FOLDS;
   }
   for (size_t i = 0; i < s->row_count; ++i) {
     const size_t fold = fold_of[s->rows[i].block];
@@ -76,7 +70,6 @@ static supine_status deal(study *s, size_t seed, supine_error *error) {
     supine_patient_normals_add_row(&s->normals[seed * FOLDS + fold], &s->rows[i]);
   }
   s->blocks = blocks;
-  gsl_rng_free(random);
   free(fold_of);
   return SUPINE_OK;
 }

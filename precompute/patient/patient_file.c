@@ -78,6 +78,47 @@ static void add_report(json_t *root, const supine_patient *patient,
                             json_real(100.0 * report->explained_fitted));
 }
 
+static const char *const sides[2] = {"left", "right"};
+
+static json_t *modes(const supine_patient_stiffness *stiffness, size_t side) {
+  json_t *all = json_array();
+  for (size_t k = 0; k < stiffness->count[side]; ++k) {
+    const supine_patient_mode *mode = &stiffness->mode[side][k];
+    (void)json_array_append_new(all, json_pack("{s:f, s:o, s:f}", "log_stiffness", mode->value,
+                                               "centre_mm", numbers(mode->centre, 3), "radius_mm",
+                                               mode->radius));
+  }
+  return all;
+}
+
+static json_t *expandability(const supine_patient_record *record) {
+  const supine_patient_expand_report *report = &record->expand;
+  json_t *of = json_object();
+  if (report->tried) {
+    (void)json_object_update_new(
+        of, json_pack("{s:b, s:o, s:o, s:f, s:f}", "kept", report->kept ? 1 : 0,
+                      "fitted_without_and_with_mm", numbers(report->fitted, 2),
+                      "held_out_without_and_with_mm", numbers(report->held_out, 2), "softest",
+                      report->softest, "stiffest", report->stiffest));
+  }
+  for (size_t k = 0; k < 2; ++k) {
+    if (record->stiffness.count[k] > 0) {
+      (void)json_object_set_new(of, sides[k], modes(&record->stiffness, k));
+    }
+  }
+  return of;
+}
+
+static json_t *applied(const supine_patient_applied *of) {
+  return json_pack("{s:i, s:f, s:f, s:o, s:f, s:f}", "blocks", (int)of->blocks, "matched_percent",
+                   100.0 * of->matched, "correlation_with_height", of->correlation, "c7_to_c9",
+                   numbers(of->slopes, 3), "left_rms", of->left, "spread_rms", of->spread);
+}
+
+bool supine_patient_is_uneven(const supine_patient_record *record) {
+  return record->stiffness.count[0] > 0 || record->stiffness.count[1] > 0;
+}
+
 static json_t *encode(const supine_patient_record *record, const supine_patient_fit_report *report,
                       const char *made_by) {
   const supine_patient *patient = &record->patient;
@@ -104,6 +145,12 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   (void)json_object_set_new(root, "lengths_mm", numbers(patient->lengths, 3));
   (void)json_object_set_new(root, "powers", numbers(patient->powers, SUPINE_PATIENT_POWERS));
   (void)json_object_set_new(root, "polynomial_mm", polynomial(patient));
+  if (record->expand.tried || supine_patient_is_uneven(record)) {
+    (void)json_object_set_new(root, "expandability", expandability(record));
+  }
+  if (record->applied.blocks > 0) {
+    (void)json_object_set_new(root, "applied_force", applied(&record->applied));
+  }
   if (report != NULL) {
     add_report(root, patient, report);
   }
@@ -220,6 +267,25 @@ static bool take_force(const json_t *object, supine_force_law *force) {
          isfinite(force->gain) && take_numbers(json_object_get(object, "box"), 3, force->box);
 }
 
+/* The modes of each side that the file has. */
+static bool take_stiffness(const json_t *object, supine_patient_stiffness *stiffness) {
+  bool right = true;
+  for (size_t side = 0; side < 2; ++side) {
+    const json_t *all = json_object_get(object, sides[side]);
+    stiffness->count[side] = json_array_size(all);
+    right = right && stiffness->count[side] <= SUPINE_PATIENT_MODES;
+    for (size_t k = 0; k < stiffness->count[side] && right; ++k) {
+      const json_t *of = json_array_get(all, k);
+      supine_patient_mode *mode = &stiffness->mode[side][k];
+      mode->value = json_number_value(json_object_get(of, "log_stiffness"));
+      mode->radius = json_number_value(json_object_get(of, "radius_mm"));
+      right = isfinite(mode->value) && isfinite(mode->radius) && mode->radius > 0.0 &&
+              take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre);
+    }
+  }
+  return right;
+}
+
 static double number(const json_t *root, const char *key) {
   return json_number_value(json_object_get(root, key));
 }
@@ -243,6 +309,8 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   } else if (!take_scan(json_object_get(root, "rest"), &record->rest) ||
              !take_scan(json_object_get(root, "state"), &record->state)) {
     wrong = "rest or state";
+  } else if (!take_stiffness(json_object_get(root, "expandability"), &record->stiffness)) {
+    wrong = "expandability";
   }
   if (wrong != NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,

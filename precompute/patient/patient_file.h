@@ -5,6 +5,8 @@
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
 
+#include "precompute/patient/applied.h"
+#include "precompute/patient/expand.h"
 #include "precompute/patient/fit.h"
 #include "precompute/physics/model.h"
 
@@ -27,7 +29,13 @@ typedef struct supine_patient_record {
   bool from_surface; /**< the frame is a surface's box, else that of landmarks */
   size_t points;
   double held_out, held_out_baseline, fitted, explained; /**< of the kept law, mm RMS and share */
+  supine_patient_stiffness stiffness;                    /**< counts 0: even */
+  supine_patient_expand_report expand; /**< written, where it was tried; not read */
+  supine_patient_applied applied;      /**< written, where there are blocks; not read */
 } supine_patient_record;
+
+/** Whether the record has a stiffness of its own. */
+bool supine_patient_is_uneven(const supine_patient_record *record);
 
 /** The force of a patient's law: its slopes c7 to c9 for the paper's law, those of `law` for the
  * others; `gain` of it turns with gravity. Seen in one posture, any gain gives the same field. */
@@ -61,7 +69,8 @@ supine_status supine_patient_parse(const char *name, const char *text,
 /** The patient's law as directions d [N, 3], mm, of a surface: with the catch F of the record's
  * force in the fitted posture, F_i d_i = u_i, outwards where the lung grows.
  *
- * @param model  its force is ignored and set to the record's; its stiffness counts
+ * @param model  its force is ignored and set to the record's; its stiffness counts, and is the
+ *               record's own where it has one (stiffness.h): to be set before
  * @retval SUPINE_ERROR_MESH       the surface lies elsewhere than where the law was fitted, or is
  * the other lung
  * @retval SUPINE_ERROR_NUMERICAL  a vertex catches no force */

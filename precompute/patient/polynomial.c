@@ -3,8 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include <cblas.h>
-#include <lapacke.h>
+#include <gsl/gsl_linalg.h>
 
 #include "precompute/patient/rows.h"
 
@@ -46,8 +45,12 @@ void supine_patient_normals_add_row(supine_patient_normals *normals,
 
 void supine_patient_normals_add(supine_patient_normals *normals,
                                 const supine_patient_normals *other) {
-  cblas_daxpy(N * N, 1.0, other->matrix[0], 1, normals->matrix[0], 1);
-  cblas_daxpy(N, 1.0, other->right, 1, normals->right, 1);
+  for (size_t i = 0; i < N; ++i) {
+    for (size_t j = 0; j <= i; ++j) {
+      normals->matrix[i][j] += other->matrix[i][j];
+    }
+    normals->right[i] += other->right[i];
+  }
   normals->squares += other->squares;
   normals->weight += other->weight;
 }
@@ -124,14 +127,22 @@ supine_status supine_patient_polynomial_fit(const supine_patient_normals *normal
       matrix[i * N + i] += penalty[i] + slightest_ridge * trace;
     }
   }
-  return LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', N, 1, matrix, N, coefficients, 1) == 0
+  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, N, N);
+  gsl_vector_view right = gsl_vector_view_array(coefficients, N);
+  return gsl_linalg_cholesky_decomp1(&matrix_view.matrix) == GSL_SUCCESS &&
+                 gsl_linalg_cholesky_svx(&matrix_view.matrix, &right.vector) == GSL_SUCCESS
              ? SUPINE_OK
              : SUPINE_ERROR_NUMERICAL;
 }
 
 double supine_patient_polynomial_squares(const supine_patient_normals *normals, const double c[N]) {
-  double product[N];
-  cblas_dsymv(CblasRowMajor, CblasLower, N, 1.0, normals->matrix[0], N, c, 1, 0.0, product, 1);
-  return fmax(0.0, normals->squares - 2.0 * cblas_ddot(N, c, 1, normals->right, 1) +
-                       cblas_ddot(N, c, 1, product, 1));
+  double squares = normals->squares;
+  for (size_t i = 0; i < N; ++i) {
+    double product = normals->matrix[i][i] * c[i];
+    for (size_t j = 0; j < i; ++j) { /* both triangles */
+      product += 2.0 * normals->matrix[i][j] * c[j];
+    }
+    squares += c[i] * (product - 2.0 * normals->right[i]);
+  }
+  return fmax(0.0, squares);
 }

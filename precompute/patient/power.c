@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_linalg.h>
 #include <gsl/gsl_multifit_nlinear.h>
-#include <lapacke.h>
 
 #include "precompute/patient/rows.h"
 
@@ -120,8 +120,10 @@ static bool solve_linear(problem *p, const double powers[P]) {
     matrix[a * m + a] += 1e-10;
     p->linear[a] *= scale[a];
   }
-  const lapack_int n = (lapack_int)m;
-  if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', n, 1, matrix, n, p->linear, 1) != 0) {
+  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, m, m);
+  gsl_vector_view linear_view = gsl_vector_view_array(p->linear, m);
+  if (gsl_linalg_cholesky_decomp1(&matrix_view.matrix) != GSL_SUCCESS ||
+      gsl_linalg_cholesky_svx(&matrix_view.matrix, &linear_view.vector) != GSL_SUCCESS) {
     return false;
   }
   for (size_t a = 0; a < m; ++a) {
@@ -194,9 +196,12 @@ static int derivatives(const gsl_vector *q, void *context, gsl_matrix *jacobian)
       }
     }
   }
-  if (LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', (lapack_int)m, P, p->factor, (lapack_int)m, projected,
-                     P) != 0) {
-    return GSL_EDOM;
+  gsl_matrix_const_view factor_view = gsl_matrix_const_view_array(p->factor, m, m);
+  for (size_t k = 0; k < P; ++k) {
+    gsl_vector_view column = gsl_vector_view_array_with_stride(projected + k, P, m);
+    if (gsl_linalg_cholesky_svx(&factor_view.matrix, &column.vector) != GSL_SUCCESS) {
+      return GSL_EDOM;
+    }
   }
   for (size_t i = 0; i < p->count; ++i) {
     const double *design = p->design + LINEAR_MAX * i;
@@ -228,6 +233,7 @@ static void take(problem *p, const gsl_vector *q, supine_patient_power *fit) {
   for (size_t k = 0; k < P; ++k) {
     double range[2];
     range_of(k, range);
+    fit->pulled += pull * pow(k < 3 ? log(fit->powers[k] / common_exponent) : fit->powers[k], 2.0);
     const double t = (fit->powers[k] - range[0]) / (range[1] - range[0]);
     fit->at_bound[k] = t < bound_share || t > 1.0 - bound_share;
   }
@@ -293,4 +299,15 @@ double supine_patient_power_residual(const supine_patient_power *fit,
     left += design[a] * fit->linear[a];
   }
   return left;
+}
+
+double supine_patient_power_along(const supine_patient_power *fit, const supine_patient_row *row) {
+  supine_patient_row one = *row;
+  double design[LINEAR_MAX];
+  double logs[3];
+  one.force[0] = 1.0;
+  one.force[1] = one.force[2] = one.force[3] = 0.0;
+  take_logs(row, logs);
+  design_row(&one, logs, fit->powers, design);
+  return design[0] * fit->linear[0] + design[1] * fit->linear[1] + design[2] * fit->linear[2];
 }

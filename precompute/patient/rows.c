@@ -66,3 +66,19 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   }
   return blocks;
 }
+
+supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned long seed,
+                                       size_t *fold_of) {
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  if (random == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  gsl_rng_set(random, seed);
+  for (size_t b = 0; b < blocks; ++b) {
+    const size_t other = gsl_rng_uniform_int(random, b + 1);
+    fold_of[b] = fold_of[other];
+    fold_of[other] = b % folds;
+  }
+  gsl_rng_free(random);
+  return SUPINE_OK;
+}

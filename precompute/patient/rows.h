@@ -31,12 +31,18 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
+/* Deals blocks at random to so many folds, [blocks].
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned long seed,
+                                       size_t *fold_of);
+
 /* --- the paper's law ------------------------------------------------------------------------- */
 
 typedef struct supine_patient_power {
   double powers[SUPINE_PATIENT_POWERS];
   double linear[9]; /* c1, c3, c5 in mm; translation in mm; small rotation in rad */
   double squares;   /* what is left, weighted, mm^2 */
+  double pulled;    /* what holds down powers that the rows leave open has come to, mm^2 */
   bool at_bound[SUPINE_PATIENT_POWERS];
 } supine_patient_power;
 
@@ -62,6 +68,9 @@ supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t co
 /* What a fit leaves of a row, mm. */
 double supine_patient_power_residual(const supine_patient_power *fit,
                                      const supine_patient_row *row);
+
+/* How far a force of 1 moves a row's point along its axis, mm. */
+double supine_patient_power_along(const supine_patient_power *fit, const supine_patient_row *row);
 
 /* --- polynomials ----------------------------------------------------------------------------- */
 

@@ -12,8 +12,9 @@
 #ifndef SUPINE_PATIENT_SURFACES_H
 #define SUPINE_PATIENT_SURFACES_H
 
+#include "precompute/patient/applied.h"
+#include "precompute/patient/expand.h"
 #include "precompute/patient/fit.h"
-#include "precompute/physics/model.h"
 
 /** How the surfaces came together. */
 typedef struct supine_patient_surface_report {
@@ -25,25 +26,39 @@ typedef struct supine_patient_surface_report {
   double before, after; /**< RMS of point to plane at rest and in the end, mm */
 } supine_patient_surface_report;
 
-/** The frame of a surface: its lungs' box and midline. */
-supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs);
+/** What a law is fitted to. */
+typedef struct supine_patient_surface_task {
+  const supine_lungs *rest;
+  const supine_mesh *state;              /**< the same lungs, mm, same frame */
+  const supine_model *model;             /**< stiffness and spreading of the force; its force and
+                                              directions do not count */
+  const supine_patient_pairs *landmarks; /**< optional, to be matched as well */
+  /** Without a law given: the paper's, as surfaces show no sliding; with landmarks whatever holds
+   * out best. */
+  supine_patient_fit_options options;
+  double gravity[3];  /**< of the other state */
+  bool expandability; /**< to be found as well (expand.h); of the paper's law alone */
+  supine_patient_progress *progress; /**< optional */
+  void *progress_context;
+} supine_patient_surface_task;
+
+/** What was found. */
+typedef struct supine_patient_surface_fit {
+  supine_patient patient;
+  supine_patient_fit_report report;
+  supine_patient_surface_report surface;
+  supine_patient_stiffness stiffness; /**< counts 0: even */
+  supine_patient_expand_report expand;
+  supine_patient_applied applied;
+} supine_patient_surface_fit;
 
 /** Fits a law to a surface in another state.
- *
- * @param rest       at rest
- * @param state      the same lungs, mm, same frame
- * @param model      stiffness and spreading of the force; its force and directions do not count
- * @param landmarks  optional, to be matched as well
- * @param options    without a law given: the paper's, as surfaces show no sliding
  * @retval SUPINE_ERROR_MESH  nothing overlaps (frames, units or sides differ), the same surface as
  *                            rest, or next to no compatible points
+ * @retval SUPINE_ERROR_ARGUMENT     expandability of another law than the paper's
+ * @retval SUPINE_ERROR_INTERRUPTED  progress said so
  * @retval those of supine_patient_fit */
-supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
-                                         const supine_model *model,
-                                         const supine_patient_pairs *landmarks,
-                                         const supine_patient_fit_options *options,
-                                         supine_patient *patient, supine_patient_fit_report *report,
-                                         supine_patient_surface_report *surface,
-                                         supine_error *error);
+supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
+                                         supine_patient_surface_fit *fit, supine_error *error);
 
 #endif

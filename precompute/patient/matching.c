@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Closest points with compatible normals, and how much each counts. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_sort.h>
+
+#include "precompute/patient/matching.h"
+
+#include "precompute/physics/solve.h"
+#include "sh/base/parallel.h"
+
+enum { GRAIN = 64 };
+
+static const double compatible = 0.5;   /* cosine between normals: 60 degrees */
+static const double biweight = 4.685;   /* of the scale: 95 % efficient on normal errors */
+static const double scale_least = 0.02; /* mm: no surface is known better */
+
+supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs) {
+  supine_patient_frame frame = {.midline = lungs->midline,
+                                .only_side = lungs->lung_count == 1 ? lungs->side[0] : 0};
+  memcpy(frame.minimum, lungs->minimum, sizeof frame.minimum);
+  memcpy(frame.maximum, lungs->maximum, sizeof frame.maximum);
+  return frame;
+}
+
+static void match_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  supine_patient_matching *m = context;
+  for (size_t i = begin; i < end; ++i) {
+    const double *at = m->moved + 3 * i;
+    const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
+    supine_patient_row *row = &m->rows[i];
+    m->nearest[i] = supine_inside_surface_find(m->tree, at, m->warm ? &m->nearest[i] : NULL);
+    const supine_inside_place *place = &m->nearest[i];
+    const uint32_t *corner = m->state->triangles + 3 * place->triangle;
+    double normal[3] = {0.0, 0.0, 0.0};
+    double length = 0.0;
+    double cosine = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      for (size_t v = 0; v < 3; ++v) {
+        normal[k] += place->barycentric[v] * m->state_normals[3 * (size_t)corner[v] + k];
+      }
+      length += normal[k] * normal[k];
+    }
+    length = sqrt(length);
+    row->value = 0.0;
+    m->distance[i] = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      row->axis[k] = length > 0.0 ? normal[k] / length : 0.0;
+      row->value += row->axis[k] * (place->nearest[k] - from[k]);
+      m->distance[i] += row->axis[k] * (place->nearest[k] - at[k]);
+      cosine += row->axis[k] * m->normals[3 * i + k];
+    }
+    row->weight = cosine > compatible ? 1.0 : 0.0;
+  }
+}
+
+void supine_patient_matching_find(supine_patient_matching *matching) {
+  supine_parallel_for(matching->count, GRAIN, 0, match_range, matching);
+  matching->warm = true;
+}
+
+double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms) {
+  supine_patient_matching *m = matching;
+  size_t count = 0;
+  double squares = 0.0;
+  double weights = 0.0;
+  *rms = 0.0;
+  for (size_t i = 0; i < m->count; ++i) {
+    if (m->rows[i].weight > 0.0) {
+      m->space[count++] = fabs(m->distance[i]);
+    }
+  }
+  if (count == 0) {
+    return 0.0;
+  }
+  gsl_sort(m->space, 1, count);
+  const double most = fmax(fmax(scale_least, scale), 1.4826 * m->space[count / 2]);
+  for (size_t i = 0; i < m->count; ++i) {
+    const double t = m->distance[i] / (biweight * most);
+    m->rows[i].weight *= fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
+    squares += m->rows[i].weight * m->distance[i] * m->distance[i];
+    weights += m->rows[i].weight;
+  }
+  *rms = weights > 0.0 ? sqrt(squares / weights) : 0.0;
+  return (double)count / (double)m->count;
+}
+
+supine_status supine_patient_matching_solve(supine_patient_matching *matching,
+                                            const double *stiffness, supine_error *error) {
+  supine_patient_matching *m = matching;
+  supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, stiffness, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
+                                              0.0, false, m->caught, NULL, error);
+  }
+  for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
+    memcpy(m->rows[i].force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
+           sizeof m->rows[i].force);
+  }
+  return status;
+}
+
+/* The network with its stiffness as the model has it, and the force's columns. */
+static supine_status set_up_forces(supine_patient_matching *m, const supine_model *model,
+                                   supine_error *error) {
+  const size_t n = m->rest->mesh.vertex_count;
+  if (supine_physics_model_network(m->rest, model, &m->network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(m->network, SUPINE_PATIENT_COLUMNS, 0, &m->equilibrium) !=
+          SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    double box[3];
+    supine_lungs_box_coordinates(m->rest, i, box);
+    m->columns[SUPINE_PATIENT_COLUMNS * i] = 1.0;
+    for (size_t k = 0; k < 3; ++k) {
+      m->columns[SUPINE_PATIENT_COLUMNS * i + 1 + k] = box[k] - 0.5;
+    }
+  }
+  return supine_patient_matching_solve(m, model->stiffness, error);
+}
+
+supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
+                                             const supine_model *model, size_t most,
+                                             size_t landmarks, supine_patient_matching *matching,
+                                             supine_error *error) {
+  const size_t n = rest->mesh.vertex_count;
+  supine_patient_matching *m = matching;
+  double *all = malloc(3 * n * sizeof *all);
+  *m = (supine_patient_matching){.rest = rest, .state = state};
+  m->frame = supine_patient_frame_of_lungs(rest);
+  m->count = n < most ? n : most;
+  m->columns = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
+  m->caught = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
+  m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
+  m->vertex = malloc(m->count * sizeof *m->vertex);
+  m->normals = malloc(3 * m->count * sizeof(double));
+  m->moved = malloc(3 * m->count * sizeof(double));
+  m->rows = calloc(m->count + 3 * landmarks, sizeof *m->rows);
+  m->distance = malloc(m->count * sizeof(double));
+  m->nearest = calloc(m->count, sizeof *m->nearest);
+  m->space = malloc(m->count * sizeof(double));
+  if (all == NULL || m->columns == NULL || m->caught == NULL || m->state_normals == NULL ||
+      m->vertex == NULL || m->normals == NULL || m->moved == NULL || m->rows == NULL ||
+      m->distance == NULL || m->nearest == NULL || m->space == NULL) {
+    free(all);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  supine_mesh_vertex_normals(&rest->mesh, all);
+  supine_mesh_vertex_normals(state, m->state_normals);
+  for (size_t i = 0; i < m->count; ++i) {
+    const size_t v = i * n / m->count;
+    m->vertex[i] = v;
+    memcpy(m->normals + 3 * i, all + 3 * v, 3 * sizeof(double));
+    memcpy(m->moved + 3 * i, rest->mesh.vertices + 3 * v, 3 * sizeof(double));
+    m->rows[i].place = supine_patient_find(&m->frame, rest->mesh.vertices + 3 * v);
+  }
+  free(all);
+  const supine_status status = set_up_forces(m, model, error);
+  return status != SUPINE_OK ? status
+                             : supine_inside_surface_create(state->vertices, state->triangle_count,
+                                                            state->triangles, &m->tree, error);
+}
+
+void supine_patient_matching_free(supine_patient_matching *matching) {
+  supine_patient_matching *m = matching;
+  supine_inside_surface_destroy(m->tree);
+  supine_physics_equilibrium_destroy(m->equilibrium);
+  supine_physics_network_destroy(m->network);
+  free(m->columns);
+  free(m->caught);
+  free(m->state_normals);
+  free(m->vertex);
+  free(m->normals);
+  free(m->moved);
+  free(m->rows);
+  free(m->distance);
+  free(m->nearest);
+  free(m->space);
+}
+
+void supine_patient_matching_append(supine_patient_matching *matching,
+                                    const supine_patient_pairs *landmarks) {
+  supine_patient_matching *m = matching;
+  supine_patient_rows_of_pairs(&m->frame, landmarks, m->rows + m->count);
+  m->landmark_rows_count = 3 * landmarks->count;
+  for (size_t i = 0; i < m->landmark_rows_count; ++i) {
+    m->rows[m->count + i].weight = (double)m->count / (double)m->landmark_rows_count;
+  }
+}
