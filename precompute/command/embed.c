@@ -112,7 +112,7 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
     (void)printf(
         "taken to be where the scan was, %.0f mL below full inflation; the file holds it at "
         "full inflation\n",
-        info->scan_volume);
+        -info->scan_volume);
   }
   if (report->centres < report->surface) {
     (void)printf("interpolated from %zu of %zu vertices; at the others that leaves %.2g %% of the "
