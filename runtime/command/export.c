@@ -5,6 +5,7 @@
 
 #include <export.h>
 
+#include "runtime/command/names.h"
 #include "runtime/options/basis_input.h"
 
 static const char name[] = "export";
@@ -15,6 +16,7 @@ typedef struct request {
   double largest;
   bool page;
   bool glb_only; /* an option was given that a page has no use for */
+  const char *inside;
   export_glb_options glb;
 } request;
 
@@ -72,6 +74,10 @@ static const supine_option table[] = {
      "adds an animation: the patient breathes, and turns from the back over the left side onto "
      "the belly and on",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
+    {"inside", 0, "FILE",
+     "what is inside, of 'supine embed' from the same basis: moves along, seen through the lungs; "
+     "each part a material of its name, points as balls of 4 mm",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {.name = NULL}};
 
 static int write_glb(const export_source *source, const request *wanted) {
@@ -87,6 +93,39 @@ static int write_glb(const export_source *source, const request *wanted) {
                  source->info->mode_count, report.loss_percent);
   }
   return supine_options_finish(name);
+}
+
+/* The same with what is inside, which must be of these lungs. */
+static int write_glb_with_inside(const export_source *source, request *wanted) {
+  export_source inside = {0};
+  supine_command_names names = {0};
+  supine_error error;
+  supine_status status = supine_export_source_open(wanted->inside, &inside, &error);
+  if (status == SUPINE_OK) {
+    status = supine_command_names_open(inside.basis, &names, &error);
+  }
+  if (status == SUPINE_OK &&
+      (!inside.info->vector || inside.info->mode_count != source->info->mode_count ||
+       inside.terms != source->terms ||
+       memcmp(inside.modes, source->modes,
+              source->info->mode_count * source->terms * sizeof *source->modes) != 0)) {
+    status = supine_error_set(&error, SUPINE_ERROR_FORMAT,
+                              "%s: not of this basis: make it with 'supine embed' from the basis "
+                              "that is exported",
+                              wanted->inside);
+  }
+  int result = SUPINE_EXIT_OK;
+  if (status != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    const export_parts parts = {names.count, names.text, names.part};
+    wanted->glb.inside = &inside;
+    wanted->glb.parts = &parts;
+    result = write_glb(source, wanted);
+  }
+  supine_command_names_close(&names);
+  supine_export_source_close(&inside);
+  return result;
 }
 
 static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
@@ -113,7 +152,9 @@ static int export_basis(const char *path, request *wanted) {
                                &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
   } else {
-    result = wanted->page ? write_page(&source, wanted, path) : write_glb(&source, wanted);
+    result = wanted->page             ? write_page(&source, wanted, path)
+             : wanted->inside != NULL ? write_glb_with_inside(&source, wanted)
+                                      : write_glb(&source, wanted);
   }
   supine_export_source_close(&source);
   return result;
@@ -122,8 +163,8 @@ static int export_basis(const char *path, request *wanted) {
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other: .glb */
-  if (wanted->page && wanted->glb_only) {
-    return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
+  if (wanted->page && (wanted->glb_only || wanted->inside != NULL)) {
+    return supine_options_usage(name, "--profile, --quantise, --animate and --inside are for .glb");
   }
   if (!wanted->page && wanted->title != NULL) {
     return supine_options_usage(name, "--title is for .html");
@@ -146,6 +187,7 @@ const supine_command supine_command_export = {
         "Examples:\n"
         "  supine export lungs.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.glb --animate\n"
+        "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.glb\n"
         "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --volume 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

@@ -56,6 +56,13 @@ supine_status supine_export_breath_scale(const export_source *source, const expo
                                          const double g[3], const double *weights, double fraction,
                                          double *scale, supine_error *error);
 
+/** Names of what is inside the lungs, as 'supine embed' wrote them. */
+typedef struct export_parts {
+  size_t count;       /**< names, > 0 */
+  char *const *name;  /**< [count] */
+  const uint32_t *of; /**< [N] which each vertex goes by */
+} export_parts;
+
 /** How to write glTF. Zeros: every mode as a target, float32, no animation. */
 typedef struct export_glb_options {
   bool eight;      /**< at most eight targets, the best there are */
@@ -64,6 +71,9 @@ typedef struct export_glb_options {
   bool animate;    /**< an animation that breathes and turns the patient; clamp-safe too, because
                       there are engines whose animations know no other weights */
   export_breath breath;
+  const export_source *inside; /**< content of the same lungs, of kind vector, with their modes: a
+                                    second mesh, seen through them; NULL: none */
+  const export_parts *parts;   /**< with it */
 } export_glb_options;
 
 /** What was written. */
@@ -81,8 +91,9 @@ typedef struct export_glb_report {
  * with modes, offset, unit and the volume forms that give s in the mesh's `extras`, and vertices
  * in the basis' order. Each lung is a primitive of its own material, named for it. Targets hold
  * normals as well: the linear change with the weights that fits the surface's own best, over
- * breaths up to `breath` in all postures. The node turns and scales millimetres LPS to glTF's
- * metres, y up.
+ * breaths up to `breath` in all postures. What is inside is a mesh of the same targets, each part a
+ * primitive of a material of its name; points are balls of 4 mm. The node turns and scales
+ * millimetres LPS to glTF's metres, y up.
  * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */

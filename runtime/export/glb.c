@@ -22,22 +22,9 @@ typedef struct glb {
   uint32_t *corners;  /* [M, 3], lung by lung */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1];
   int16_t *short4; /* [N, 4], where quantised */
+  glb_inside inside;
   glb_plan plan;
 } glb;
-
-/* Bounds of `count` points, as they will stand in the file. */
-static void find_bounds(const float *xyz, size_t count, bool rounded, double low[3],
-                        double high[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    low[axis] = INFINITY;
-    high[axis] = -INFINITY;
-    for (size_t i = 0; i < count; ++i) {
-      const double x = (double)xyz[3 * i + axis];
-      low[axis] = fmin(low[axis], rounded ? rint(x) : x);
-      high[axis] = fmax(high[axis], rounded ? rint(x) : x);
-    }
-  }
-}
 
 /* Triangles in the order of their lungs. */
 static void group_triangles(glb *g) {
@@ -82,7 +69,7 @@ static json_t *plan_mesh(glb *g) {
                                      GLTF_INDICES, 1, NULL, NULL);
   }
   supine_export_targets_base(g->source, &g->targets, g->xyz);
-  find_bounds(g->xyz, n, false, low, high);
+  supine_export_glb_bounds(g->xyz, n, false, low, high);
   const json_int_t base = (json_int_t)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n,
                                                                  GLTF_VERTICES, 3, low, high);
   (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
@@ -90,7 +77,7 @@ static json_t *plan_mesh(glb *g) {
   json_t *weights = json_array();
   for (size_t j = 0; j < g->targets.count; ++j) {
     supine_export_targets_fill(g->source, &g->targets, j, g->xyz);
-    find_bounds(g->xyz, n, g->options->quantise, low, high);
+    supine_export_glb_bounds(g->xyz, n, g->options->quantise, low, high);
     const json_int_t at = (json_int_t)supine_export_glb_plan_add(&g->plan, type, "VEC3", n,
                                                                  GLTF_VERTICES, 3, low, high);
     (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
@@ -110,16 +97,20 @@ static json_t *plan_mesh(glb *g) {
                    weights, "extras", supine_export_glb_extras(g->source, g->options, &g->targets));
 }
 
-/* A material for each lung, by its name. */
-static json_t *materials(const export_source *source) {
+/* A material for each lung, by its name; seen through where something is inside. */
+static json_t *materials(const export_source *source, bool inside) {
+  const double alpha = inside ? 0.3 : 1.0;
   json_t *names = lung_names(source);
   json_t *list = json_array();
   for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
     (void)json_array_append_new(list, json_pack("{s:O, s:{s:[f,f,f,f], s:f, s:f}, s:b}", "name",
                                                 json_array_get(names, lung), "pbrMetallicRoughness",
-                                                "baseColorFactor", 0.80, 0.45, 0.42, 1.0,
+                                                "baseColorFactor", 0.80, 0.45, 0.42, alpha,
                                                 "metallicFactor", 0.0, "roughnessFactor", 0.55,
                                                 "doubleSided", 1));
+    if (alpha < 1.0) {
+      (void)json_object_set_new(json_array_get(list, lung), "alphaMode", json_string("BLEND"));
+    }
   }
   json_decref(names);
   return list;
@@ -134,15 +125,40 @@ static json_t *nodes(const glb *g) {
                    "scale", metres, metres, metres);
 }
 
+/* A second mesh at node 2, beside the lungs', with their weights. */
+static void add_inside(glb *g, json_t *root) {
+  json_t *lungs = json_array_get(json_object_get(root, "meshes"), 0);
+  json_t *node = json_deep_copy(json_array_get(json_object_get(root, "nodes"), 1));
+  json_t *list = json_object_get(root, "materials");
+  json_t *mesh = supine_export_glb_inside_plan(&g->inside, &g->targets,
+                                               (json_int_t)g->source->info->lung_count, &g->plan);
+  json_t *more = supine_export_glb_inside_materials(&g->inside);
+  (void)json_object_set(mesh, "weights", json_object_get(lungs, "weights"));
+  (void)json_object_set(json_object_get(mesh, "extras"), "targetNames",
+                        json_object_get(json_object_get(lungs, "extras"), "targetNames"));
+  (void)json_array_append_new(json_object_get(root, "meshes"), mesh);
+  (void)json_object_set_new(node, "name", json_string("inside"));
+  (void)json_object_set_new(node, "mesh", json_integer(1));
+  (void)json_array_append_new(json_object_get(root, "nodes"), node);
+  (void)json_array_append_new(
+      json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "children"),
+      json_integer(2));
+  (void)json_array_extend(list, more);
+  json_decref(more);
+}
+
 static json_t *make_json(glb *g) {
   g->plan = (glb_plan){json_array(), json_array(), 0};
   json_t *mesh = plan_mesh(g);
-  json_t *root =
-      json_pack("{s:{s:s, s:s}, s:i, s:[{s:s, s:[i]}], s:o, s:[o], s:o}", "asset", "version", "2.0",
-                "generator", "supine", "scene", 0, "scenes", "name", "lungs", "nodes", 0, "nodes",
-                nodes(g), "meshes", mesh, "materials", materials(g->source));
+  json_t *root = json_pack("{s:{s:s, s:s}, s:i, s:[{s:s, s:[i]}], s:o, s:[o], s:o}", "asset",
+                           "version", "2.0", "generator", "supine", "scene", 0, "scenes", "name",
+                           "lungs", "nodes", 0, "nodes", nodes(g), "meshes", mesh, "materials",
+                           materials(g->source, g->options->inside != NULL));
   if (root == NULL) {
     return NULL;
+  }
+  if (g->options->inside != NULL) {
+    add_inside(g, root);
   }
   if (g->options->quantise) {
     (void)json_object_set_new(root, "extensionsUsed", json_pack("[s]", "KHR_mesh_quantization"));
@@ -150,9 +166,10 @@ static json_t *make_json(glb *g) {
                               json_pack("[s]", "KHR_mesh_quantization"));
   }
   if (g->options->animate) {
-    (void)json_object_set_new(
-        root, "animations",
-        supine_export_glb_animation_plan(&g->animation, g->targets.count, &g->plan));
+    (void)json_object_set_new(root, "animations",
+                              supine_export_glb_animation_plan(&g->animation, g->targets.count,
+                                                               g->options->inside != NULL ? 2 : 1,
+                                                               &g->plan));
   }
   const bool good =
       json_object_set(root, "bufferViews", g->plan.views) == 0 &&
@@ -190,6 +207,9 @@ static void write_numbers(glb *g, FILE *file) {
   (void)fwrite(g->base_normal, 3 * sizeof *g->base_normal, n, file);
   for (size_t j = 0; j < g->targets.count; ++j) {
     write_target(g, j, file);
+  }
+  if (g->options->inside != NULL) {
+    supine_export_glb_inside_write(&g->inside, &g->targets, file);
   }
   if (g->options->animate) {
     const glb_animation *a = &g->animation;
@@ -244,6 +264,9 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
   if (status == SUPINE_OK && options->animate) {
     status = supine_export_glb_animation_make(source, &safe, &g.targets, &g.animation, error);
   }
+  if (status == SUPINE_OK && options->inside != NULL) {
+    status = supine_export_glb_inside_make(options->inside, options->parts, &g.inside, error);
+  }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -282,6 +305,7 @@ cleanup:
   free(g.corners);
   free(g.short4);
   supine_export_glb_animation_free(&g.animation);
+  supine_export_glb_inside_free(&g.inside);
   supine_export_targets_free(&g.targets);
   return status;
 }

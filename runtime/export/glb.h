@@ -25,6 +25,10 @@ typedef struct glb_plan {
 size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
                                   int target, size_t axes, const double *low, const double *high);
 
+/** Bounds of `count` points, as they will stand in the file. */
+void supine_export_glb_bounds(const float *xyz, size_t count, bool rounded, double low[3],
+                              double high[3]);
+
 /** An array of numbers. */
 json_t *supine_export_glb_numbers(const double *values, size_t count);
 
@@ -48,8 +52,33 @@ supine_status supine_export_glb_animation_make(const export_source *source,
                                                glb_animation *animation, supine_error *error);
 void supine_export_glb_animation_free(glb_animation *animation);
 
-/** Plans its three accessors and returns the "animations" array. */
+/** Plans its three accessors and returns the "animations" array; `nodes` 2: node 2 has the same
+ * weights as node 1. */
 json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t targets,
-                                         glb_plan *plan);
+                                         size_t nodes, glb_plan *plan);
+
+/** What is inside the lungs, ready for the file. */
+typedef struct glb_inside {
+  export_source source; /**< the content, with balls for points; what it has is this struct's: */
+  supine_basis_info info;
+  float *vertices, *normals; /**< [N, 3] */
+  float *coefficients;       /**< [N, 3, K] */
+  uint32_t *corners;         /**< [M, 3] part by part */
+  size_t part_count;         /**< primitives */
+  size_t *part_begin;        /**< [part_count + 1] of corners */
+  const export_parts *parts;
+  float *xyz; /**< [N, 3] space */
+} glb_inside;
+
+/** @param inside  zero-initialised
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_export_glb_inside_make(const export_source *content, const export_parts *parts,
+                                            glb_inside *inside, supine_error *error);
+void supine_export_glb_inside_free(glb_inside *inside);
+/** Plans its accessors and returns its mesh, without weights; materials count from `material`. */
+json_t *supine_export_glb_inside_plan(glb_inside *inside, const export_targets *targets,
+                                      json_int_t material, glb_plan *plan);
+json_t *supine_export_glb_inside_materials(const glb_inside *inside);
+void supine_export_glb_inside_write(glb_inside *inside, const export_targets *targets, FILE *file);
 
 #endif

@@ -86,7 +86,7 @@ void supine_export_glb_animation_free(glb_animation *animation) {
 }
 
 json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t targets,
-                                         glb_plan *plan) {
+                                         size_t nodes, glb_plan *plan) {
   const double first = 0;
   const double last = (double)animation->times[animation->frames - 1];
   const size_t frames = animation->frames;
@@ -96,10 +96,17 @@ json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t 
       plan, GLTF_FLOAT, "SCALAR", frames * targets, GLTF_NO_TARGET, 1, NULL, NULL);
   const json_int_t turns = (json_int_t)supine_export_glb_plan_add(plan, GLTF_FLOAT, "VEC4", frames,
                                                                   GLTF_NO_TARGET, 4, NULL, NULL);
-  return json_pack("[{s:s, s:[{s:I, s:I, s:s}, {s:I, s:I, s:s}], s:[{s:i, s:{s:i, s:s}}, {s:i, "
-                   "s:{s:i, s:s}}]}]",
-                   "name", "breathe and turn", "samplers", "input", times, "output", weights,
-                   "interpolation", "LINEAR", "input", times, "output", turns, "interpolation",
-                   "LINEAR", "channels", "sampler", 0, "target", "node", 1, "path", "weights",
-                   "sampler", 1, "target", "node", 0, "path", "rotation");
+  json_t *list =
+      json_pack("[{s:s, s:[{s:I, s:I, s:s}, {s:I, s:I, s:s}], s:[{s:i, s:{s:i, s:s}}, {s:i, "
+                "s:{s:i, s:s}}]}]",
+                "name", "breathe and turn", "samplers", "input", times, "output", weights,
+                "interpolation", "LINEAR", "input", times, "output", turns, "interpolation",
+                "LINEAR", "channels", "sampler", 0, "target", "node", 1, "path", "weights",
+                "sampler", 1, "target", "node", 0, "path", "rotation");
+  for (int node = 2; node <= (int)nodes; ++node) {
+    (void)json_array_append_new(
+        json_object_get(json_array_get(list, 0), "channels"),
+        json_pack("{s:i, s:{s:i, s:s}}", "sampler", 0, "target", "node", node, "path", "weights"));
+  }
+  return list;
 }

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What a glTF file's buffer will hold, in order. */
+#include <math.h>
+
 #include "runtime/export/glb.h"
 
 enum { SHORT_STRIDE = 8 };
@@ -35,4 +37,17 @@ size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *typ
   (void)json_array_append_new(plan->accessors, accessor);
   plan->bytes += count * size;
   return json_array_size(plan->accessors) - 1;
+}
+
+void supine_export_glb_bounds(const float *xyz, size_t count, bool rounded, double low[3],
+                              double high[3]) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = INFINITY;
+    high[axis] = -INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+      const double x = (double)xyz[3 * i + axis];
+      low[axis] = fmin(low[axis], rounded ? rint(x) : x);
+      high[axis] = fmax(high[axis], rounded ? rint(x) : x);
+    }
+  }
 }

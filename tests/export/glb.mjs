@@ -2,7 +2,7 @@
 // .glb files: Khronos' validator has nothing to say, and three.js, given weights from Y_lm(g) as
 // the file's own extras describe them, makes the positions that the C evaluator makes.
 import assert from 'node:assert/strict';
-import { readFileSync, statSync } from 'node:fs';
+import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import {
   evaluate, folder, largestDistance, load, loadCommon, randomDirections, randomSource, supine,
@@ -169,6 +169,41 @@ async function checkAnimation(basis) {
   }
 }
 
+/** What is inside: its parts have names, lungs are seen through, and each goes where `deform` says. */
+async function checkInside(basis, words, tolerance) {
+  const [points, ball, inside, path, moved] =
+    ['points.csv', 'ball.ply', 'inside.safetensors', 'inside.glb', 'moved.csv'].map((n) => join(folder, n));
+  writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\nfiducial,70,-160,-60\n');
+  supine('phantom', '-o', ball, '--vertices', '100', '--volume', '5000'); // a mesh within the lungs
+  supine('embed', basis, points, ball, '-o', inside);
+  supine('export', basis, '--inside', inside, '-o', path, ...words);
+  await validate(path);
+  const { meshes } = await open(path);
+  const named = Object.fromEntries(meshes.map((m) => [m.material.name, m]));
+  assert.deepEqual(Object.keys(named), ['left', 'right', 'nodule', 'fiducial', 'ball']);
+  assert.ok(named.left.material.transparent && named.left.material.opacity < 0.5);
+  assert.ok(!named.nodule.material.transparent);
+  assert.deepEqual(named.nodule.userData.parts, ['nodule', 'fiducial', 'ball']);
+  const extras = named.left.userData.supine;
+  const all = [named.left, named.nodule];
+  for (const gravity of [[0, -1, 0], [0.6, 0, -0.8]]) {
+    supine('deform', inside, '--gravity', gravity.join(','), '--volume', '300', '-o', moved);
+    const rows = readFileSync(moved, 'utf8').trim().split('\n').slice(1).map((row) => row.split(','));
+    const { weights } = weightsFor(extras, gravity, 300);
+    all.forEach((m) => m.morphTargetInfluences.splice(0, weights.length, ...weights));
+    const xyz = morphed(named.nodule);
+    for (const part of ['nodule', 'fiducial', 'ball']) {
+      const corners = new Set(named[part].geometry.index.array);
+      const mean = (at) => at.map((p) => p / at.length).reduce((a, b) => a + b, 0);
+      const truth = rows.filter((row) => row[0] === part);
+      for (let k = 0; k < 3; ++k) { // a ball's middle is its point
+        const [is, wanted] = [mean([...corners].map((c) => xyz[3 * c + k])), mean(truth.map((row) => +row[2 + k]))];
+        assert.ok(Math.abs(is - wanted) < tolerance, `${part}: ${is} and not ${wanted}`);
+      }
+    }
+  }
+}
+
 const mesh = join(folder, 'lungs.ply');
 const modes = join(folder, 'modes.safetensors');
 const many = join(folder, 'harmonics.safetensors');
@@ -184,3 +219,5 @@ for (const [basis, raw, eight] of [[modes, 4, 4], [many, 16, 8]]) {
   }
 }
 await checkAnimation(modes);
+await checkInside(modes, [], 2 * FLOAT_MM); // the table has three decimals
+await checkInside(modes, ['--quantise', '--animate'], 2 * FLOAT_MM);
