@@ -136,13 +136,28 @@ void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
  */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
+/** Numbers of a whole surface, for VTP's field data. */
+typedef struct supine_mesh_field {
+  const char *name; /**< with its unit: "volume_mL" */
+  size_t count;
+  const double *values; /**< [frames, count]; frames: 1 but in a series */
+} supine_mesh_field;
+
 /** What goes into a file beside the surface itself. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< of the file; AUTO: LPS. Written as its SPACE tag */
   const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
-                            vector and its magnitude (mm) as point data */
+                            vector and its magnitude as point data */
   const char *comment; /**< optional, one line */
   double millimetres_per_unit; /**< of the file; 0: 1. Displacements are in its units as well */
+  /** @{ Of VTP alone, all optional. */
+  const float *normals;            /**< [vertex_count, 3]: its "Normals" */
+  const unsigned char *lung;       /**< [vertex_count] number of each vertex's lung: its "lung" */
+  const supine_mesh_field *fields; /**< [field_count] */
+  size_t field_count;
+  double rounding; /**< mm: lengths are rounded to the next power of two below it, and normals to
+                        1/256, so that they compress; 0: exact */
+  /** @} */
 } supine_mesh_save_options;
 
 /** Writes the surface as the name's ending says: .ply (binary), .obj, .stl (binary), .vtp.
@@ -153,6 +168,29 @@ typedef struct supine_mesh_save_options {
  * @retval SUPINE_ERROR_WRITE     no such folder, no permission, full disk */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
+
+/** Surfaces of one topology over time in one VTP file, as VTK's and ParaView's readers of it know
+ * time: triangles once, every array compressed, displacements without their magnitude. Their time
+ * is the frame's number; seconds and the fields are tables of all frames, "time_s" and as named.
+ * The file appears whole or not at all. */
+typedef struct supine_mesh_series supine_mesh_series;
+
+/** Begins one. Everything given must stay until commit; before each frame the caller changes what
+ * `mesh->vertices` and `options->normals` point to.
+ * @param times  [frames] s
+ * Statuses as supine_mesh_save, and
+ * @retval SUPINE_ERROR_WRITE  the path is a pipe or device: where arrays lie is written last
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
+                                      const supine_mesh_save_options *options, size_t frames,
+                                      const double *times, supine_mesh_series **series,
+                                      supine_error *error);
+/** Adds the next frame. Statuses as supine_mesh_save. */
+supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
+/** Gives the file its name, after all frames. Statuses as supine_mesh_save. */
+supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
+/** Releases; what was not committed is gone. NULL is legal. */
+void supine_mesh_series_close(supine_mesh_series *series);
 
 /** True where `path` has an ending that supine_mesh_save writes. */
 bool supine_mesh_save_supports(const char *path);

@@ -349,6 +349,19 @@ static void test_breathe_series_lists_every_frame_and_its_time(void **state) {
   assert_int_equal(rmdir(series_folder), 0);
 }
 
+/* Said before the work; what then cannot be written ends it. */
+static void test_breathe_very_large_is_said_before(void **state) {
+  (void)state;
+  assert_int_equal(RUN(basis, "--posture", "supine", "--fps", "1000", "--seconds", "200", "-o",
+                       "/nowhere/a.pvd"),
+                   SUPINE_EXIT_OUTPUT);
+  assert_non_null(strstr(text, "/nowhere/a.pvd: 200001 frames of "));
+  assert_non_null(strstr(text, " vertices will take about "));
+  assert_non_null(strstr(text, " GB; --fps or --seconds"));
+  assert_int_equal(RUN(basis, "--posture", "supine", "-o", "/nowhere/a.pvd"), SUPINE_EXIT_OUTPUT);
+  assert_null(strstr(text, " GB; "));
+}
+
 static void test_breathe_folder_in_use_is_left_alone(void **state) {
   (void)state;
   char inside[128];
@@ -491,6 +504,7 @@ int main(void) {
       cmocka_unit_test(test_breathe_one_posture_three_additions_keep_volumes),
       cmocka_unit_test(test_breathe_options_shape_the_breath),
       cmocka_unit_test(test_breathe_series_lists_every_frame_and_its_time),
+      cmocka_unit_test(test_breathe_very_large_is_said_before),
       cmocka_unit_test(test_breathe_folder_in_use_is_left_alone),
       cmocka_unit_test(test_breathe_bad_arguments_are_usage_errors),
       cmocka_unit_test(test_breathe_bad_input_names_the_remedy),

@@ -143,7 +143,8 @@ static supine_status save(const char *path, supine_error *error) {
   return status;
 }
 
-/* Writers take no memory but what opening the output takes; the folder's removal finds leftovers.
+/* Writers take no memory, but VTP's, but what opening the output takes; the folder's removal finds
+ * leftovers.
  */
 static void test_save_each_allocation_failing_memory(void **state) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
@@ -153,11 +154,36 @@ static void test_save_each_allocation_failing_memory(void **state) {
   }
 }
 
+static supine_status save_series(const char *path, supine_error *error) {
+  double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  uint32_t triangles[] = {0, 1, 2};
+  static const double times[1] = {0.0};
+  const supine_mesh mesh = {3, vertices, 1, triangles};
+  supine_mesh_series *series = NULL;
+  supine_status status = supine_mesh_series_open(path, &mesh, NULL, 1, times, &series, error);
+  if (status == SUPINE_OK) {
+    status = supine_mesh_series_add(series, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_mesh_series_commit(series, error);
+  }
+  supine_mesh_series_close(series);
+  assert_int_equal(unlink(path), status == SUPINE_OK ? 0 : -1);
+  return status;
+}
+
+static void test_series_each_allocation_failing_memory(void **state) {
+  char path[256];
+  fail_each(save_series, sample_path(state, "a.vtp", path),
+            5); /* itself, offsets, bytes, packed, sizes */
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_load_each_allocation_failing_memory),
       cmocka_unit_test(test_topology_each_allocation_failing_memory),
       cmocka_unit_test(test_save_each_allocation_failing_memory),
+      cmocka_unit_test(test_series_each_allocation_failing_memory),
   };
   return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
 }

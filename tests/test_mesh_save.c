@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What is saved is read back the same, carries its displacement, and never stands there half. */
+#include <fcntl.h>
 #include <float.h>
 #include <math.h>
 #include <sys/stat.h>
 
 #include "mesh_samples.h"
+#include <zlib.h>
 
 static const char *const endings[] = {"a.ply", "a.obj", "a.stl", "a.VTP"};
 
@@ -173,6 +175,18 @@ static uint64_t size_at(const unsigned char *bytes) {
   return value;
 }
 
+/* One array in one block: what it holds when decompressed, at most 64 bytes; the next one's place.
+ */
+static const unsigned char *unpack(const unsigned char *at, unsigned char *array, size_t expected) {
+  uLongf size = 64;
+  assert_int_equal(size_at(at), 1);
+  assert_int_equal(size_at(at + 16), expected); /* of the last block, smaller than the others */
+  const size_t packed = size_at(at + 24);
+  assert_int_equal(uncompress(array, &size, at + 32, packed), Z_OK);
+  assert_int_equal(size, expected);
+  return at + 32 + packed;
+}
+
 static void test_save_vtp_layout(void **state) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -194,12 +208,14 @@ static void test_save_vtp_layout(void **state) {
   (void)find(bytes, size, "Name=\"displacement_magnitude\" NumberOfComponents=\"1\"");
   const unsigned char *at =
       (const unsigned char *)find(bytes, size, "<AppendedData encoding=\"raw\">\n_");
+  const unsigned char *begin = at;
   const size_t sizes[5] = {48, 48, 16, 48, 16};
-  const unsigned char *arrays[5];
+  static unsigned char arrays[5][64];
   for (size_t i = 0; i < 5; ++i) {
-    assert_int_equal(size_at(at), sizes[i]);
-    arrays[i] = at + 8;
-    at += 8 + sizes[i];
+    char offset[32];
+    (void)snprintf(offset, sizeof offset, "offset=\"%zu\"", (size_t)(at - begin));
+    (void)find(bytes, size, offset);
+    at = unpack(at, arrays[i], sizes[i]);
   }
   assert_memory_equal(at, "\n</AppendedData>\n</VTKFile>\n", 28);
   assert_true(float_at(arrays[0] + 12) == 120.0F);
@@ -248,6 +264,92 @@ static void test_save_vtp_opens_in_vtk(void **state) {
   assert_int_equal(system(command), 0); /* NOLINT(cert-env33-c) */
   supine_mesh_free(&mesh);
   assert_int_equal(unlink(script), 0);
+  assert_int_equal(unlink(path), 0);
+}
+
+/* A series: refused where it cannot be, gone where it was not committed. */
+static void test_series_statuses(void **state) {
+  static const double times[2] = {0.0, 0.5};
+  supine_mesh mesh = sample_tetrahedron();
+  supine_mesh_series *series = NULL;
+  supine_error error;
+  char path[256];
+  (void)sample_path(state, "a.vtp", path);
+  assert_int_equal(
+      supine_mesh_series_open("/nowhere/a.vtp", &mesh, NULL, 2, times, &series, &error),
+      SUPINE_ERROR_WRITE);
+  assert_null(series);
+  supine_mesh_series_close(NULL);
+
+  assert_int_equal(mkfifo(path, 0600), 0);
+  const int reader = open(path, O_RDONLY | O_NONBLOCK); /* so that a writer need not wait */
+  assert_true(reader >= 0);
+  assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
+                   SUPINE_ERROR_WRITE);
+  assert_non_null(strstr(error.message, "pipe"));
+  assert_int_equal(close(reader), 0);
+  assert_int_equal(unlink(path), 0);
+
+  assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
+                   SUPINE_OK);
+  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
+  mesh.vertices[4] = (double)INFINITY;
+  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "vertex 1"));
+  supine_mesh_series_close(series);
+  assert_int_equal(access(path, F_OK), -1);
+
+  mesh.vertices[4] = 0.0;
+  assert_int_equal(supine_mesh_series_open("/dev/full", &mesh, NULL, 1, times, &series, &error),
+                   SUPINE_OK);
+  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
+  assert_int_equal(supine_mesh_series_commit(series, &error), SUPINE_ERROR_WRITE);
+  supine_mesh_series_close(series);
+  supine_mesh_free(&mesh);
+}
+
+/* Other axes and units turn and scale everything; lengths are on a grid, in the file's units. */
+static void test_save_vtp_axes_units_and_rounding(void **state) {
+  supine_mesh mesh = sample_tetrahedron();
+  double rest[12];
+  memcpy(rest, mesh.vertices, sizeof rest);
+  rest[9] -= 3.0;
+  static const float normals[12] = {1, 0, 0, 0, 0.6F, 0.8F, 0, 0, 1, 0, 0, -1};
+  const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS,
+                                            .millimetres_per_unit = 1000.0,
+                                            .rest = rest,
+                                            .normals = normals,
+                                            .rounding = 1.0 / 256.0};
+  char path[256];
+  save(sample_path(state, "a.vtp", path), &mesh, &options);
+  size_t size = 0;
+  unsigned char *bytes = sample_read(path, &size);
+  (void)find(bytes, size, ">82 65 83 0<");
+  char units[64] = {0};
+  for (const char *c = "1000 mm, mL, s"; *c != '\0'; ++c) {
+    (void)snprintf(units + strlen(units), sizeof units - strlen(units), "%d ", *c);
+  }
+  (void)find(bytes, size, units);
+  const unsigned char *at =
+      (const unsigned char *)find(bytes, size, "<AppendedData encoding=\"raw\">\n_");
+  static const size_t sizes[6] = {48, 48, 16, 48, 16, 48};
+  static unsigned char arrays[6][64];
+  for (size_t i = 0; i < 6; ++i) {
+    at = unpack(at, arrays[i], sizes[i]);
+  }
+  static const double grid = 1.0 / 262144.0; /* m: the power of two below 1/256 mm */
+  for (size_t i = 0; i < 12; ++i) {
+    const double sign = i % 3 == 2 ? 1.0 : -1.0;
+    const double point = (double)float_at(arrays[0] + 4 * i);
+    assert_true(fabs(point - sign * mesh.vertices[i] / 1000.0) <= 0.5 * grid);
+    assert_true(point / grid == rint(point / grid));
+    const double normal = (double)float_at(arrays[5] + 4 * i);
+    assert_true(fabs(normal - sign * (double)normals[i]) <= 1.0 / 512.0);
+  }
+  assert_true(fabs((double)float_at(arrays[3] + 36) + 0.003) <= 0.5 * grid);
+  assert_true(fabs((double)float_at(arrays[4] + 12) - 0.003) <= grid);
+  free(bytes);
+  supine_mesh_free(&mesh);
   assert_int_equal(unlink(path), 0);
 }
 
@@ -347,6 +449,8 @@ int main(void) {
       cmocka_unit_test(test_save_stl_layout_and_normals),
       cmocka_unit_test(test_save_vtp_layout),
       cmocka_unit_test(test_save_vtp_opens_in_vtk),
+      cmocka_unit_test(test_save_vtp_axes_units_and_rounding),
+      cmocka_unit_test(test_series_statuses),
       cmocka_unit_test(test_save_unknown_ending_argument),
       cmocka_unit_test(test_save_not_finite_mesh_no_file),
       cmocka_unit_test(test_save_too_large_argument),

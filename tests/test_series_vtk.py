@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A breath as a series for ParaView, read back: the index by an XML parser, each frame by VTK's own
-reader. (VTK itself has no reader for the index; ParaView's is built on the same two.)
+"""A breath as ParaView's readers see it: one file over time, and a file a frame with an index, by VTK's
+own reader, held against the numbers of the same breath as safetensors. (VTK has no reader for the
+index; ParaView's is built on the same two.)
 
     test_series_vtk.py SUPINE
 """
+import json
 import os
 import subprocess
 import sys
@@ -11,44 +13,121 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 
 try:
+    import numpy as np
     import vtk
+    from vtkmodules.util.numpy_support import vtk_to_numpy
 except ImportError:
-    print("skipped: this python has no vtk")
+    print("skipped: this python has no vtk, or no numpy")
     sys.exit(77)
 
 supine = sys.argv[1]
-with tempfile.TemporaryDirectory() as folder:
-    def run(*arguments):
-        subprocess.run([supine, *arguments], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+HALF_STEP = 1 / 512  # mm: lengths are rounded to 1/256
 
-    run("phantom", "-o", "lungs.ply", "--vertices", "500")
-    run("precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
-    run("breathe", "lungs.safetensors", "--turn", "supine:left:1s", "--fps", "5", "-o", "breath.pvd")
 
-    def read(path):
-        reader = vtk.vtkXMLPolyDataReader()
-        reader.SetFileName(path)
+def read(path, step=None):
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(path)
+    reader.UpdateInformation()
+    if step is None:
         reader.Update()
-        return reader.GetOutput()
+    else:
+        reader.UpdateTimeStep(step)
+    assert reader.GetErrorCode() == 0
+    return reader.GetNumberOfTimeSteps(), reader.GetOutput()
 
-    index = ElementTree.parse(os.path.join(folder, "breath.pvd")).getroot()
+
+def normals_of(points, triangles):
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    normals = np.zeros_like(points)
+    for i in range(3):
+        np.add.at(normals, triangles[:, i], np.cross(b - a, c - a))
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def check_surface(surface, points, triangles, rest, lung):
+    """Every array of a frame, but for its numbers."""
+    data = surface.GetPointData()
+    found = vtk_to_numpy(surface.GetPoints().GetData())
+    assert np.abs(found - points).max() <= HALF_STEP * 1.01
+    assert (vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3) == triangles).all()
+    moved = vtk_to_numpy(data.GetArray("displacement"))
+    assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01
+    normals = vtk_to_numpy(data.GetNormals()).astype(float)
+    assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
+    cosine = (normals * normals_of(points, triangles)).sum(1) / np.linalg.norm(normals, axis=1)
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # a grid of 1/256 turns by 0.2
+    assert (vtk_to_numpy(data.GetArray("lung")) == lung).all()
+    fields = surface.GetFieldData()
+    assert fields.GetAbstractArray("SPACE").GetValue(0) == "LPS"
+    assert fields.GetAbstractArray("units").GetValue(0) == "mm, mL, s"
+    return fields
+
+
+def tensors(path):
+    with open(path, "rb") as file:
+        raw = file.read()
+    size = int.from_bytes(raw[:8], "little")
+    types = {"F32": np.float32, "F64": np.float64, "U32": np.uint32, "U8": np.uint8}
+    return {name: np.frombuffer(raw[8 + size + t["data_offsets"][0]:8 + size + t["data_offsets"][1]],
+                                types[t["dtype"]]).reshape(t["shape"])
+            for name, t in json.loads(raw[8:8 + size]).items() if t.get("dtype") in types}
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+
+    def run(*arguments):
+        subprocess.run([supine, *arguments], check=True, stdout=subprocess.DEVNULL)
+
+    run("phantom", "-o", "lungs.ply", "--vertices", "5000")
+    run("precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
+    for name in ("breath.vtp", "frames.pvd", "exact.safetensors"):
+        run("breathe", "lungs.safetensors", "--turn", "supine:left:1s", "--fps", "10", "-o", name)
+    basis, exact = tensors("lungs.safetensors"), tensors("exact.safetensors")
+    points, triangles = exact["positions"].astype(float), exact["triangles"]
+    rest, lung = basis["vertices"].astype(float), basis["lung"]
+    frames = len(points)
+    assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # it breathes: mL
+
+    # One file: the triangles once.
+    for step in (0, 7, 3, 10):
+        steps, surface = read("breath.vtp", step)
+        fields = check_surface(surface, points[step], triangles, rest, lung)
+        assert steps == frames
+        for name, wanted in (("time_s", "time"), ("gravity_LPS", "gravity"), ("volume_mL", "volume")):
+            table = vtk_to_numpy(fields.GetArray(name))
+            assert (table == exact[wanted]).all(), name
+    # Of what it took before it was compressed: points, displacement, magnitude, triangles, ends.
+    n, m = len(rest), len(triangles)
+    share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
+    print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
+    assert share <= 0.4  # 0.35 over hundreds of frames: here the triangles still count
+
+    # A file a frame, and the index.
+    index = ElementTree.parse("frames.pvd").getroot()
     assert index.tag == "VTKFile" and index.get("type") == "Collection"
-    frames = index.findall("./Collection/DataSet")
-    times = [float(frame.get("timestep")) for frame in frames]
-    assert len(frames) >= 5 and times == sorted(set(times)), times
-    volumes = []
-    for frame in frames:
-        surface = read(os.path.join(folder, frame.get("file")))
-        assert surface.GetNumberOfPoints() == surface.GetPointData().GetArray("displacement").GetNumberOfTuples()
-        assert surface.GetNumberOfPolys() > 0
-        magnitude = surface.GetPointData().GetArray("displacement_magnitude")
-        vector = surface.GetPointData().GetArray("displacement")
-        for i in range(0, surface.GetNumberOfPoints(), 37):
-            length = sum(x * x for x in vector.GetTuple(i)) ** 0.5
-            assert abs(length - magnitude.GetValue(i)) <= 1e-4 * max(1.0, length)
-        properties = vtk.vtkMassProperties()
-        properties.SetInputData(surface)
-        properties.Update()
-        volumes.append(properties.GetVolume() * 1e-3)
-    assert max(volumes) - volumes[0] > 100.0, volumes  # it breathes: mL, by VTK's own measure
-    print(f"{len(frames)} frames, {volumes[0]:.1f} to {max(volumes):.1f} mL")
+    listed = index.findall("./Collection/DataSet")
+    assert [float(frame.get("timestep")) for frame in listed] == [round(t, 9) for t in exact["time"]]
+    for step, frame in enumerate(listed):
+        _, surface = read(frame.get("file"))
+        fields = check_surface(surface, points[step], triangles, rest, lung)
+        for name, wanted in (("TimeValue", "time"), ("gravity_LPS", "gravity"), ("volume_mL", "volume")):
+            assert (vtk_to_numpy(fields.GetArray(name)).ravel() == exact[wanted][step]).all(), name
+        length = vtk_to_numpy(surface.GetPointData().GetArray("displacement_magnitude"))
+        assert np.abs(length - np.linalg.norm(points[step] - rest, axis=1)).max() <= 3 * HALF_STEP
+
+    # One surface, exactly, in the scan's own axes as well.
+    run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")
+    _, surface = read("prone.vtp")
+    found = vtk_to_numpy(surface.GetPoints().GetData())
+    fields = check_surface(surface, found.astype(float), triangles, rest, lung)
+    assert fields.GetArray("gravity_LPS").GetTuple(0) == (0, -1, 0)
+    measured = vtk.vtkMassProperties()
+    measured.SetInputData(surface)
+    measured.Update()
+    whole = measured.GetVolume() / 1000 - sum(fields.GetArray("volume_mL").GetTuple(0))
+    run("deform", "lungs.safetensors", "--posture", "prone", "--volume", "full", "-o", "full.vtp")
+    measured.SetInputData(read("full.vtp")[1])
+    measured.Update()
+    assert abs(measured.GetVolume() / 1000 - whole) < 0.05, whole  # mL
+    print("every array as it was computed")

@@ -10,16 +10,29 @@
 
 #include "mesh/save/save.h"
 
-typedef void save_function(const mesh_writer *writer);
+typedef supine_status save_function(const mesh_writer *writer);
+
+static supine_status save_ply(const mesh_writer *writer) {
+  supine_mesh_save_ply(writer);
+  return SUPINE_OK;
+}
+
+static supine_status save_obj(const mesh_writer *writer) {
+  supine_mesh_save_obj(writer);
+  return SUPINE_OK;
+}
+
+static supine_status save_stl(const mesh_writer *writer) {
+  supine_mesh_save_stl(writer);
+  return SUPINE_OK;
+}
 
 static save_function *find_function(const char *path) {
   static const struct {
     const char *ending;
     save_function *function;
-  } known[] = {{".ply", supine_mesh_save_ply},
-               {".obj", supine_mesh_save_obj},
-               {".stl", supine_mesh_save_stl},
-               {".vtp", supine_mesh_save_vtp}};
+  } known[] = {
+      {".ply", save_ply}, {".obj", save_obj}, {".stl", save_stl}, {".vtp", supine_mesh_save_vtp}};
   const size_t length = strlen(path);
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const size_t ending = strlen(known[i].ending);
@@ -39,7 +52,8 @@ static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
 
-static supine_status check(const char *path, const supine_mesh *mesh, supine_error *error) {
+supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
+                                       supine_error *error) {
   if (mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: too large to write: %zu vertices, %zu triangles", path,
@@ -67,6 +81,27 @@ static void copy_comment(const char *comment, char *line, size_t size) {
   line[length] = '\0';
 }
 
+void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
+                              mesh_writer *writer) {
+  const supine_mesh_save_options chosen =
+      options == NULL ? (supine_mesh_save_options){0} : *options;
+  const bool ras = chosen.axes == SUPINE_AXES_RAS;
+  const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
+  const double horizontal = (ras ? -1.0 : 1.0) / unit;
+  *writer = (mesh_writer){.mesh = mesh,
+                          .rest = chosen.rest,
+                          .normals = chosen.normals,
+                          .lung = chosen.lung,
+                          .fields = chosen.fields,
+                          .field_count = chosen.field_count,
+                          .factor = {horizontal, horizontal, 1.0 / unit},
+                          .space = ras ? "RAS" : "LPS"};
+  if (chosen.rounding > 0.0) {
+    writer->quantum = exp2(floor(log2(chosen.rounding / unit)));
+  }
+  copy_comment(chosen.comment, writer->comment, sizeof writer->comment);
+}
+
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error) {
   save_function *function = find_function(path);
@@ -74,13 +109,8 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: unknown ending; end the name in .ply, .obj, .stl or .vtp", path);
   }
-  const supine_mesh_save_options chosen =
-      options == NULL ? (supine_mesh_save_options){0} : *options;
-  const bool ras = chosen.axes == SUPINE_AXES_RAS;
-  const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
-  const double horizontal = (ras ? -1.0 : 1.0) / unit;
   supine_output output;
-  supine_status status = check(path, mesh, error);
+  supine_status status = supine_mesh_writer_check(path, mesh, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -88,19 +118,35 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   if (status != SUPINE_OK) {
     return status;
   }
-  mesh_writer writer = {.out = output.file,
-                        .mesh = mesh,
-                        .rest = chosen.rest,
-                        .factor = {horizontal, horizontal, 1.0 / unit},
-                        .space = ras ? "RAS" : "LPS"};
-  copy_comment(chosen.comment, writer.comment, sizeof writer.comment);
-  function(&writer);
+  mesh_writer writer;
+  supine_mesh_writer_begin(mesh, options, &writer);
+  writer.out = output.file;
+  status = function(&writer);
+  if (status != SUPINE_OK) {
+    supine_output_abandon(&output);
+    return supine_error_set(error, status, "%s: out of memory", path);
+  }
   return supine_output_commit(&output, error);
+}
+
+/* To the writer's grid, where it has one. */
+static double rounded(const mesh_writer *writer, double length) {
+  return writer->quantum > 0.0 ? rint(length / writer->quantum) * writer->quantum : length;
+}
+
+void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
+  static const double steps = 256.0; /* a grid for normals, where lengths have one: 0.1 degrees */
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double turned = copysign((double)writer->normals[3 * i + axis],
+                                   (double)writer->normals[3 * i + axis] * writer->factor[axis]);
+    normal[axis] = (float)((writer->quantum > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
+  }
 }
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
   for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
-    position[axis] = (float)(writer->factor[axis] * writer->mesh->vertices[3 * i + axis] + 0.0);
+    position[axis] =
+        (float)(rounded(writer, writer->factor[axis] * writer->mesh->vertices[3 * i + axis]) + 0.0);
   }
 }
 
@@ -108,11 +154,11 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double d = writer->mesh->vertices[3 * i + axis] - writer->rest[3 * i + axis];
-    const double scaled = writer->factor[axis] * d;
+    const double scaled = rounded(writer, writer->factor[axis] * d);
     displacement[axis] = (float)(scaled + 0.0);
     square += scaled * scaled;
   }
-  displacement[3] = (float)sqrt(square);
+  displacement[3] = (float)rounded(writer, sqrt(square));
 }
 
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {

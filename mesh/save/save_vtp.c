@@ -1,123 +1,131 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* VTK XML PolyData with its arrays appended raw, each behind its size in bytes as a UInt64. */
+/* VTK XML PolyData: what surrounds the arrays, and one surface as a whole. */
+#include <stdlib.h>
 #include <string.h>
 
-#include "mesh/save/save.h"
+#include "mesh/save/vtp.h"
 
-/* One array's place in the file. */
-typedef struct vtp_array {
-  const char *type;
-  const char *name;
-  unsigned components;
-  size_t bytes;
-} vtp_array;
-
-static void write_array(FILE *out, const vtp_array *array, size_t *offset) {
-  (void)fprintf(out,
-                "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%u\" format=\"appended\" "
-                "offset=\"%zu\"/>\n",
-                array->type, array->name, array->components, *offset);
-  *offset += 8 + array->bytes;
+/* An element whose length does not depend on where its array lies. */
+static void write_array(const vtp *file, size_t number, FILE *out) {
+  const vtp_array *array = &file->arrays[number];
+  for (size_t frame = 0; frame < file->frames; ++frame) {
+    char offset[32];
+    const int length =
+        snprintf(offset, sizeof offset, "%llu\"",
+                 (unsigned long long)file->offsets[frame * file->array_count + number]);
+    (void)fprintf(out, "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%u\"", array->type,
+                  array->name, array->components);
+    if (file->times != NULL) {
+      (void)fprintf(out, " TimeStep=\"%zu\"", frame);
+    }
+    (void)fprintf(out, " format=\"appended\" offset=\"%s%*s/>\n", offset, 21 - length, "");
+  }
 }
 
-static void write_size(FILE *out, size_t bytes) {
-  const uint32_t halves[2] = {(uint32_t)bytes, (uint32_t)((uint64_t)bytes >> 32)};
-  unsigned char size[8];
-  unsigned char *at = size;
-  supine_mesh_put_u32(&at, halves, 2);
-  (void)fwrite(size, 1, sizeof size, out);
-}
-
-static void write_f32(FILE *out, const float *values, size_t count) {
-  unsigned char bytes[4 * sizeof(float)];
-  unsigned char *at = bytes;
-  supine_mesh_put_f32(&at, values, count);
-  (void)fwrite(bytes, 1, (size_t)(at - bytes), out);
-}
-
-/* 3D Slicer looks for the axes in this array; a reader of text, in the comment. "--" may not stand
- * in an XML comment. */
-static void write_notes(const mesh_writer *writer) {
-  (void)fprintf(writer->out, "<!-- SPACE=%s mm ", writer->space);
+/* 3D Slicer looks for the axes in the array SPACE; a reader of text, in the comment. "--" may not
+ * stand in an XML comment. */
+static void write_notes(const mesh_writer *writer, FILE *out) {
+  (void)fprintf(out, "<!-- SPACE=%s mm ", writer->space);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
-    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', writer->out); /* may be cut in a letter */
+    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* may be cut in a letter */
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
-      (void)fputc(' ', writer->out);
+      (void)fputc(' ', out);
     }
   }
-  (void)fputs(" -->\n", writer->out);
+  (void)fputs(" -->\n", out);
 }
 
-static void write_head(const mesh_writer *writer, const vtp_array *arrays, size_t point_arrays) {
-  FILE *out = writer->out;
-  size_t offset = 0;
-  (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", out);
-  write_notes(writer);
+static void write_text(const char *name, const char *text, FILE *out) {
+  (void)fprintf(out, "<Array type=\"String\" Name=\"%s\" NumberOfTuples=\"1\" format=\"ascii\">",
+                name);
+  for (; *text != '\0'; ++text) {
+    (void)fprintf(out, "%d ", *text);
+  }
+  (void)fputs("0</Array>\n", out);
+}
+
+/* Of all frames, one tuple each. */
+static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE *out) {
   (void)fprintf(out,
-                "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
-                "header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n"
-                "<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">"
-                "%d %d %d 0</Array>\n</FieldData>\n"
+                "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"%zu\" "
+                "NumberOfTuples=\"%zu\" format=\"ascii\">",
+                field->name, field->count, file->frames);
+  for (size_t i = 0; i < file->frames * field->count; ++i) {
+    (void)fprintf(out, "%s%.17g", i > 0 ? " " : "", field->values[i]);
+  }
+  (void)fputs("</DataArray>\n", out);
+}
+
+static void write_field_data(const vtp *file, FILE *out) {
+  const mesh_writer *writer = &file->writer;
+  char units[64];
+  const double unit = 1.0 / writer->factor[2];
+  (void)snprintf(units, sizeof units, unit == 1.0 ? "mm, mL, s" : "%g mm, mL, s", unit);
+  (void)fputs("<FieldData>\n", out);
+  write_text("SPACE", writer->space, out);
+  write_text("units", units, out);
+  if (file->times != NULL) { /* "TimeValue" would be taken for that of the one frame there is */
+    write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
+  }
+  for (size_t i = 0; i < writer->field_count; ++i) {
+    write_numbers(file, &writer->fields[i], out);
+  }
+  (void)fputs("</FieldData>\n", out);
+}
+
+void supine_mesh_vtp_head(const vtp *file, FILE *out) {
+  const mesh_writer *writer = &file->writer;
+  (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", out);
+  write_notes(writer, out);
+  (void)fputs("<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+              "header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<PolyData",
+              out);
+  for (size_t frame = 0; file->times != NULL && frame < file->frames; ++frame) {
+    (void)fprintf(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ", file->times[frame],
+                  frame + 1 == file->frames ? "\"" : "");
+  }
+  (void)fputs(">\n", out);
+  write_field_data(file, out);
+  (void)fprintf(out,
                 "<Piece NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
                 "NumberOfStrips=\"0\" NumberOfPolys=\"%zu\">\n<Points>\n",
-                writer->space[0], writer->space[1], writer->space[2], writer->mesh->vertex_count,
-                writer->mesh->triangle_count);
-  write_array(out, &arrays[0], &offset);
+                writer->mesh->vertex_count, writer->mesh->triangle_count);
+  write_array(file, 0, out);
   (void)fputs("</Points>\n<Polys>\n", out);
-  write_array(out, &arrays[1], &offset);
-  write_array(out, &arrays[2], &offset);
-  (void)fputs("</Polys>\n<PointData>\n", out);
-  for (size_t i = 0; i < point_arrays; ++i) {
-    write_array(out, &arrays[3 + i], &offset);
+  write_array(file, 1, out);
+  write_array(file, 2, out);
+  (void)fprintf(out, "</Polys>\n<PointData%s>\n",
+                writer->normals != NULL ? " Normals=\"Normals\"" : "");
+  for (size_t i = VTP_FIRST_OF_POINTS; i < file->array_count; ++i) {
+    write_array(file, i, out);
   }
   (void)fputs("</PointData>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_", out);
 }
 
-void supine_mesh_save_vtp(const mesh_writer *writer) {
-  const supine_mesh *mesh = writer->mesh;
-  const size_t points = mesh->vertex_count;
-  const size_t triangles = mesh->triangle_count;
-  const vtp_array arrays[] = {{"Float32", "Points", 3, 12 * points},
-                              {"Int32", "connectivity", 1, 12 * triangles},
-                              {"Int32", "offsets", 1, 4 * triangles},
-                              {"Float32", "displacement", 3, 12 * points},
-                              {"Float32", "displacement_magnitude", 1, 4 * points}};
-  FILE *out = writer->out;
-  write_head(writer, arrays, writer->rest != NULL ? 2 : 0);
-
-  write_size(out, arrays[0].bytes);
-  for (size_t i = 0; i < points; ++i) {
-    float position[3];
-    supine_mesh_writer_position(writer, i, position);
-    write_f32(out, position, 3);
-  }
-  write_size(out, arrays[1].bytes);
-  for (size_t t = 0; t < triangles; ++t) {
-    unsigned char bytes[12];
-    unsigned char *at = bytes;
-    supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
-    (void)fwrite(bytes, 1, sizeof bytes, out);
-  }
-  write_size(out, arrays[2].bytes);
-  for (size_t t = 0; t < triangles; ++t) {
-    const uint32_t stop = (uint32_t)(3 * (t + 1));
-    unsigned char bytes[4];
-    unsigned char *at = bytes;
-    supine_mesh_put_u32(&at, &stop, 1);
-    (void)fwrite(bytes, 1, sizeof bytes, out);
-  }
-  float displacement[4];
-  if (writer->rest != NULL) {
-    write_size(out, arrays[3].bytes);
-    for (size_t i = 0; i < points; ++i) {
-      supine_mesh_writer_displacement(writer, i, displacement);
-      write_f32(out, displacement, 3);
-    }
-    write_size(out, arrays[4].bytes);
-    for (size_t i = 0; i < points; ++i) {
-      supine_mesh_writer_displacement(writer, i, displacement);
-      write_f32(out, displacement + 3, 1);
-    }
-  }
+void supine_mesh_vtp_foot(FILE *out) {
   (void)fputs("\n</AppendedData>\n</VTKFile>\n", out);
+}
+
+/* The arrays into memory first, as their places come before them. */
+supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
+  vtp file = {.writer = *writer, .frames = 1};
+  char *bytes = NULL;
+  size_t size = 0;
+  supine_status status = supine_mesh_vtp_begin(&file);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  FILE *memory = open_memstream(&bytes, &size);
+  status = memory == NULL ? SUPINE_ERROR_MEMORY : supine_mesh_vtp_frame(&file, memory);
+  if (memory != NULL && fclose(memory) != 0) {
+    status = SUPINE_ERROR_MEMORY;
+  }
+  if (status == SUPINE_OK) {
+    supine_mesh_vtp_head(&file, writer->out);
+    (void)fwrite(bytes, 1, size, writer->out);
+    supine_mesh_vtp_foot(writer->out);
+  }
+  free(bytes);
+  supine_mesh_vtp_end(&file);
+  return status;
 }

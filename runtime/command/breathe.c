@@ -56,7 +56,11 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as sup
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.pvd: that file, and a folder NAME of VTP files, for ParaView; NAME.safetensors: one "
+     "NAME.vtp: one file for ParaView, the triangles once, whose time is the frame's number; "
+     "NAME.pvd: "
+     "time in seconds, and a folder NAME with a VTP file a frame, half as large again. Both to "
+     "1/256 "
+     "mm, with normals, lungs, gravity and volumes. NAME.safetensors: one "
      "file with positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; "
      "anything else: a folder with breath.pvd and the VTP files. A folder must be new or empty",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
@@ -223,6 +227,19 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
+/* Before the work, of what few would want by accident. */
+static void warn_of_size(const request *wanted, const breath_content *content) {
+  static const double large = 2e9; /* bytes */
+  const double bytes = supine_command_breath_output_size(wanted->path, content);
+  if (bytes >= large) {
+    supine_options_say(name,
+                       "%s: %zu frames of %zu vertices will take about %.1f GB; --fps or --seconds "
+                       "make them fewer",
+                       wanted->path, content->course->count, content->rest->vertex_count,
+                       1e-9 * bytes);
+  }
+}
+
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
                           supine_error *error) {
@@ -262,15 +279,21 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    status = supine_command_breath_output_open(wanted->path, &rest, frame, &course, &output, error);
+    const breath_content content = {.basis = basis,
+                                    .rest = &rest,
+                                    .frame = frame,
+                                    .course = &course,
+                                    .volumes = supine_breath_frames_volumes(frames),
+                                    .made_by = made_by};
+    warn_of_size(wanted, &content);
+    status = supine_command_breath_output_open(wanted->path, &content, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   status = play_frames(&course, frames, output, &measured, xyz, seconds, error);
   if (status == SUPINE_OK) {
-    status = supine_command_breath_output_commit(output, supine_breath_frames_volumes(frames),
-                                                 made_by, error);
+    status = supine_command_breath_output_commit(output, error);
   }
   if (status == SUPINE_OK) {
     report(wanted, &course, frames, &measured, seconds);
@@ -332,8 +355,8 @@ const supine_command supine_command_breathe = {
         "display that must not wait.",
     .options = table,
     .notes = "Examples:\n"
-             "  supine breathe lungs.safetensors --posture prone -o prone.pvd\n"
-             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.pvd\n"
+             "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
+             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
              "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

@@ -37,15 +37,19 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Positions at the given scales as doubles, for measuring and saving. */
+/* Positions at the given scales as doubles, for measuring and saving; normals [N, 3] where they are
+ * not NULL. */
 static supine_status deformed_mesh(const supine_basis *basis, const double *weights,
-                                   const double *scales, supine_mesh *mesh) {
+                                   const double *scales, supine_mesh *mesh, float *normals) {
   const size_t n = mesh->vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
   if (xyz == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_deform(basis, weights, scales, xyz);
+  if (normals != NULL) {
+    supine_normals(basis, xyz, normals);
+  }
   for (size_t i = 0; i < 3 * n; ++i) {
     mesh->vertices[i] = (double)xyz[i];
   }
@@ -75,7 +79,7 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
     scales[j] = 1.0;
   }
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  if (deformed_mesh(basis, weights, scales, mesh) != SUPINE_OK) {
+  if (deformed_mesh(basis, weights, scales, mesh, NULL) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   const double largest = largest_displacement(rest, mesh);
@@ -96,6 +100,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   double scales[SUPINE_LUNGS_MAX];
   supine_mesh rest = {0};
   supine_mesh mesh = {0};
+  float *normals = NULL;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   int result = SUPINE_EXIT_OK;
   if (supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
@@ -117,10 +122,22 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
-  if (deformed_mesh(basis, weights, scales, &mesh) != SUPINE_OK) {
+  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
+  double volumes[SUPINE_LUNGS_MAX];
+  const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
+                                      {"volume_mL", info->lung_count, volumes}};
+  for (size_t i = 0; info->has_volume && i < info->lung_count; ++i) {
+    volumes[i] = supine_basis_lung_volume(basis, i, weights, scales[i]);
+  }
+  normals = malloc(3 * mesh.vertex_count * sizeof *normals);
+  if (normals == NULL || deformed_mesh(basis, weights, scales, &mesh, normals) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
+  save.normals = mesh.triangle_count > 0 ? normals : NULL; /* points inside have none */
+  save.lung = lung == NULL ? NULL : lung->data;
+  save.fields = fields;
+  save.field_count = info->has_volume ? 2 : 1;
   const double largest = largest_displacement(&rest, &mesh);
   const double gained = 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest));
   if (supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
@@ -138,6 +155,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
 cleanup:
   supine_mesh_free(&rest);
   supine_mesh_free(&mesh);
+  free(normals);
   return result;
 }
 

@@ -57,6 +57,13 @@ static ssize_t stream_write(void *cookie, const char *bytes, size_t size) {
   return done == size ? (ssize_t)size : 0;
 }
 
+static int stream_seek(void *cookie, off64_t *offset, int from) {
+  const struct supine_output_stream *stream = cookie;
+  const off64_t at = lseek(stream->descriptor, *offset, from);
+  *offset = at;
+  return at < 0 ? -1 : 0;
+}
+
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
   const int code = errno;
   (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", output->path, what,
@@ -184,7 +191,8 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   if (output->stream->descriptor < 0) {
     return output_fail(output, error, "cannot write");
   }
-  output->file = fopencookie(output->stream, "wb", (cookie_io_functions_t){.write = stream_write});
+  output->file = fopencookie(output->stream, "wb",
+                             (cookie_io_functions_t){.write = stream_write, .seek = stream_seek});
   if (output->file == NULL || setvbuf(output->file, NULL, _IOFBF, BUFFER) != 0) {
     supine_output_abandon(output);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);

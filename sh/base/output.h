@@ -16,8 +16,8 @@
 extern "C" {
 #endif
 
-/** A file on its way. Write to `file` with stdio, in order; errors may be left for commit to find.
- */
+/** A file on its way. Write to `file` with stdio, which can seek but in a pipe or device; errors
+ * may be left for commit to find. */
 typedef struct supine_output {
   FILE *file;
   char *path;      /**< as the user wrote it */
