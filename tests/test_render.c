@@ -223,6 +223,49 @@ static void test_draw_puts_the_head_on_top(void **state) {
   unmake(&m);
 }
 
+/* Vertices at the lungs' outermost places come to lie at the outermost pixels drawn. */
+static void test_project_agrees_with_the_drawing(void **state) {
+  (void)state;
+  static uint32_t pixels[PIXELS];
+  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  const supine_basis_info *info = supine_basis_get_info(m.basis);
+  const double weights[5] = {0};
+  const double scales[2] = {1, 1};
+  supine_mark *mark = calloc(info->vertex_count, sizeof *mark);
+  double(*at)[2] = calloc(info->vertex_count, sizeof *at);
+  for (size_t i = 0; i < info->vertex_count; ++i) {
+    memcpy(mark[i].xyz, info->vertices + 3 * i, sizeof mark[i].xyz);
+  }
+  const supine_marks marks = {info->vertex_count, mark};
+  for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
+    const supine_scene scene = {
+        .weights = weights, .scales = scales, .view = view, .width = WIDTH, .height = HEIGHT};
+    double is[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+    double drawn[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+    draw(&m, view, weights, 1, pixels);
+    supine_render_project(m.renderer, &scene, &marks, at);
+    for (size_t i = 0; i < info->vertex_count; ++i) {
+      for (int side = 0; side < 2; ++side) {
+        is[2 * side] = fmin(is[2 * side], at[i][side]);
+        is[2 * side + 1] = fmax(is[2 * side + 1], at[i][side]);
+      }
+    }
+    for (size_t i = 0; i < PIXELS; ++i) {
+      const double place[2] = {(double)(i % WIDTH), (double)(i / WIDTH)};
+      for (int side = 0; side < 2 && pixels[i] >> 24 > 127; ++side) {
+        drawn[2 * side] = fmin(drawn[2 * side], place[side]);
+        drawn[2 * side + 1] = fmax(drawn[2 * side + 1], place[side] + 1);
+      }
+    }
+    for (int end = 0; end < 4; ++end) { /* triangles taper to nothing at a corner */
+      assert_true(fabs(is[end] - drawn[end]) < 3);
+    }
+  }
+  free(mark);
+  free(at);
+  unmake(&m);
+}
+
 static void test_draw_same_state_twice_is_equal(void **state) {
   (void)state;
   static uint32_t first[PIXELS];
@@ -338,6 +381,7 @@ int main(void) {
       cmocka_unit_test(test_bar_ends_at_a_round_tick),
       cmocka_unit_test(test_draw_shows_lungs_on_clear_ground),
       cmocka_unit_test(test_draw_puts_the_head_on_top),
+      cmocka_unit_test(test_project_agrees_with_the_drawing),
       cmocka_unit_test(test_draw_same_state_twice_is_equal),
       cmocka_unit_test(test_draw_gpu_displacement_equals_run_time),
       cmocka_unit_test(test_draw_one_lung_leaves_the_other_out),

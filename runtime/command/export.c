@@ -5,7 +5,7 @@
 
 #include <export.h>
 
-#include "runtime/command/names.h"
+#include "runtime/command/inside.h"
 #include "runtime/options/basis_input.h"
 
 static const char name[] = "export";
@@ -104,15 +104,8 @@ static int write_glb_with_inside(const export_source *source, request *wanted) {
   if (status == SUPINE_OK) {
     status = supine_command_names_open(inside.basis, &names, &error);
   }
-  if (status == SUPINE_OK &&
-      (!inside.info->vector || inside.info->mode_count != source->info->mode_count ||
-       inside.terms != source->terms ||
-       memcmp(inside.modes, source->modes,
-              source->info->mode_count * source->terms * sizeof *source->modes) != 0)) {
-    status = supine_error_set(&error, SUPINE_ERROR_FORMAT,
-                              "%s: not of this basis: make it with 'supine embed' from the basis "
-                              "that is exported",
-                              wanted->inside);
+  if (status == SUPINE_OK) {
+    status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, &error);
   }
   int result = SUPINE_EXIT_OK;
   if (status != SUPINE_OK) {

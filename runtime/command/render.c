@@ -7,6 +7,7 @@
 #include "sh/base/output.h"
 #include <supine/compare.h>
 
+#include "runtime/command/inside.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/posture_list.h"
 #include "runtime/options/volume.h"
@@ -20,7 +21,8 @@ typedef struct request {
   supine_volume_options volume;
   const char *reference; /* posture that colours are the difference from, or NULL */
   const char *title;
-  double scale; /* mm, or 0: by volume */
+  const char *inside; /* a file, or NULL */
+  double scale;       /* mm, or 0: by volume */
   double largest;
   size_t width, height;
   supine_view view[SUPINE_VIEWS_MAX];
@@ -34,6 +36,7 @@ typedef struct state {
   double scales[SUPINE_LUNGS_MAX];
   float *value; /* [N] */
   char subtitle[96];
+  supine_command_marks marks;
 } state;
 
 static int find_state(const supine_basis *basis, const supine_compare *compare,
@@ -133,7 +136,8 @@ static int draw(const supine_basis *basis, const request *wanted, supine_rendere
                               .subtitle = states[i].subtitle,
                               .weights = states[i].weights,
                               .scales = states[i].scales,
-                              .value = states[i].value};
+                              .value = states[i].value,
+                              .marks = wanted->inside != NULL ? &states[i].marks.marks : NULL};
     memcpy(panel[i].gravity, postures->item[i].gravity, sizeof panel[i].gravity);
   }
   (void)snprintf(label, sizeof label, "%s%s, mm",
@@ -155,6 +159,25 @@ static int draw(const supine_basis *basis, const request *wanted, supine_rendere
   picture.beyond = ends[1] > picture.largest;
   choose_size(wanted, &picture);
   return write_picture(wanted, renderer, &picture);
+}
+
+/* What is inside, in each state. */
+static supine_status find_marks(const supine_basis *basis, const char *path, state *states,
+                                size_t count, const state *reference, supine_error *error) {
+  supine_basis *inside = NULL;
+  supine_command_names names = {0};
+  supine_status status = supine_basis_open(path, &inside, error);
+  status = status == SUPINE_OK ? supine_command_names_open(inside, &names, error) : status;
+  status = status == SUPINE_OK ? supine_command_inside_check(basis, inside, path, error) : status;
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    status = supine_command_marks_make(inside, &names, states[i].weights, states[i].scales,
+                                       reference != NULL ? reference->weights : NULL,
+                                       reference != NULL ? reference->scales : NULL,
+                                       &states[i].marks, error);
+  }
+  supine_command_names_close(&names);
+  supine_basis_close(inside);
+  return status;
 }
 
 static int render(const supine_basis *basis, const request *wanted,
@@ -188,11 +211,20 @@ static int render(const supine_basis *basis, const request *wanted,
     find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &ends[0],
                &ends[1]);
   }
+  if (wanted->inside != NULL &&
+      find_marks(basis, wanted->inside, states, count, reference != NULL ? &states[count] : NULL,
+                 &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
   result = draw(basis, wanted, renderer, postures, reference != NULL ? reference->name : NULL,
                 states, ends);
 cleanup:
   supine_render_destroy(renderer);
   supine_compare_destroy(compare);
+  for (size_t i = 0; states != NULL && i < count; ++i) {
+    supine_command_marks_free(&states[i].marks);
+  }
   free(states);
   free(values);
   return result;
@@ -285,6 +317,10 @@ static const supine_option table[] = {
      "end of the colour bar; default: what 95 % of the surface does not exceed, rounded up; a "
      "pointed end says that some values lie beyond",
      SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0"},
+    {"inside", 0, "FILE",
+     "what is inside, of 'supine embed' from the same basis, seen through the lungs: points and "
+     "meshes by name, with how far they have moved",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
      .standard = "light"},
     {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title)},
@@ -346,11 +382,15 @@ const supine_command supine_command_render = {
         "right, anterior, posterior, head, feet) and where gravity points (the arrow; a cross "
         "points away from you).",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine render lungs.safetensors --posture supine,prone,left,right -o "
-             "postures.png\n"
-             "  supine render lungs.safetensors --posture prone --colour difference:supine \\\n"
-             "      --view anterior,lateral,posterior --theme dark -o prone.png",
+    .notes =
+        "Examples:\n"
+        "  supine render lungs.safetensors --posture supine,prone,left,right -o "
+        "postures.png\n"
+        "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone "
+        "\\\n"
+        "      -o inside.png\n"
+        "  supine render lungs.safetensors --posture prone --colour difference:supine \\\n"
+        "      --view anterior,lateral,posterior --theme dark -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

@@ -25,6 +25,14 @@ void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, 
   (void)extent;
 }
 
+void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
+                           const supine_marks *marks, double (*pixel)[2]) {
+  (void)renderer;
+  (void)scene;
+  (void)marks;
+  (void)pixel;
+}
+
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error) {
   (void)renderer;

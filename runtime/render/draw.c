@@ -115,10 +115,8 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* The extent in the middle, filling the picture. */
-static void load_camera(supine_renderer *r, const supine_scene *scene) {
-  const camera c = find_camera(r, scene);
-  const double depth[2] = {c.away, depth_in_radii * c.radius};
+/* The extent in the middle, filling the picture: its middle, and what a mm is of half a side. */
+static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
     memcpy(extent, scene->extent, sizeof extent);
@@ -129,8 +127,17 @@ static void load_camera(supine_renderer *r, const supine_scene *scene) {
   const double wide = fmax(1e-3, margin * (extent[1] - extent[0]) / 2);
   const double high = fmax(1e-3, margin * (extent[3] - extent[2]) / 2);
   const double tall = fmax(high, wide / aspect);
-  const double frame[4] = {(extent[0] + extent[1]) / 2, (extent[2] + extent[3]) / 2,
-                           1 / (tall * aspect), 1 / tall};
+  frame[0] = (extent[0] + extent[1]) / 2;
+  frame[1] = (extent[2] + extent[3]) / 2;
+  frame[2] = 1 / (tall * aspect);
+  frame[3] = 1 / tall;
+}
+
+static void load_camera(supine_renderer *r, const supine_scene *scene) {
+  const camera c = find_camera(r, scene);
+  const double depth[2] = {c.away, depth_in_radii * c.radius};
+  double frame[4];
+  find_frame(r, scene, frame);
   float columns[9];
   for (int i = 0; i < 9; ++i) {
     columns[i] = (float)c.axes[i % 3][i / 3];
@@ -139,6 +146,26 @@ static void load_camera(supine_renderer *r, const supine_scene *scene) {
   uniform(r, "centre", 3, c.centre);
   uniform(r, "frame", 4, frame);
   uniform(r, "depth", 2, depth);
+}
+
+void supine_render_project(supine_renderer *r, const supine_scene *scene, const supine_marks *marks,
+                           double (*pixel)[2]) {
+  const camera c = find_camera(r, scene);
+  const double size[2] = {(double)scene->width, (double)scene->height};
+  double frame[4];
+  find_frame(r, scene, frame);
+  for (size_t i = 0; i < marks->count; ++i) {
+    double p[3] = {0, 0, 0};
+    for (size_t row = 0; row < 3; ++row) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        p[row] += c.axes[row][axis] * ((double)marks->mark[i].xyz[axis] - c.centre[axis]);
+      }
+    }
+    for (size_t side = 0; side < 2; ++side) { /* as lungs.vert.glsl does; the first row is on top */
+      const double away = p[side] * c.away / (c.away - p[2]) - frame[side];
+      pixel[i][side] = 0.5 * (1 + away * frame[2 + side] * (side == 0 ? 1 : -1)) * size[side];
+    }
+  }
 }
 
 static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {

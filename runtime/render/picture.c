@@ -30,6 +30,7 @@ static const theme themes[2] = {
      {0.94, 0.955, 0.97},
      {0.6, 0.655, 0.71}},
 };
+static const double seen_through = 0.35;            /* of lungs with something inside */
 static const double accent[3] = {0.91, 0.33, 0.17}; /* gravity */
 
 /* Where things go, in pixels. */
@@ -172,10 +173,54 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
+/* Discs and specks at what is inside, then the names, so that none is covered. */
+static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
+                                const supine_marks *marks, double size, double x, double y,
+                                const theme *look) {
+  double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
+  if (pixel == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_render_project(renderer, scene, marks, pixel);
+  for (int names = 0; names < 2; ++names) {
+    for (size_t i = 0; i < marks->count; ++i) {
+      const supine_mark *mark = &marks->mark[i];
+      const double *at = pixel[i];
+      double rgb[3];
+      if (names == 1 ? mark->label == NULL : mark->label != NULL && !mark->point) {
+        continue;
+      }
+      supine_render_colour(scene->colours, fmin(1, (double)mark->value / scene->largest), rgb);
+      if (names == 0) {
+        cairo_new_path(cr);
+        cairo_arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
+        colour(cr, rgb);
+        cairo_fill_preserve(cr);
+        cairo_set_line_width(cr, size * 0.1);
+        colour(cr, mark->point ? look->text : rgb);
+        cairo_stroke(cr);
+        continue;
+      }
+      font(cr, size * 0.75, false);
+      const double beside = at[0] + size * 0.5;
+      const double room = (double)scene->width - text_width(cr, mark->label);
+      cairo_move_to(cr, x + fmax(0, fmin(beside, room)), y + at[1] - size * 0.3);
+      cairo_text_path(cr, mark->label);
+      cairo_set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
+      cairo_set_line_width(cr, size * 0.25);
+      cairo_stroke_preserve(cr);
+      colour(cr, look->text);
+      cairo_fill(cr);
+    }
+  }
+  free(pixel);
+  return SUPINE_OK;
+}
+
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
-                           double x, double y, double width, double height, const double *extent,
-                           supine_error *error) {
+                           double x, double y, double width, double height, double size,
+                           const double *extent, supine_error *error) {
   const supine_scene scene = {.weights = panel->weights,
                               .scales = panel->scales,
                               .value = panel->value,
@@ -201,7 +246,11 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   if (status == SUPINE_OK) {
     cairo_surface_mark_dirty(image);
     cairo_set_source_surface(cr, image, floor(x), floor(y));
-    cairo_paint(cr);
+    cairo_paint_with_alpha(cr, panel->marks != NULL ? seen_through : 1.0);
+    if (panel->marks != NULL) {
+      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
+                          &themes[picture->dark ? 1 : 0]);
+    }
   }
 cleanup:
   cairo_surface_destroy(image);
@@ -237,8 +286,8 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
               supine_render_view_name(view));
   return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->strip,
-               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, extent,
-               error);
+               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, at->font,
+               extent, error);
 }
 
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,

@@ -92,6 +92,24 @@ supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
                                 unsigned char **bytes, size_t *size, supine_error *error);
 
+/** Something inside the lungs. */
+typedef struct supine_mark {
+  float xyz[3];      /**< mm, where it is */
+  float value;       /**< mm, what its colour shows */
+  bool point;        /**< a disc; else a speck, of which many make a surface */
+  const char *label; /**< written beside it, or NULL */
+} supine_mark;
+
+typedef struct supine_marks {
+  size_t count;
+  const supine_mark *mark;
+} supine_marks;
+
+/** Where marks come to lie on the drawing of a scene: pixels [count, 2] from its left and upper
+ * edge. */
+void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
+                           const supine_marks *marks, double (*pixel)[2]);
+
 /** One posture of a picture. */
 typedef struct supine_panel {
   const char *title;
@@ -100,6 +118,7 @@ typedef struct supine_panel {
   const double *weights;
   const double *scales;
   const float *value;
+  const supine_marks *marks; /**< drawn over the lungs, which are then seen through; or NULL */
 } supine_panel;
 
 enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 7 };
