@@ -182,7 +182,7 @@ void fixture_write(const fixture *f, const char *path) {
   const size_t n = f->vertices;
   const size_t k = f->modes;
   const size_t g = f->lungs;
-  supine_tensor tensors[11] = {
+  supine_tensor tensors[12] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, f->vertex},
       {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
       {"coefficients", SUPINE_F32, 2, {n, k}, f->coefficient},
@@ -199,6 +199,9 @@ void fixture_write(const fixture *f, const char *path) {
     tensors[count++] = (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, f->linear};
     tensors[count++] = (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, f->quadratic};
     tensors[count++] = (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, f->cubic};
+  }
+  if (f->resting != NULL) {
+    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, f->resting};
   }
   if (f->normals > 0) {
     tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, f->normals}, f->normal};

@@ -33,15 +33,21 @@ typedef struct made {
   supine_compare *compare;
 } made;
 
-static made make(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
-                 bool volume) {
+static made make_resting(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
+                         bool volume, const double *resting) {
   made m = {.f = fixture_create(vertices, modes, band, lungs, vector, volume, 6.3, 20041)};
+  m.f->resting = resting;
   size_t size = 0;
   m.bytes = fixture_bytes(m.f, &size);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   assert_int_equal(supine_basis_open_memory_with(m.bytes, size, &exact, &m.basis, NULL), SUPINE_OK);
   assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
   return m;
+}
+
+static made make(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
+                 bool volume) {
+  return make_resting(vertices, modes, band, lungs, vector, volume, NULL);
 }
 
 static void unmake(made *m) {
@@ -283,6 +289,31 @@ static void test_scale_each_inflation_reaches_it(void **state) {
   assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
                    SUPINE_OK);
   assert_near(scale, 0.11, 1e-9);
+  unmake(&m);
+}
+
+/* Beyond the rest of that direction of gravity: constant and linear terms by hand. */
+static void test_scale_from_rest_reaches_the_posture_s_own(void **state) {
+  (void)state;
+  static const double resting[9] = {-40, 7, -5, 3}; /* of Y_00, Y_1-1, Y_10, Y_11: y, z, x */
+  made m = make_resting(401, 6, 3, 2, false, true, resting);
+  const double g[3] = {0.6, -0.48, 0.64};
+  double weights[SUPINE_MODES_MAX];
+  double scale = 0;
+  assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
+  const supine_inflation inflation = {SUPINE_INFLATION_REST, 11};
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
+                   SUPINE_OK);
+  const double rest =
+      0.5 * sqrt(1 / M_PI) * -40 + 0.5 * sqrt(3 / M_PI) * (7 * g[1] + -5 * g[2] + 3 * g[0]);
+  assert_near(supine_basis_lung_volume(m.basis, 0, weights, scale) +
+                  supine_basis_lung_volume(m.basis, 1, weights, scale),
+              rest + 11, 1e-9);
+  const double none[3] = {0, 0, 0};
+  supine_error error;
+  assert_int_equal(supine_compare_scale(m.compare, &inflation, none, weights, &scale, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_string_equal(error.message, "gravity has no direction");
   unmake(&m);
 }
 
@@ -582,6 +613,7 @@ int main(void) {
       cmocka_unit_test(test_statistics_random_pairs_equal_sorting),
       cmocka_unit_test(test_energy_sums_to_mean_square_over_sphere),
       cmocka_unit_test(test_scale_each_inflation_reaches_it),
+      cmocka_unit_test(test_scale_from_rest_reaches_the_posture_s_own),
       cmocka_unit_test(test_scale_open_or_still_is_refused),
       cmocka_unit_test(test_create_surface_without_area_is_refused),
       cmocka_unit_test(test_search_finds_what_no_random_direction_beats),

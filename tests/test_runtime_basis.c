@@ -206,6 +206,14 @@ static void spoil_quadratic(fixture *f) {
 static void spoil_cubic(fixture *f) {
   f->cubic[53] = (double)NAN;
 }
+static void spoil_resting(fixture *f) {
+  static const double resting[9] = {-900, 0, 0, 0, 0, 0, 0, 0, (double)NAN};
+  f->resting = resting;
+}
+static void spoil_resting_size(fixture *f) {
+  static const double resting[9] = {-900, 0x1p30};
+  f->resting = resting;
+}
 static void spoil_lung_order(fixture *f) {
   f->lung[11] = 0;
 }
@@ -230,6 +238,8 @@ static void test_open_wrong_content_refused_with_reason(void **state) {
   expect_refused(spoil_linear, "volume_linear is not finite");
   expect_refused(spoil_quadratic, "volume_quadratic is not finite");
   expect_refused(spoil_cubic, "volume_cubic is not finite");
+  expect_refused(spoil_resting, "resting_volume is not finite, or 2^30 and more");
+  expect_refused(spoil_resting_size, "resting_volume is not finite, or 2^30 and more");
   expect_refused(spoil_lung_order, "grouped by lung");
   expect_refused(spoil_lung_gap, "vertex 6 is of lung 2");
   expect_refused(spoil_lung_first, "vertex 0 is of lung 1");
@@ -304,6 +314,17 @@ static void test_open_wrong_structure_refused(void **state) {
     p.metadata[i].key = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
+  p = sound(); /* resting volumes are optional, nine terms where they are */
+  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
+  assert_int_equal(open_parts(&p), SUPINE_OK);
+  p.tensors[9].dtype = SUPINE_F32;
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  for (size_t terms = 4; terms <= 16; terms += 4) {
+    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, zeros64};
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  }
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64};
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p = sound(); /* kind vector needs [N, 3, K] */
   p.metadata[2].value = "vector";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
