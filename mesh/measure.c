@@ -3,13 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "mesh/mesh.h"
+#include "sh/base/vec3.h"
 
-static void cross(const double a[3], const double b[3], double product[3]) {
-  product[0] = a[1] * b[2] - a[2] * b[1];
-  product[1] = a[2] * b[0] - a[0] * b[2];
-  product[2] = a[0] * b[1] - a[1] * b[0];
-}
+#include "mesh/mesh.h"
 
 double supine_mesh_volume(const supine_mesh *mesh) {
   double minimum[3];
@@ -25,8 +21,8 @@ double supine_mesh_volume(const supine_mesh *mesh) {
       }
     }
     double product[3];
-    cross(p[1], p[2], product);
-    sum += p[0][0] * product[0] + p[0][1] * product[1] + p[0][2] * product[2];
+    supine_cross(p[1], p[2], product);
+    sum += supine_dot(p[0], product);
   }
   return sum / 6.0;
 }
@@ -60,9 +56,8 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area) {
       }
     }
     double product[3];
-    cross(side[0], side[1], product);
-    const double third =
-        sqrt(product[0] * product[0] + product[1] * product[1] + product[2] * product[2]) / 6.0;
+    supine_cross(side[0], side[1], product);
+    const double third = supine_length(product) / 6.0;
     for (int k = 0; k < 3; ++k) {
       area[corner[k]] += third;
     }
@@ -81,11 +76,9 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices) 
         side[k / 3][k % 3] =
             from[3 * (size_t)corner[1 + k / 3] + k % 3] - from[3 * (size_t)corner[0] + k % 3];
       }
-      cross(side[0], side[1], normal[state]);
+      supine_cross(side[0], side[1], normal[state]);
     }
-    turned +=
-        normal[0][0] * normal[1][0] + normal[0][1] * normal[1][1] + normal[0][2] * normal[1][2] <
-        0.0;
+    turned += supine_dot(normal[0], normal[1]) < 0.0;
   }
   return mesh->triangle_count == 0 ? 0.0 : (double)turned / (double)mesh->triangle_count;
 }
@@ -108,7 +101,7 @@ void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     double *n = normals + 3 * i;
-    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    const double length = supine_length(n);
     for (size_t k = 0; k < 3 && length > 0.0; ++k) {
       n[k] /= length;
     }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 
 #include "precompute/precompute.h"
@@ -93,7 +94,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
       supine_physics_directions(p->lungs, &p->options->model.direction, p->directions, error);
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     const double *d = p->directions + 3 * i;
-    p->weight[i] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    p->weight[i] = supine_dot(d, d);
   }
   return status;
 }

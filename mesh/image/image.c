@@ -8,6 +8,8 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/image/formats.h"
 
 static bool ends_in(const char *path, const char *ending) {
@@ -24,26 +26,19 @@ bool supine_image_supports(const char *path) {
   return ends_in(path, ".nrrd") || is_nifti(path);
 }
 
-static double determinant(const double step[3][3]) {
-  const double *u = step[0];
-  const double *v = step[1];
-  const double *w = step[2];
-  return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
-         u[2] * (v[0] * w[1] - v[1] * w[0]);
-}
-
 /* Finite, and three directions? A voxel's edges are no closer than a thousandth of a right angle.
  */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
   for (int a = 0; a < 3; ++a) {
     const double *s = image->step[a];
-    lengths *= sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    lengths *= supine_length(s);
     if (!isfinite(image->origin[a])) {
       return false;
     }
   }
-  return isfinite(lengths) && lengths > 0.0 && fabs(determinant(image->step)) > 1e-3 * lengths;
+  return isfinite(lengths) && lengths > 0.0 &&
+         fabs(supine_triple(image->step[0], image->step[1], image->step[2])) > 1e-3 * lengths;
 }
 
 size_t supine_image_bytes(const supine_image *image, size_t file_size) {
@@ -158,7 +153,7 @@ void supine_image_set(supine_image *image, size_t index, double value) {
 }
 
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
-  const double whole = determinant(image->step);
+  const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
   double from[3];
   for (int k = 0; k < 3; ++k) {
     from[k] = point[k] - image->origin[k];
@@ -167,6 +162,6 @@ void supine_image_locate(const supine_image *image, const double point[3], doubl
     double replaced[3][3];
     memcpy(replaced, image->step, sizeof replaced);
     memcpy(replaced[a], from, sizeof from);
-    voxel[a] = determinant((const double(*)[3])replaced) / whole;
+    voxel[a] = supine_triple(replaced[0], replaced[1], replaced[2]) / whole;
   }
 }

@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "sh/base/output.h"
+#include "sh/base/vec3.h"
 
 #include "mesh/image/formats.h"
 
@@ -143,7 +144,7 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   for (int a = 0; a < 3; ++a) {
     const double *s = image->step[a];
     h.dim[1 + a] = (short)image->size[a];
-    h.pixdim[1 + a] = (float)sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    h.pixdim[1 + a] = (float)supine_length(s);
     for (int k = 0; k < 3; ++k) {
       rows[k][a] = (float)(k < 2 ? -s[k] : s[k]);
     }

@@ -3,14 +3,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/read/read.h"
 
 /* Twice the area of the triangle abc, seen from where `normal` points to. */
 static double turn(const double normal[3], const double *a, const double *b, const double *c) {
   const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   const double v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-  return normal[0] * (u[1] * v[2] - u[2] * v[1]) + normal[1] * (u[2] * v[0] - u[0] * v[2]) +
-         normal[2] * (u[0] * v[1] - u[1] * v[0]);
+  return supine_triple(normal, u, v);
 }
 
 /* Sum of the corners' cross products about the first. */

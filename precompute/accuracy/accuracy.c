@@ -5,12 +5,13 @@
 #include <string.h>
 
 #include "precompute/accuracy/accuracy.h"
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 #include <supine/volume.h>
 
 #include "precompute/accuracy/tally.h"
-#include "precompute/physics/network.h"
 #include "precompute/projection/compression.h"
 
 /* Sums are of so many parts of the vertices, whatever the number of threads. */
@@ -48,7 +49,7 @@ static void turn_block(const accuracy_work *work, size_t begin, size_t count, tu
   for (size_t i = 0; i < count; ++i) {
     const double *u = work->directions + 3 * (begin + i);
     const float *c = work->compression->coefficients + (begin + i) * modes;
-    block->length[i] = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    block->length[i] = supine_length(u);
     for (size_t k = 0; k < modes; ++k) {
       block->coefficients[k][i] = c[k];
     }

@@ -5,10 +5,10 @@
 #include <string.h>
 
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 
 #include "precompute/accuracy/error_table.h"
-#include "precompute/physics/network.h"
 #include "precompute/projection/compression.h"
 
 enum { VERTICES_MAX = 4096 };
@@ -78,7 +78,7 @@ static void errors_range(void *context, size_t begin, size_t end, size_t thread)
     for (size_t i = 0; i < work->count; ++i) {
       const size_t vertex = i * work->stride;
       const double *u = work->directions + 3 * vertex;
-      const double square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+      const double square = supine_dot(u, u);
       const double truth = true_value(work->truth, n, d, vertex);
       const double *c = work->coefficients + i * terms;
       const float *m = work->field->coefficients + vertex * modes;

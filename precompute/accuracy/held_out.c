@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
+
 #include "precompute/accuracy/held_out.h"
 #include "precompute/projection/compression.h"
 #include "precompute/projection/sampler.h"
@@ -11,14 +13,9 @@
 #include <supine/sh.h>
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
-  const double golden = M_PI * (3.0 - sqrt(5.0));
+  static const double off_the_grids = 0.3; /* rad: grids have a node at longitude 0 */
   for (size_t i = 0; i < count; ++i) {
-    const double z = 1.0 - (2.0 * (double)i + 1.0) / (double)count;
-    const double radius = sqrt(1.0 - z * z);
-    const double longitude = golden * (double)i + 0.3;
-    directions[3 * i] = radius * cos(longitude);
-    directions[3 * i + 1] = radius * sin(longitude);
-    directions[3 * i + 2] = z;
+    supine_spiral((double)i, (double)count, off_the_grids, directions + 3 * i);
   }
 }
 

@@ -5,10 +5,10 @@
 
 #include "precompute/accuracy/accuracy.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 #include <supine/volume.h>
 
-#include "precompute/physics/network.h"
 #include "precompute/projection/compression.h"
 
 enum { POSTURES = 6, SAMPLES_MAX = 50000 };

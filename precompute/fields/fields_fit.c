@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "precompute/fields/fields.h"
+#include "sh/base/vec3.h"
 #include "sh/grid.h"
 #include "sh/transform.h"
 #include <supine/sh.h>
@@ -163,7 +164,7 @@ static supine_sh_grid *find_grid(const supine_fields *fields, size_t *place) {
       supine_sh_grid_direction(grid, j / grid->longitudes, j % grid->longitudes, g);
       for (size_t d = 0; d < m; ++d) {
         const double *h = fields->directions + 3 * d;
-        if (hypot(hypot(g[0] - h[0], g[1] - h[1]), g[2] - h[2]) < same) {
+        if (supine_distance(g, h) < same) {
           place[d] = j;
           ++found;
           break;
@@ -203,14 +204,14 @@ static double best_directions(const supine_fields *fields, double *directions, d
     (void)LAPACKE_dsyev(LAPACK_COL_MAJOR, 'V', 'U', 3, sums, 3, eigenvalues);
     double *d = directions + 3 * i;
     const double *leading = sums + 6;
-    const double along = leading[0] * mean[0] + leading[1] * mean[1] + leading[2] * mean[2];
+    const double along = supine_dot(leading, mean);
     for (size_t a = 0; a < 3; ++a) {
       d[a] = along < 0.0 ? -leading[a] : leading[a];
     }
     lost += fmax(eigenvalues[0], 0.0) + fmax(eigenvalues[1], 0.0);
     for (size_t m = 0; m < fields->direction_count; ++m) {
       const double *u = fields->displacement + 3 * (m * n + i);
-      values[m * n + i] = u[0] * d[0] + u[1] * d[1] + u[2] * d[2];
+      values[m * n + i] = supine_dot(u, d);
     }
   }
   return lost;
@@ -447,7 +448,7 @@ static void tally_misses(const fitting *w, const without *o, size_t d, supine_ta
     if (w->options->scalar) { /* and what no magnitude along one direction can give */
       const double *u = w->fields->displacement + 3 * (d * n + i);
       const double along = w->values[d * n + i];
-      square += fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - along * along, 0.0);
+      square += fmax(supine_dot(u, u) - along * along, 0.0);
     }
     const double miss = sqrt(square);
     supine_accuracy_tally_add(tally, 1, &miss);

@@ -10,6 +10,7 @@
 
 #include "sh/base/csv.h"
 #include "sh/base/output.h"
+#include "sh/base/vec3.h"
 
 /* Directions closer than this are the same, radians. */
 static const double same_direction = 1e-6;
@@ -42,7 +43,7 @@ static supine_status grow(supine_fields *fields, size_t count, supine_error *err
 static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
                                      const char *unit, const size_t *where, supine_error *error) {
   double *g = fields->directions + 3 * at;
-  const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  const double length = supine_length(g);
   if (!(length > 0.0) || !isfinite(length)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: %s %zu: gravity %g,%g,%g has no direction", path, unit, where[at],
@@ -53,7 +54,7 @@ static supine_status check_direction(const supine_fields *fields, size_t at, con
   }
   for (size_t other = 0; other < at; ++other) {
     const double *h = fields->directions + 3 * other;
-    if (hypot(hypot(g[0] - h[0], g[1] - h[1]), g[2] - h[2]) < same_direction) {
+    if (supine_distance(g, h) < same_direction) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: %s %zu and %zu have the same direction: keep one of them", path,
                               unit, where[other], where[at]);

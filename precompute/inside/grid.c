@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 #include "precompute/inside/grid.h"
 
@@ -14,11 +15,6 @@ static void node_point(const supine_inside_grid *grid, const double node[3], dou
     point[k] = grid->origin[k] + node[0] * grid->step[0][k] + node[1] * grid->step[1][k] +
                node[2] * grid->step[2][k];
   }
-}
-
-static double step_length(const supine_inside_grid *grid, int axis) {
-  const double *s = grid->step[axis];
-  return hypot(hypot(s[0], s[1]), s[2]);
 }
 
 /* Coordinates of a point in steps of the grid: Cramer's rule. */
@@ -34,11 +30,9 @@ static void grid_coordinates(const supine_inside_grid *grid, const double point[
   const double *columns[4] = {a, b, c, x};
   double determinant[4];
   for (int replaced = 0; replaced < 4; ++replaced) { /* the fourth: none */
-    const double *u = columns[replaced == 0 ? 3 : 0];
-    const double *v = columns[replaced == 1 ? 3 : 1];
-    const double *w = columns[replaced == 2 ? 3 : 2];
-    determinant[replaced] = u[0] * (v[1] * w[2] - v[2] * w[1]) +
-                            u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+    determinant[replaced] =
+        supine_triple(columns[replaced == 0 ? 3 : 0], columns[replaced == 1 ? 3 : 1],
+                      columns[replaced == 2 ? 3 : 2]);
   }
   for (int k = 0; k < 3; ++k) {
     node[k] = determinant[k] / determinant[3];
@@ -64,8 +58,8 @@ static void cover(const supine_inside_shells *shells, const supine_inside_grid *
     }
   }
   for (int k = 0; k < 3; ++k) {
-    low[k] -= margin / step_length(grid, k);
-    high[k] += margin / step_length(grid, k);
+    low[k] -= margin / supine_length(grid->step[k]);
+    high[k] += margin / supine_length(grid->step[k]);
   }
 }
 
@@ -82,7 +76,8 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   double nodes = 1.0;
   cover(shells, &from, margin, low, high);
   for (int k = 0; k < 3; ++k) {
-    const double every = like != NULL ? fmax(1.0, rint(spacing / step_length(&from, k))) : spacing;
+    const double every =
+        like != NULL ? fmax(1.0, rint(spacing / supine_length(from.step[k]))) : spacing;
     if (like != NULL) {
       low[k] = fmax(low[k], 0.0);
       high[k] = fmin(high[k], (double)from.size[k] - 1.0);
@@ -182,7 +177,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   }
   double diagonal = 0.0;
   for (int k = 0; k < 3; ++k) { /* the longest diagonal is no longer than this, however oblique */
-    diagonal += step_length(&grid, k);
+    diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   search work = {shells, &grid, diagonal, malloc(nodes)};

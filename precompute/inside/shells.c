@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
+
 #include "precompute/inside/shells.h"
 
 static double mean_edge(const supine_inside_shell *shell) {
@@ -12,7 +14,7 @@ static double mean_edge(const supine_inside_shell *shell) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
     const double *a = shell->vertices + 3 * (size_t)shell->triangles[i];
     const double *b = shell->vertices + 3 * (size_t)shell->triangles[next];
-    sum += hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]);
+    sum += supine_distance(b, a);
   }
   return sum / (double)(3 * shell->triangle_count);
 }
@@ -167,7 +169,7 @@ static void step_to(const supine_inside_shells *shells, const double point[3], s
   supine_inside_place *place = &walk->place[lung];
   if (walk->known[lung]) {
     const double *from = place->point;
-    const double moved = hypot(hypot(point[0] - from[0], point[1] - from[1]), point[2] - from[2]);
+    const double moved = supine_distance(point, from);
     if (fabs(place->depth) - moved > far) {
       return;
     }

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "precompute/inside/surface.h"
 
 enum { LEAF = 8 };
@@ -36,16 +38,6 @@ static void subtract(const double a[3], const double b[3], double out[3]) {
   for (int k = 0; k < 3; ++k) {
     out[k] = a[k] - b[k];
   }
-}
-
-static double dot(const double a[3], const double b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3]) {
-  out[0] = a[1] * b[2] - a[2] * b[1];
-  out[1] = a[2] * b[0] - a[0] * b[2];
-  out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
 static void corners(const supine_inside_surface *s, size_t triangle, const double *corner[3]) {
@@ -80,8 +72,8 @@ static void measure(const supine_inside_surface *s, node *n) {
     corners(s, s->order[i], p);
     subtract(p[1], p[0], u);
     subtract(p[2], p[0], v);
-    cross(u, v, normal);
-    const double area = 0.5 * sqrt(dot(normal, normal));
+    supine_cross(u, v, normal);
+    const double area = 0.5 * sqrt(supine_dot(normal, normal));
     total += area;
     for (int k = 0; k < 3; ++k) {
       n->low[k] = fmin(n->low[k], fmin(p[0][k], fmin(p[1][k], p[2][k])));
@@ -165,8 +157,8 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
 
 /* Weight of the second of two points, nearest to the first one's origin: -w.e / e.e in 0 to 1. */
 static double along(const double offset[3], const double edge[3]) {
-  const double length = dot(edge, edge);
-  return length > 0.0 ? fmin(fmax(dot(offset, edge) / length, 0.0), 1.0) : 0.0;
+  const double length = supine_dot(edge, edge);
+  return length > 0.0 ? fmin(fmax(supine_dot(offset, edge) / length, 0.0), 1.0) : 0.0;
 }
 
 /* Barycentric coordinates of the triangle's point nearest to x: inside it, or on an edge. */
@@ -177,11 +169,11 @@ static void nearest_in_triangle(const double *const p[3], const double x[3], dou
   subtract(p[1], p[0], u);
   subtract(p[2], p[0], v);
   subtract(x, p[0], w);
-  const double uu = dot(u, u);
-  const double uv = dot(u, v);
-  const double vv = dot(v, v);
-  const double uw = dot(u, w);
-  const double vw = dot(v, w);
+  const double uu = supine_dot(u, u);
+  const double uv = supine_dot(u, v);
+  const double vv = supine_dot(v, v);
+  const double uw = supine_dot(u, w);
+  const double vw = supine_dot(v, w);
   const double determinant = uu * vv - uv * uv;
   b[1] = (vv * uw - uv * vw) / determinant;
   b[2] = (uu * vw - uv * uw) / determinant;
@@ -257,7 +249,7 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
       q[k] = b[0] * p[0][k] + b[1] * p[1][k] + b[2] * p[2][k];
     }
     subtract(x, q, apart);
-    const double square = dot(apart, apart);
+    const double square = supine_dot(apart, apart);
     if (square < *best) {
       *best = square;
       place->triangle = s->order[i];
@@ -276,11 +268,12 @@ static double solid_angle(const double *const p[3], const double x[3]) {
   subtract(p[0], x, a);
   subtract(p[1], x, b);
   subtract(p[2], x, c);
-  cross(b, c, bc);
-  const double la = sqrt(dot(a, a));
-  const double lb = sqrt(dot(b, b));
-  const double lc = sqrt(dot(c, c));
-  return 2.0 * atan2(dot(a, bc), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  supine_cross(b, c, bc);
+  const double la = sqrt(supine_dot(a, a));
+  const double lb = sqrt(supine_dot(b, b));
+  const double lc = sqrt(supine_dot(c, c));
+  return 2.0 * atan2(supine_dot(a, bc), la * lb * lc + supine_dot(a, b) * lc +
+                                            supine_dot(b, c) * la + supine_dot(c, a) * lb);
 }
 
 /* Sum of solid angles below node `at`. */
@@ -288,9 +281,9 @@ static double angle(const supine_inside_surface *s, size_t at, const double x[3]
   const node *n = &s->nodes[at];
   double apart[3];
   subtract(n->centre, x, apart);
-  const double distance = sqrt(dot(apart, apart));
+  const double distance = sqrt(supine_dot(apart, apart));
   if (distance > dipole_distance * n->radius) {
-    return dot(n->dipole, apart) / (distance * distance * distance);
+    return supine_dot(n->dipole, apart) / (distance * distance * distance);
   }
   if (n->right != 0) {
     return angle(s, at + 1, x) + angle(s, n->right, x);
@@ -314,7 +307,7 @@ supine_inside_place supine_inside_surface_find(const supine_inside_surface *surf
   if (near != NULL) { /* the surface is no farther than from there, and the way */
     double way[3];
     subtract(point, near->point, way);
-    moved = sqrt(dot(way, way));
+    moved = sqrt(supine_dot(way, way));
     const double limit = (fabs(near->depth) + moved) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
   }

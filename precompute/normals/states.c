@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 #include <supine/volume.h>
 
@@ -87,7 +88,6 @@ static bool scale_of(const supine_normals_surface *s, const double *y, const dou
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
-  static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
   static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1: apart from the angle */
   const size_t terms = supine_normals_terms(surface->mode_count);
   const size_t harmonics = supine_sh_count(surface->band);
@@ -102,9 +102,8 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   }
   for (size_t i = 0; i < count; ++i) {
     const double at = (double)i + shift;
-    const double z = 1.0 - (2.0 * at + 0.5) / (double)(count + 1);
-    const double r = sqrt(fmax(0.0, 1.0 - z * z));
-    const double g[3] = {r * cos(golden_angle * at), r * sin(golden_angle * at), z};
+    double g[3];
+    supine_spiral(at, (double)count, 0.0, g);
     double scale = 0.0;
     double amount = 0.0;
     (void)supine_sh_evaluate(surface->band, g, y);

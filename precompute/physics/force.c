@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "precompute/physics/force.h"
+#include "sh/base/vec3.h"
 
-#include "precompute/physics/network.h"
+#include "precompute/physics/force.h"
 
 static bool has_fixed_part(const supine_force_law *law) {
   return law->box[0] != 0.0 || law->box[1] != 0.0 || law->box[2] != 0.0;

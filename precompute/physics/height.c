@@ -7,8 +7,7 @@
 
 #include "precompute/physics/force.h"
 #include "sh/base/parallel.h"
-
-#include "precompute/physics/network.h"
+#include "sh/base/vec3.h"
 
 /* Vertices are taken in blocks, each with its box. The box's own extent along a direction bounds
  * its vertices', so that only the few blocks that can hold an extreme are read: the result is

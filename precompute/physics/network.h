@@ -34,9 +34,4 @@ double supine_physics_link_distance(const double *first, const double *second);
 supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
                                                const supine_topology *topology, double reach);
 
-/* Of vectors of three. */
-static inline double supine_dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 #endif

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
+
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/tissue/disease.h"
@@ -75,7 +77,7 @@ double supine_physics_solution_largest(const supine_solution *solution) {
   double largest = 0.0;
   for (size_t i = 0; i < solution->vertex_count; ++i) {
     const double *d = solution->directions + 3 * i;
-    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const double length = supine_length(d);
     largest = fmax(largest, fabs(solution->catch_[i]) * length);
   }
   return largest;

@@ -6,6 +6,7 @@
 
 #include "precompute/physics/volume_forms.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/physics/network.h"
@@ -29,11 +30,6 @@ static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_fo
     return SUPINE_ERROR_MEMORY;
   }
   return SUPINE_OK;
-}
-
-static double determinant(const double *a, const double *b, const double *c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
 /* Triangles are summed in so many parts, whatever the number of threads, and so are the parts. */
@@ -69,13 +65,13 @@ SUPINE_CLONES static void scalar_part(const forms_work *work, size_t begin, size
       d[v] = work->directions + 3 * (size_t)corner[v];
       c[v] = work->columns + count * (size_t)corner[v];
     }
-    const double l0 = determinant(d[0], p[1], p[2]);
-    const double l1 = determinant(p[0], d[1], p[2]);
-    const double l2 = determinant(p[0], p[1], d[2]);
-    const double q01 = determinant(d[0], d[1], p[2]);
-    const double q02 = determinant(d[0], p[1], d[2]);
-    const double q12 = determinant(p[0], d[1], d[2]);
-    const double q012 = determinant(d[0], d[1], d[2]);
+    const double l0 = supine_triple(d[0], p[1], p[2]);
+    const double l1 = supine_triple(p[0], d[1], p[2]);
+    const double l2 = supine_triple(p[0], p[1], d[2]);
+    const double q01 = supine_triple(d[0], d[1], p[2]);
+    const double q02 = supine_triple(d[0], p[1], d[2]);
+    const double q12 = supine_triple(p[0], d[1], d[2]);
+    const double q012 = supine_triple(d[0], d[1], d[2]);
     for (size_t k = 0; k < count; ++k) {
       linear[k] += l0 * c[0][k] + l1 * c[1][k] + l2 * c[2][k];
       const double first = q01 * c[0][k];
@@ -111,19 +107,17 @@ static void vector_part(const forms_work *work, size_t begin, size_t end, size_t
       }
     }
     for (size_t k = 0; k < count; ++k) {
-      linear[k] += determinant(c[0][k], p[1], p[2]) + determinant(p[0], c[1][k], p[2]) +
-                   determinant(p[0], p[1], c[2][k]);
+      linear[k] += supine_triple(c[0][k], p[1], p[2]) + supine_triple(p[0], c[1][k], p[2]) +
+                   supine_triple(p[0], p[1], c[2][k]);
       for (size_t l = 0; l < count; ++l) {
-        quadratic[k * count + l] += determinant(c[0][k], c[1][l], p[2]) +
-                                    determinant(c[0][k], p[1], c[2][l]) +
-                                    determinant(p[0], c[1][k], c[2][l]);
-        const double *a = c[0][k];
-        const double *b = c[1][l];
-        const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                                 a[0] * b[1] - a[1] * b[0]};
+        quadratic[k * count + l] += supine_triple(c[0][k], c[1][l], p[2]) +
+                                    supine_triple(c[0][k], p[1], c[2][l]) +
+                                    supine_triple(p[0], c[1][k], c[2][l]);
+        double cross[3];
+        supine_cross(c[0][k], c[1][l], cross);
         double *row = cubic + (k * count + l) * count;
         for (size_t m = 0; m < count; ++m) {
-          row[m] += cross[0] * c[2][m][0] + cross[1] * c[2][m][1] + cross[2] * c[2][m][2];
+          row[m] += supine_dot(cross, c[2][m]);
         }
       }
     }

@@ -7,8 +7,8 @@
 #include "sh/base/parallel.h"
 #include <supine/sh.h>
 
-#include "precompute/physics/network.h"
 #include "precompute/projection/compression.h"
+#include "sh/base/clones.h"
 
 void supine_projection_compression_free(supine_compression *compression) {
   free(compression->coefficients);

@@ -5,6 +5,7 @@
 
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 #include "precompute/projection/sampler.h"
 
@@ -140,8 +141,7 @@ static void find_exponents(const sample_work *work, size_t first, size_t lanes, 
   for (size_t i = 0; i < sampler->lungs->mesh.vertex_count; ++i) {
     const double *p = sampler->lungs->mesh.vertices + 3 * i;
     for (size_t r = 0; r < lanes; ++r) {
-      exponents[i * lanes + r] =
-          slope[r][0] * p[0] + slope[r][1] * p[1] + slope[r][2] * p[2] - mean[r];
+      exponents[i * lanes + r] = supine_dot(slope[r], p) - mean[r];
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/physics/solve.h"
@@ -107,7 +108,7 @@ static supine_status inflate(supine_lungs *lungs, const supine_model *model, con
   for (size_t i = 0; i < count; i += 3) {
     const double *p = lungs->mesh.vertices + i;
     const double *q = scan.mesh.vertices + i;
-    found->moved = fmax(found->moved, hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]));
+    found->moved = fmax(found->moved, supine_distance(p, q));
   }
   free(scan.mesh.vertices);
   return status;

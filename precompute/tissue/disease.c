@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "precompute/tissue/disease.h"
 
 /* The part of a lesion that a distance gets: 1 inside, 0 from the radius on. */
@@ -33,8 +35,7 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
   size_t found = 0;
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    const double w =
-        lesion_weight(hypot(hypot(p[0] - c[0], p[1] - c[1]), p[2] - c[2]), lesion->radius);
+    const double w = lesion_weight(supine_distance(p, c), lesion->radius);
     if (w > 0.0) {
       factors[i] *= pow(lesion->factor, w);
       ++found;

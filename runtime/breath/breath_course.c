@@ -5,19 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/breath/breath_course.h"
-
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double *a, const double *b, double *product) {
-  for (size_t k = 0; k < 3; ++k) {
-    const size_t i = (k + 1) % 3;
-    const size_t j = (k + 2) % 3;
-    product[k] = a[i] * b[j] - a[j] * b[i];
-  }
-}
 
 /* The direction a quarter turn on from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
@@ -25,22 +15,22 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   static const double back[3] = {0.0, 1.0, 0.0};
   const double *from = turn->from;
   double axis[3];
-  cross(from, turn->to, axis);
-  const double sine = sqrt(dot(axis, axis));
+  supine_cross(from, turn->to, axis);
+  const double sine = supine_length(axis);
   if (sine < 1e-9) { /* opposite */
     const double *over = fabs(from[2]) > 0.5 ? back : left;
-    cross(from, over, axis);
-    if (dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
-      cross(from, back, axis);
+    supine_cross(from, over, axis);
+    if (supine_dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
+      supine_cross(from, back, axis);
     }
   }
-  const double length = sqrt(dot(axis, axis));
+  const double length = supine_length(axis);
   const double unit[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
-  cross(unit, from, quarter);
+  supine_cross(unit, from, quarter);
 }
 
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
-  const double cosine = fmax(-1.0, fmin(1.0, dot(turn->from, turn->to)));
+  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
   if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
     memcpy(gravity, turn->to, 3 * sizeof *gravity);
     return;

@@ -6,6 +6,7 @@
 #include <jansson.h>
 
 #include "sh/base/output.h"
+#include "sh/base/vec3.h"
 
 #include "runtime/command/compare_content.h"
 #include "runtime/command/names.h"
@@ -59,7 +60,7 @@ static double move_between(const comparison *c, size_t from, size_t to, size_t n
     move[k] = c->moves[3 * (to * c->names.count + name) + k] -
               c->moves[3 * (from * c->names.count + name) + k];
   }
-  return hypot(hypot(move[0], move[1]), move[2]);
+  return supine_length(move);
 }
 
 static void print_table(const comparison *c, size_t from, size_t to) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "mesh/mesh.h"
+#include "sh/base/vec3.h"
 #include <supine/runtime.h>
 
 #include "runtime/command/deform_content.h"
@@ -62,7 +63,7 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     const double *a = rest->vertices + 3 * i;
     const double *b = mesh->vertices + 3 * i;
-    largest = fmax(largest, hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]));
+    largest = fmax(largest, supine_distance(b, a));
   }
   return largest;
 }

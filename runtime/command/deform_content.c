@@ -6,6 +6,7 @@
 #include <strings.h>
 
 #include "sh/base/output.h"
+#include "sh/base/vec3.h"
 
 #include "runtime/command/deform_content.h"
 #include "runtime/command/names.h"
@@ -88,7 +89,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n",
                     names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
                     (double)p[0] + d[0], (double)p[1] + d[1], (double)p[2] + d[2], d[0], d[1], d[2],
-                    hypot(hypot(d[0], d[1]), d[2]));
+                    supine_length(d));
     }
     status = supine_output_commit(&output, error);
   }

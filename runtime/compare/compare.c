@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 
 #include "runtime/compare/compare_internal.h"
@@ -21,10 +22,9 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
     u[axis] = (double)b[axis] - (double)a[axis];
     v[axis] = (double)c[axis] - (double)a[axis];
   }
-  const double x = u[1] * v[2] - u[2] * v[1];
-  const double y = u[2] * v[0] - u[0] * v[2];
-  const double z = u[0] * v[1] - u[1] * v[0];
-  return sqrt(x * x + y * y + z * z);
+  double product[3];
+  supine_cross(u, v, product);
+  return supine_length(product);
 }
 
 /* a_i: a third of the triangles around i, over the area of all. */

@@ -4,6 +4,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/compare/compare_internal.h"
 
 static double dot(const double *weights, const float *coefficients, size_t count) {
@@ -14,10 +16,6 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-static double length(const double *u) {
-  return sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-}
-
 /* |u_i| of the field with weights q. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
@@ -26,12 +24,12 @@ static double displacement(const supine_basis *basis, const double *q, size_t i)
     for (size_t axis = 0; axis < 3; ++axis) {
       u[axis] = dot(q, basis->info.coefficients + (3 * i + axis) * count, count);
     }
-    return length(u);
+    return supine_length(u);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = (double)basis->info.direction[3 * i + axis];
   }
-  return fabs(dot(q, basis->info.coefficients + i * count, count)) * length(u);
+  return fabs(dot(q, basis->info.coefficients + i * count, count)) * supine_length(u);
 }
 
 void supine_compare_distances(const supine_compare *compare, const double *weights_a,

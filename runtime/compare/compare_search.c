@@ -4,10 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/compare/compare_internal.h"
 
-static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
-static const double last_step = 1e-6;                     /* rad */
+static const double last_step = 1e-6; /* rad */
 
 enum { DIRECTIONS_MAX = 16384, MOVES_MAX = 4096 };
 
@@ -62,12 +63,12 @@ static supine_status sample(search *s, const double from[3], size_t directions,
                             supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i <= directions; ++i) {
-    const double z = 1 - (2 * (double)i + 1) / (double)directions;
-    const double r = sqrt(fmax(0, 1 - z * z));
-    const double turn = golden_angle * (double)i;
-    const double spiral[3] = {r * cos(turn), r * sin(turn), z};
     double *q = s->state + s->reached * s->count;
-    memcpy(s->direction[s->reached], i < directions ? spiral : from, sizeof spiral);
+    if (i < directions) {
+      supine_spiral((double)i, (double)directions, 0, s->direction[s->reached]);
+    } else {
+      memcpy(s->direction[s->reached], from, sizeof s->direction[0]);
+    }
     status = state_of(s, s->direction[s->reached], q, error);
     if (status == SUPINE_ERROR_NUMERICAL && i < directions) {
       continue;
@@ -107,14 +108,12 @@ static void turned(const double direction[3], int move, double step, double resu
   const int thin = fabs(direction[0]) < 0.6 ? 0 : (fabs(direction[1]) < 0.6 ? 1 : 2);
   double across[3] = {0, 0, 0};
   across[thin] = 1;
-  double t[3] = {direction[1] * across[2] - direction[2] * across[1],
-                 direction[2] * across[0] - direction[0] * across[2],
-                 direction[0] * across[1] - direction[1] * across[0]};
+  double t[3];
+  supine_cross(direction, across, t);
   normalise(t);
   if (move / 2 == 1) {
-    const double u[3] = {direction[1] * t[2] - direction[2] * t[1],
-                         direction[2] * t[0] - direction[0] * t[2],
-                         direction[0] * t[1] - direction[1] * t[0]};
+    double u[3];
+    supine_cross(direction, t, u);
     memcpy(t, u, sizeof u);
   }
   const double sign = move % 2 == 0 ? 1 : -1;

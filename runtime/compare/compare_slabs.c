@@ -4,6 +4,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/compare/compare_internal.h"
 
 /* Sums over the part of a lung's surface above a cut, or over one slab's; heights grow along
@@ -37,14 +39,12 @@ typedef struct cutter {
   outline line[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static void add_cross(const double *a, const double *b, double factor, double *sum) {
-  sum[0] += factor * (a[1] * b[2] - a[2] * b[1]);
-  sum[1] += factor * (a[2] * b[0] - a[0] * b[2]);
-  sum[2] += factor * (a[0] * b[1] - a[1] * b[0]);
+  double product[3];
+  supine_cross(a, b, product);
+  for (int i = 0; i < 3; ++i) {
+    sum[i] += factor * product[i];
+  }
 }
 
 /* Orthonormal axes with the third along gravity. */
@@ -57,20 +57,18 @@ static bool make_axes(const double gravity[3], double axis[3][3]) {
   for (int i = 0; i < 3; ++i) {
     g[i] = gravity[i] / largest;
   }
-  const double size = sqrt(dot(g, g));
+  const double size = supine_length(g);
   for (int i = 0; i < 3; ++i) {
     g[i] /= size;
   }
   double seed[3] = {0, 0, 0};
   seed[fabs(g[0]) < 0.6 ? 0 : 1] = 1;
-  memset(axis[0], 0, sizeof axis[0]);
-  memset(axis[1], 0, sizeof axis[1]);
-  add_cross(g, seed, 1, axis[0]);
-  const double across = sqrt(dot(axis[0], axis[0]));
+  supine_cross(g, seed, axis[0]);
+  const double across = supine_length(axis[0]);
   for (int i = 0; i < 3; ++i) {
     axis[0][i] /= across;
   }
-  add_cross(g, axis[0], 1, axis[1]);
+  supine_cross(g, axis[0], axis[1]);
   return true;
 }
 
@@ -78,7 +76,7 @@ static void place(const cutter *c, const float *point, const float *origin, doub
   const double p[3] = {(double)point[0] - (double)origin[0], (double)point[1] - (double)origin[1],
                        (double)point[2] - (double)origin[2]};
   for (int i = 0; i < 3; ++i) {
-    out[i] = dot(c->axis[i], p);
+    out[i] = supine_dot(c->axis[i], p);
   }
 }
 
@@ -109,7 +107,7 @@ static void read_triangle(const cutter *c, const float *xyz, const uint32_t *cor
 static void add_piece(const triangle *t, const double m[3], part *sum) {
   for (int v = 0; v < 3; ++v) {
     const double down = m[v] * t->normal[2];
-    sum->sweep += m[v] * dot(t->u[v], t->average);
+    sum->sweep += m[v] * supine_dot(t->u[v], t->average);
     sum->volume += down * t->at[v][2];
     sum->area += down;
     sum->moment[0] += down * t->at[v][0];

@@ -14,6 +14,8 @@
 #include <gsl/gsl_blas.h>
 #include <gsl/gsl_linalg.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/export/targets.h"
 
 enum { POSES = 96 };
@@ -55,7 +57,7 @@ static void settle(const export_targets *targets, size_t n, float *base, float *
         sum[axis] += targets->offset[j] / targets->unit[j] * (double)added[(j * n + i) * 3 + axis];
       }
     }
-    const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+    const double length = supine_length(sum);
     if (length < least) {
       continue; /* n_0 stays: what is added is off by a constant */
     }
@@ -96,7 +98,7 @@ supine_status supine_export_targets_normals(const export_source *source,
   }
   for (size_t p = 0; p < POSES; ++p) {
     double g[3];
-    supine_export_direction(p, POSES, g);
+    supine_spiral((double)p, POSES, 0, g);
     status = SUPINE_ERROR_NUMERICAL; /* a breath that folds is no pose: one less deep is */
     for (double part = (double)(p % 4 + 1) / 4; status != SUPINE_OK && part > 1e-3; part /= 2) {
       status = supine_export_targets_at(source, breath, targets, g, part, &pose[p], error);

@@ -13,6 +13,8 @@
 #include <gsl/gsl_blas.h>
 #include <gsl/gsl_eigen.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/export/targets.h"
 
 /* U^T U. */
@@ -26,7 +28,7 @@ static void gram(const export_source *source, gsl_matrix *sum) {
     }
     for (size_t a = 0; a < k; ++a) {
       for (size_t b = 0; b <= a; ++b) {
-        *gsl_matrix_ptr(sum, a, b) += u[a][0] * u[b][0] + u[a][1] * u[b][1] + u[a][2] * u[b][2];
+        *gsl_matrix_ptr(sum, a, b) += supine_dot(u[a], u[b]);
       }
     }
   }

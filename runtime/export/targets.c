@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
 #include <supine/sh.h>
 
 #include "runtime/export/targets.h"
@@ -49,15 +50,6 @@ void supine_export_targets_weights(const export_targets *targets, size_t terms, 
   }
 }
 
-void supine_export_direction(size_t i, size_t count, double g[3]) {
-  static const double turn = 2.39996322972865332; /* the golden angle */
-  const double z = (2 * (double)i + 1) / (double)count - 1;
-  const double r = sqrt(1 - z * z);
-  g[0] = r * cos(turn * (double)i);
-  g[1] = r * sin(turn * (double)i);
-  g[2] = z;
-}
-
 supine_status supine_export_targets_at(const export_source *source, const export_breath *breath,
                                        const export_targets *targets, const double g[3],
                                        double fraction, export_pose *pose, supine_error *error) {
@@ -85,7 +77,7 @@ static supine_status find_ranges(const export_source *source, const export_breat
   export_pose pose;
   for (size_t i = 0; i < 2 * (size_t)DIRECTIONS; ++i) {
     double g[3];
-    supine_export_direction(i / 2, DIRECTIONS, g);
+    supine_spiral((double)(i / 2), DIRECTIONS, 0, g);
     const supine_status status =
         supine_export_targets_at(source, breath, targets, g, (double)(i % 2), &pose, error);
     if (status != SUPINE_OK) {

@@ -34,9 +34,6 @@ void supine_export_targets_free(export_targets *targets);
 void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
                                    double scale, double *weights);
 
-/** Direction `i` of `count`, evenly over the sphere: a Fibonacci lattice. */
-void supine_export_direction(size_t i, size_t count, double g[3]);
-
 /** The lungs at a fraction of the breath. */
 typedef struct export_pose {
   double basis[SUPINE_MODES_MAX];   /**< the basis' weights */

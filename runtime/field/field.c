@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/field/cell.h"
 
 /* The tensors of a grid, checked: a file may hold anything. */
@@ -89,7 +91,7 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   double step = INFINITY;
   for (int a = 0; a < 3; ++a) {
     const double *s = nodes->step[a];
-    step = fmin(step, sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]));
+    step = fmin(step, supine_length(s));
   }
   const size_t layers = (size_t)fmin(ceil(fade / step), 1000.0);
   for (size_t layer = 1; layer < layers; ++layer) {

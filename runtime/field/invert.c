@@ -5,15 +5,12 @@
 #include <string.h>
 
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 #include "runtime/field/cell.h"
 
 static const double close_enough = 1e-5; /* mm */
 static const double lost_beyond = 0.01;  /* mm */
-
-static double norm(const double v[3]) {
-  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 /* x + u(x) - y, and its derivative by the cell's shares: that of x, the steps, and of u. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
@@ -28,7 +25,7 @@ static double misfit(const supine_field *field, const double x[3], const double 
       slope[k][a] += field->nodes.step[a][k];
     }
   }
-  return norm(residual);
+  return supine_length(residual);
 }
 
 /* The step in shares that takes the residual away: Cramer's rule; false where the field folds. */
@@ -46,9 +43,7 @@ static bool newton(const double m[3][3], const double residual[3], double step[3
   const double determinant =
       m[0][0] * adjugate[0][0] + m[0][1] * adjugate[1][0] + m[0][2] * adjugate[2][0];
   for (int i = 0; i < 3; ++i) {
-    step[i] = -(adjugate[i][0] * residual[0] + adjugate[i][1] * residual[1] +
-                adjugate[i][2] * residual[2]) /
-              determinant;
+    step[i] = -supine_dot(adjugate[i], residual) / determinant;
   }
   return isfinite(step[0] + step[1] + step[2]);
 }
@@ -157,7 +152,7 @@ static void measure(const supine_field *field, const supine_field *inverse,
     for (size_t k = 0; k < 3; ++k) {
       back[k] += (double)u[3 * node + k];
     }
-    const double off = norm(back);
+    const double off = supine_length(back);
     residual->largest = fmax(residual->largest, off);
     sum += off * off;
     ++count;

@@ -6,6 +6,8 @@
 #include <pthread.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/render/render.h"
 
 enum { KNOTS = 6, FINE = 4096, COLOURS = 256 };
@@ -72,7 +74,7 @@ static void make_map(const double path[KNOTS][3], double map[COLOURS][3]) {
     if (i > 0) {
       const double *a = lab[i - 1];
       const double *b = lab[i];
-      length[i] = length[i - 1] + hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]);
+      length[i] = length[i - 1] + supine_distance(b, a);
     }
   }
   for (int i = 0, at = 0; i < COLOURS; ++i) {

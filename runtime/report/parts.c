@@ -2,6 +2,7 @@
 /* What several parts of the HTML report are made of. */
 #include <math.h>
 
+#include "sh/base/vec3.h"
 #include <supine/posture.h>
 
 #include "runtime/report/comparison_parts.h"
@@ -43,7 +44,7 @@ json_t *supine_report_direction(const double g[3]) {
   for (size_t i = 0; i < supine_posture_count(); ++i) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
-    const double cosine = named[0] * g[0] + named[1] * g[1] + named[2] * g[2];
+    const double cosine = supine_dot(named, g);
     if (cosine > nearest + 1e-9) { /* the first of equals: names before DICOM's codes */
       nearest = cosine;
       name = supine_posture_name(i);

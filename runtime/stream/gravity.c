@@ -4,6 +4,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "runtime/stream/gravity.h"
 
 /* 32-bit floats leave 1e-6, trackers' own arithmetic up to about 1e-4. */
@@ -38,7 +40,7 @@ static double cofactors(const double m[9], double c[9]) {
       c[3 * i + j] = m[3 * a + u] * m[3 * b + v] - m[3 * a + v] * m[3 * b + u];
     }
   }
-  return m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
+  return supine_dot(m, c);
 }
 
 static bool all_finite(const double *numbers, int count) {
@@ -155,7 +157,7 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why) {
-  const double size = norm(down, 3);
+  const double size = supine_length(down);
   *why = "it points nowhere";
   if (!isfinite(size) || !(size > 1e-9)) {
     return SUPINE_STREAM_REFUSED;
@@ -163,7 +165,7 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
   const double unit[3] = {down[0] / size, down[1] / size, down[2] / size};
   double turned[3];
   apply(setup->body, unit, turned);
-  const double length = norm(turned, 3); /* 1 but for rounding */
+  const double length = supine_length(turned); /* 1 but for rounding */
   for (int i = 0; i < 3; ++i) {
     gravity[i] = turned[i] / length;
   }
@@ -173,11 +175,10 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
 
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]) {
-  const double cross[3] = {smooth[1] * gravity[2] - smooth[2] * gravity[1],
-                           smooth[2] * gravity[0] - smooth[0] * gravity[2],
-                           smooth[0] * gravity[1] - smooth[1] * gravity[0]};
-  const double cosine = smooth[0] * gravity[0] + smooth[1] * gravity[1] + smooth[2] * gravity[2];
-  const double sine = norm(cross, 3);
+  double cross[3];
+  supine_cross(smooth, gravity, cross);
+  const double cosine = supine_dot(smooth, gravity);
+  const double sine = supine_length(cross);
   const double angle = atan2(sine, cosine);
   const double share = seconds > 0.0 ? -expm1(-step / seconds) : 1.0;
   if (share >= 1.0 || sine < 1e-12) { /* there, or opposite: no arc is shorter than another */
@@ -189,7 +190,7 @@ double supine_stream_gravity_smooth(const double gravity[3], double step, double
   for (int i = 0; i < 3; ++i) {
     smooth[i] = a * smooth[i] + b * gravity[i];
   }
-  const double length = norm(smooth, 3);
+  const double length = supine_length(smooth);
   for (int i = 0; i < 3; ++i) {
     smooth[i] /= length;
   }

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * Vectors of three, and directions spread over the sphere. */
+#ifndef SUPINE_VEC3_H
+#define SUPINE_VEC3_H
+
+#include <math.h>
+
+static inline double supine_dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** a x b; `product` is neither of them. */
+static inline void supine_cross(const double a[3], const double b[3], double product[3]) {
+  product[0] = a[1] * b[2] - a[2] * b[1];
+  product[1] = a[2] * b[0] - a[0] * b[2];
+  product[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/** a . (b x c), the determinant of the three. */
+static inline double supine_triple(const double a[3], const double b[3], const double c[3]) {
+  double product[3];
+  supine_cross(b, c, product);
+  return supine_dot(a, product);
+}
+
+static inline double supine_length(const double v[3]) {
+  return sqrt(supine_dot(v, v));
+}
+
+static inline double supine_distance(const double a[3], const double b[3]) {
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return supine_length(d);
+}
+
+/** Point `at`, 0 to `count` - 1 or between, of a spiral of golden angles that spreads `count`
+ * directions evenly over the sphere, from +z to -z; `from` is its first longitude, rad. */
+static inline void supine_spiral(double at, double count, double from, double direction[3]) {
+  static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
+  const double z = 1.0 - (2.0 * at + 1.0) / count;
+  const double radius = sqrt(fmax(0.0, 1.0 - z * z));
+  direction[0] = radius * cos(golden_angle * at + from);
+  direction[1] = radius * sin(golden_angle * at + from);
+  direction[2] = z;
+}
+
+#endif
