@@ -1,40 +1,36 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* How well samples determine a limb. */
 #include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
 
-#include <gsl/gsl_blas.h>
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_errno.h>
-#include <gsl/gsl_linalg.h>
 #include <gsl/gsl_multifit_nlinear.h>
 #include <gsl/gsl_sort_vector.h>
 #include <gsl/gsl_statistics.h>
+#include <lapacke.h>
 
 #include "runtime/breath/pv_internal.h"
 
 /* Ratio of the extreme singular values of J with columns scaled to unit length; 0 on failure. */
 static double jacobian_condition(const gsl_matrix *jacobian) {
-  double condition = 0.0;
-  gsl_matrix *u = gsl_matrix_alloc(jacobian->size1, jacobian->size2);
-  gsl_matrix *v = gsl_matrix_alloc(jacobian->size2, jacobian->size2);
-  gsl_vector *s = gsl_vector_alloc(jacobian->size2);
-  if (u != NULL && v != NULL && s != NULL) {
-    (void)gsl_matrix_memcpy(u, jacobian);
-    for (size_t i = 0; i < u->size2; ++i) {
-      gsl_vector_view column = gsl_matrix_column(u, i);
-      const double length = gsl_blas_dnrm2(&column.vector);
-      if (length > 0.0) {
-        (void)gsl_vector_scale(&column.vector, 1.0 / length);
-      }
-    }
-    if (gsl_linalg_SV_decomp_jacobi(u, v, s) == GSL_SUCCESS) {
-      condition = gsl_vector_get(s, 0) / gsl_vector_get(s, s->size - 1);
-    }
+  const int rows = (int)jacobian->size1;
+  const int columns = (int)jacobian->size2;
+  double s[SUPINE_PV_UNKNOWNS];
+  double *scaled = malloc(jacobian->size1 * jacobian->size2 * sizeof *scaled);
+  if (scaled == NULL) {
+    return 0.0;
   }
-  gsl_vector_free(s);
-  gsl_matrix_free(v);
-  gsl_matrix_free(u);
-  return condition;
+  for (int j = 0; j < columns; ++j) {
+    cblas_dcopy(rows, jacobian->data + j, (int)jacobian->tda, scaled + j, columns);
+    const double length = cblas_dnrm2(rows, scaled + j, columns);
+    cblas_dscal(rows, length > 0.0 ? 1.0 / length : 1.0, scaled + j, columns);
+  }
+  const bool found = LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'N', rows, columns, scaled, columns, s, NULL,
+                                    columns, NULL, columns) == 0;
+  free(scaled);
+  return found ? s[0] / s[columns - 1] : 0.0;
 }
 
 /* sigma from the median absolute residual, which a few bad samples do not move. */
@@ -60,7 +56,7 @@ supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_ve
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  const double misfit = gsl_blas_dnrm2(residual);
+  const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
   const double freedom = (double)(count - SUPINE_PV_UNKNOWNS);
   const double variance = misfit * misfit / freedom;
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);

@@ -11,8 +11,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include <gsl/gsl_blas.h>
-#include <gsl/gsl_linalg.h>
+#include <cblas.h>
+#include <lapacke.h>
 
 #include "sh/base/vec3.h"
 
@@ -22,26 +22,22 @@ enum { POSES = 96 };
 static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
 
 /* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
-static bool invert(gsl_matrix *a) {
-  const size_t count = a->size2;
-  gsl_matrix *v = gsl_matrix_alloc(count, count);
-  gsl_matrix *u = gsl_matrix_alloc(a->size1, count);
-  gsl_vector *s = gsl_vector_alloc(count);
-  const bool good =
-      v != NULL && u != NULL && s != NULL && gsl_linalg_SV_decomp_jacobi(a, v, s) == 0;
-  if (good) {
-    (void)gsl_matrix_memcpy(u, a);
-    for (size_t j = 0; j < count; ++j) {
-      const double value = gsl_vector_get(s, j);
-      gsl_vector_view column = gsl_matrix_column(u, j);
-      (void)gsl_vector_scale(&column.vector,
-                             value > singular * gsl_vector_get(s, 0) ? 1 / value : 0);
-    }
-    (void)gsl_blas_dgemm(CblasNoTrans, CblasTrans, 1, u, v, 0, a);
+static bool invert(size_t count, double *a) {
+  const int j = (int)count;
+  double *u = malloc(POSES * count * sizeof *u);
+  double *vt = malloc(count * count * sizeof *vt);
+  double *s = malloc(count * sizeof *s);
+  const bool good = u != NULL && vt != NULL && s != NULL && count <= POSES &&
+                    LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', POSES, j, a, j, s, u, j, vt, j) == 0;
+  for (int i = 0; good && i < j; ++i) {
+    cblas_dscal(POSES, s[i] > singular * s[0] ? 1 / s[i] : 0, u + i, j);
   }
-  gsl_matrix_free(v);
-  gsl_matrix_free(u);
-  gsl_vector_free(s);
+  if (good) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, POSES, j, j, 1, u, j, vt, j, 0, a, j);
+  }
+  free(u);
+  free(vt);
+  free(s);
   return good;
 }
 
@@ -71,10 +67,10 @@ static void settle(const export_targets *targets, size_t n, float *base, float *
 }
 
 /* The surface's own normals in every pose, summed into the fit. */
-static void add_pose(const export_targets *targets, const gsl_matrix *inverse, size_t p, size_t n,
+static void add_pose(const export_targets *targets, const double *inverse, size_t p, size_t n,
                      const float *base, const float *normals, float *added) {
   for (size_t j = 0; j < targets->count; ++j) {
-    const float amount = (float)gsl_matrix_get(inverse, p, j);
+    const float amount = (float)inverse[p * targets->count + j];
     float *to = added + 3 * j * n;
     for (size_t i = 0; i < 3 * n; ++i) {
       to[i] += amount * (normals[i] - base[i]);
@@ -91,7 +87,7 @@ supine_status supine_export_targets_normals(const export_source *source,
   export_pose *pose = malloc(POSES * sizeof *pose);
   float *xyz = malloc(3 * n * sizeof *xyz);
   float *normals = malloc(3 * n * sizeof *normals);
-  gsl_matrix *a = gsl_matrix_alloc(POSES, targets->count);
+  double *a = malloc(POSES * targets->count * sizeof *a);
   if (pose == NULL || xyz == NULL || normals == NULL || a == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
@@ -108,10 +104,10 @@ supine_status supine_export_targets_normals(const export_source *source,
     }
     status = SUPINE_OK; /* without any breath: the reference surface, which tells nothing new */
     for (size_t j = 0; j < targets->count; ++j) {
-      gsl_matrix_set(a, p, j, pose[p].weights[j] + targets->offset[j] / targets->unit[j]);
+      a[p * targets->count + j] = pose[p].weights[j] + targets->offset[j] / targets->unit[j];
     }
   }
-  if (!invert(a)) {
+  if (!invert(targets->count, a)) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the targets' normals were not found");
     goto cleanup;
   }
@@ -129,6 +125,6 @@ cleanup:
   free(pose);
   free(xyz);
   free(normals);
-  gsl_matrix_free(a);
+  free(a);
   return status;
 }

@@ -10,121 +10,107 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_blas.h>
-#include <gsl/gsl_eigen.h>
+#include <cblas.h>
+#include <lapacke.h>
 
 #include "sh/base/vec3.h"
 
 #include "runtime/export/targets.h"
 
-/* U^T U. */
-static void gram(const export_source *source, gsl_matrix *sum) {
+/* U^T U [K, K]. */
+static void gram(const export_source *source, double *sum) {
   const size_t k = source->info->mode_count;
   double u[SUPINE_MODES_MAX][3];
-  gsl_matrix_set_zero(sum);
+  memset(sum, 0, k * k * sizeof *sum);
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
     for (size_t a = 0; a < k; ++a) {
       supine_export_field(source, i, a, u[a]);
     }
     for (size_t a = 0; a < k; ++a) {
-      for (size_t b = 0; b <= a; ++b) {
-        *gsl_matrix_ptr(sum, a, b) += supine_dot(u[a], u[b]);
+      for (size_t b = 0; b < k; ++b) {
+        sum[a * k + b] += supine_dot(u[a], u[b]);
       }
     }
   }
-  for (size_t a = 0; a < k; ++a) {
-    for (size_t b = a + 1; b < k; ++b) {
-      gsl_matrix_set(sum, a, b, gsl_matrix_get(sum, b, a));
+}
+
+/* Replaces a symmetric matrix by its eigenvectors, one a row, by ascending eigenvalue. */
+static bool eigen(size_t k, double *symmetric, double *values) {
+  return LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', (lapack_int)k, symmetric, (lapack_int)k,
+                        values) == 0;
+}
+
+/* root = sum of value^exponent v v^T, where values that are 0 to rounding count as 0. */
+static void power(size_t k, const double *values, const double *vectors, double exponent,
+                  double *root) {
+  memset(root, 0, k * k * sizeof *root);
+  for (size_t i = 0; i < k; ++i) {
+    if (values[i] > 1e-12 * values[k - 1]) {
+      const double *v = vectors + i * k;
+      cblas_dger(CblasRowMajor, (int)k, (int)k, pow(values[i], exponent), v, 1, v, 1, root, (int)k);
     }
   }
 }
 
-/* Eigenvalues, descending, and vectors of `symmetric`, which is destroyed. */
-static bool eigen(gsl_matrix *symmetric, gsl_vector *values, gsl_matrix *vectors) {
-  gsl_eigen_symmv_workspace *workspace = gsl_eigen_symmv_alloc(values->size);
-  const bool good = workspace != NULL &&
-                    gsl_eigen_symmv(symmetric, values, vectors, workspace) == GSL_SUCCESS &&
-                    gsl_eigen_symmv_sort(values, vectors, GSL_EIGEN_SORT_VAL_DESC) == GSL_SUCCESS;
-  gsl_eigen_symmv_free(workspace);
-  return good;
-}
+/* The square matrices of the reduction, and the eigenvalues. */
+typedef struct matrices {
+  double gram[SUPINE_MODES_MAX * SUPINE_MODES_MAX];
+  double square[SUPINE_MODES_MAX * SUPINE_MODES_MAX]; /* then eigenvectors */
+  double half[SUPINE_MODES_MAX * SUPINE_MODES_MAX];
+  double inverse[SUPINE_MODES_MAX * SUPINE_MODES_MAX];
+  double product[SUPINE_MODES_MAX * SUPINE_MODES_MAX];
+  double values[SUPINE_MODES_MAX];
+} matrices;
 
-/* root = V diag(value^power) V^T, with values that are 0 to rounding left at 0. */
-static void power(const gsl_vector *values, const gsl_matrix *vectors, double exponent,
-                  gsl_matrix *root) {
-  const double least = 1e-12 * gsl_vector_get(values, 0);
-  gsl_matrix_set_zero(root);
-  for (size_t i = 0; i < values->size; ++i) {
-    const double value = gsl_vector_get(values, i);
-    if (value > least) {
-      const gsl_vector_const_view v = gsl_matrix_const_column(vectors, i);
-      (void)gsl_blas_dger(pow(value, exponent), &v.vector, &v.vector, root);
-    }
-  }
-}
-
-enum { GRAM, SQUARE, HALF, INVERSE, VECTORS, WORK, MATRICES };
-
-static bool reduce(const export_source *source, gsl_matrix **m, gsl_vector *values,
-                   export_targets *targets) {
-  const size_t k = source->info->mode_count;
-  const size_t count = targets->count;
-  const gsl_matrix_const_view modes = gsl_matrix_const_view_array(source->modes, k, source->terms);
-  gram(source, m[GRAM]);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasTrans, 1, &modes.matrix, &modes.matrix, 0, m[SQUARE]);
-  if (!eigen(m[SQUARE], values, m[VECTORS])) {
+static bool reduce(const export_source *source, matrices *m, export_targets *targets) {
+  const size_t modes = source->info->mode_count;
+  const int k = (int)modes;
+  const int count = (int)targets->count;
+  const int terms = (int)source->terms;
+  gram(source, m->gram);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, k, k, terms, 1, source->modes, terms,
+              source->modes, terms, 0, m->square, k);
+  if (!eigen(modes, m->square, m->values)) {
     return false;
   }
-  power(values, m[VECTORS], 0.5, m[HALF]);
-  power(values, m[VECTORS], -0.5, m[INVERSE]);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasNoTrans, 1, m[GRAM], m[HALF], 0, m[WORK]);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasNoTrans, 1, m[HALF], m[WORK], 0, m[SQUARE]);
-  if (!eigen(m[SQUARE], values, m[VECTORS])) {
+  power(modes, m->values, m->square, 0.5, m->half);
+  power(modes, m->values, m->square, -0.5, m->inverse);
+  cblas_dsymm(CblasRowMajor, CblasRight, CblasLower, k, k, 1, m->half, k, m->gram, k, 0, m->product,
+              k);
+  cblas_dsymm(CblasRowMajor, CblasLeft, CblasLower, k, k, 1, m->half, k, m->product, k, 0,
+              m->square, k);
+  if (!eigen(modes, m->square, m->values)) {
     return false;
   }
   double all = 0;
   double lost = 0;
-  for (size_t i = 0; i < k; ++i) {
-    const double value = fmax(gsl_vector_get(values, i), 0);
-    all += value;
-    lost += i < count ? 0 : value;
+  for (int i = 0; i < k; ++i) {
+    all += fmax(m->values[i], 0);
+    lost += i < k - count ? fmax(m->values[i], 0) : 0;
   }
   targets->loss_percent = all > 0 ? 100 * sqrt(lost / all) : 0;
-  gsl_matrix_view mix = gsl_matrix_view_array(targets->mix, k, count);
-  gsl_matrix_view made = gsl_matrix_view_array(targets->modes, count, source->terms);
-  const gsl_matrix_const_view best = gsl_matrix_const_submatrix(m[VECTORS], 0, 0, k, count);
-  gsl_matrix_view turned = gsl_matrix_submatrix(m[WORK], 0, 0, k, count);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasNoTrans, 1, m[HALF], &best.matrix, 0, &mix.matrix);
-  (void)gsl_blas_dgemm(CblasNoTrans, CblasNoTrans, 1, m[INVERSE], &best.matrix, 0, &turned.matrix);
-  (void)gsl_blas_dgemm(CblasTrans, CblasNoTrans, 1, &turned.matrix, &modes.matrix, 0, &made.matrix);
+  for (int j = 0; j < count; ++j) {
+    const double *v = m->square + (k - 1 - j) * k;
+    cblas_dsymv(CblasRowMajor, CblasLower, k, 1, m->half, k, v, 1, 0, targets->mix + j, count);
+    cblas_dsymv(CblasRowMajor, CblasLower, k, 1, m->inverse, k, v, 1, 0, m->product, 1);
+    cblas_dgemv(CblasRowMajor, CblasTrans, k, terms, 1, source->modes, terms, m->product, 1, 0,
+                targets->modes + j * terms, 1);
+  }
   return true;
 }
 
 supine_status supine_export_targets_reduce(const export_source *source, size_t limit,
                                            export_targets *targets, supine_error *error) {
   const size_t k = source->info->mode_count;
-  gsl_matrix *m[MATRICES] = {NULL};
-  supine_status status = SUPINE_ERROR_MEMORY;
+  matrices *m = malloc(sizeof *m);
+  if (m == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
   targets->count = limit < k ? limit : k;
   targets->mixed = true;
-  gsl_vector *values = gsl_vector_alloc(k);
-  bool there = values != NULL;
-  for (size_t i = 0; i < MATRICES; ++i) {
-    m[i] = gsl_matrix_alloc(k, k);
-    there = there && m[i] != NULL;
-  }
-  if (!there) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
-  }
-  status = reduce(source, m, values, targets)
-               ? SUPINE_OK
+  const bool found = reduce(source, m, targets);
+  free(m);
+  return found ? SUPINE_OK
                : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                   "the best %zu targets were not found: take profile raw", limit);
-cleanup:
-  for (size_t i = 0; i < MATRICES; ++i) {
-    gsl_matrix_free(m[i]);
-  }
-  gsl_vector_free(values);
-  return status;
 }
