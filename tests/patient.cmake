@@ -4,4 +4,4 @@ supine_test(patient_surface supine_patient supine_phantom supine_mesh_read supin
 supine_test(patient_expand supine_patient supine_phantom supine_mesh_read supine_base supine_gsl)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_command.sh
   $<TARGET_FILE:supine>)
-set_tests_properties(patient_command PROPERTIES TIMEOUT 300)
+set_tests_properties(patient_command PROPERTIES TIMEOUT 900)

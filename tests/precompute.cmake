@@ -13,17 +13,17 @@ target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 # Whole outputs of every command, as text files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
-set_tests_properties(command_output PROPERTIES TIMEOUT 300)
+set_tests_properties(command_output PROPERTIES TIMEOUT 900)
 # Manual pages and completions, which are made from the same tables.
 add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
   ${PROJECT_BINARY_DIR}/packaging/manual)
 # Forty subjects through the cohort's workflow, where snakemake is installed.
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
-set_tests_properties(cohort PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_no_data_lost.sh
   $<TARGET_FILE:supine>)
-set_tests_properties(no_data_lost PROPERTIES TIMEOUT 600)
+set_tests_properties(no_data_lost PROPERTIES TIMEOUT 900)
 supine_test(thread_count supine_precompute supine_phantom)
 supine_test(torture supine_precompute supine_phantom supine_mesh_read)
 supine_test(projection supine_precompute supine_phantom supine_mesh_read supine_gsl)

@@ -31,14 +31,14 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_install.sh ${CMAKE_COMMAND}
     ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/example $<TARGET_FILE:make_basis>
     ${CMAKE_C_COMPILER} ${CMAKE_CXX_COMPILER})
-  set_tests_properties(install PROPERTIES TIMEOUT 120)
+  set_tests_properties(install PROPERTIES TIMEOUT 900)
 endif()
 
 # The package for Python, by Debian's.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
-  set_tests_properties(python PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
+  set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 
 supine_test(runtime_quiet runtime_fixture)

@@ -5,7 +5,7 @@ function(supine_stream_test name)
   target_link_libraries(test_stream_${name} PRIVATE supine_build runtime_fixture supine_stream
     ${ARGN} supine_gsl test_skips)
   add_test(NAME stream_${name} COMMAND test_stream_${name})
-  set_tests_properties(stream_${name} PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77
+  set_tests_properties(stream_${name} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77
     ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/tsan.supp")
 endfunction()
 
@@ -41,13 +41,13 @@ if(Python3_EXECUTABLE)
       ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=$<TARGET_FILE_DIR:supine_runtime_shared>
       ${MONO_PROGRAM} ${unity}/link.exe {port} {basis})
     set_tests_properties(stream_unity_link_compiles PROPERTIES FIXTURES_SETUP unity)
-    set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 300)
+    set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 900)
   endif()
   # The live page, in headless Chromium.
   if(NODE_PROGRAM)
     add_test(NAME stream_page COMMAND ${with_server} 1000 "--volume rest+300 --web 0"
       ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_page.mjs {page} {port})
-    set_tests_properties(stream_page PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 ENVIRONMENT
+    set_tests_properties(stream_page PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
       "MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
   endif()
 endif()

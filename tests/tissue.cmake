@@ -10,4 +10,4 @@ supine_test(validation_lungs supine_precompute supine_phantom supine_mesh_read s
 # A series as VTK reads it, where Debian's python has VTK.
 add_test(NAME series_vtk COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_series_vtk.py
   $<TARGET_FILE:supine>)
-set_tests_properties(series_vtk PROPERTIES TIMEOUT 120 SKIP_RETURN_CODE 77)
+set_tests_properties(series_vtk PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
