@@ -70,25 +70,39 @@ function readBasis() {
   return basis;
 }
 
+/** What the recurrence below divides by and begins with, by band; made once. */
+const recurrences = new Map();
+function recurrenceOf(band) {
+  if (!recurrences.has(band)) {
+    const tops = new Float64Array(band + 1);
+    const steps = new Float64Array((band + 1) ** 2); // at l * l + l + m
+    for (let m = 0; m <= band; ++m) {
+      tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
+      for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
+    }
+    recurrences.set(band, { tops, steps });
+  }
+  return recurrences.get(band);
+}
+
 /** Real spherical harmonics Y_lm of a unit vector at l*l + l + m, orthonormal, no Condon-Shortley
  * phase: q(l, m)(z) times Re, Im of (x + i y)^m, by the recurrence in l. */
 function harmonics(band, [x, y, z]) {
   const values = new Float64Array((band + 1) ** 2);
-  let top = Math.sqrt(1 / (4 * Math.PI));
+  const { tops, steps } = recurrenceOf(band);
   let re = 1;
   let im = 0;
   for (let m = 0; m <= band; ++m) {
-    if (m > 0) {
-      [re, im] = [re * x - im * y, re * y + im * x];
-      top *= m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m));
-    }
+    if (m > 0) [re, im] = [re * x - im * y, re * y + im * x];
     let before = 0;
-    let q = top;
+    let q = tops[m];
     for (let l = m; l <= band; ++l) {
-      values[l * l + l - m] = q * im;
-      values[l * l + l + m] = q * re;
-      const a = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
-      [before, q] = [q / a, a * (z * q - before)];
+      const at = l * l + l;
+      values[at - m] = q * im;
+      values[at + m] = q * re;
+      const next = steps[at + m] * (z * q - before);
+      before = q / steps[at + m];
+      q = next;
     }
   }
   return values;

@@ -48,7 +48,9 @@ function fill(slider) {
 /** Sets a text where it is another. */
 function write(id, text) {
   const element = $(id);
-  if (element.textContent !== text) element.textContent = text;
+  if (element.written === text) return; // asking the page itself takes longer
+  element.written = text;
+  element.textContent = text;
 }
 
 /** Sets a slider, the number beside it, and what it says. */
@@ -56,7 +58,8 @@ function setSlider(id, value, text, digits = 0) {
   const slider = $(id);
   const number = $(`${id}-number`);
   if (document.activeElement !== number && number.value !== value.toFixed(digits)) number.value = value.toFixed(digits);
-  if (slider.getAttribute('aria-valuetext') === text) return;
+  if (slider.written === text) return;
+  slider.written = text;
   slider.value = value;
   slider.setAttribute('aria-valuetext', text);
   fill(slider);

@@ -22,48 +22,67 @@ const BODY = [
 /** The ends of the patient's axes. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
+/** The light on a ball of radius 1 of each tone, made once a canvas and theme. */
+const lights = new WeakMap();
+function lightsOf(context, tones) {
+  const made = lights.get(context);
+  if (made?.tones === tones) return made;
+  const fresh = { tones };
+  for (const [name, [bright, dim]] of Object.entries(tones)) {
+    fresh[name] = context.createRadialGradient(-0.3, -0.5, 0, 0, 0, 1.05);
+    fresh[name].addColorStop(0, bright);
+    fresh[name].addColorStop(1, dim);
+  }
+  lights.set(context, fresh);
+  return fresh;
+}
+
 /** Draws the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
-  const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
-  const parts = BODY.map((part) => ({ ...part, eye: rotate(q, part.at) }));
-  // The half axis that points most to the viewer decides what hides what.
-  const front = (part) => part.eye[2] + 0.5 * Math.hypot(...part.size.map((s, i) => s * axes[i][2]));
-  parts.sort((a, b) => front(a) - front(b));
+  const [ex, ey, ez] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
+  const light = lightsOf(context, tones);
+  const parts = BODY.map(({ at, size: [a, b, c], tone }) => {
+    const on = (i) => at[0] * ex[i] + at[1] * ey[i] + at[2] * ez[i];
+    const shape = (i, j) => a * a * ex[i] * ex[j] + b * b * ey[i] * ey[j] + c * c * ez[i] * ez[j];
+    // The half axis that points most to the viewer decides what hides what.
+    return { tone, x: on(0), y: on(1), xx: shape(0, 0), xy: shape(0, 1), yy: shape(1, 1), front: on(2) + 0.5 * Math.sqrt(shape(2, 2)) };
+  }).sort((a, b) => a.front - b.front);
+  context.save();
+  const screen = context.getTransform();
   for (const part of parts) {
-    let xx = 0;
-    let xy = 0;
-    let yy = 0;
-    part.size.forEach((s, i) => {
-      xx += (s * axes[i][0]) ** 2;
-      xy += s * axes[i][0] * s * axes[i][1];
-      yy += (s * axes[i][1]) ** 2;
-    });
-    const mean = (xx + yy) / 2;
-    const spread = Math.hypot((xx - yy) / 2, xy);
-    const angle = Math.atan2(2 * xy, xx - yy) / 2;
-    const cx = x + scale * part.eye[0];
-    const cy = y - scale * part.eye[1];
-    const long = scale * Math.sqrt(mean + spread);
-    const short = scale * Math.sqrt(Math.max(mean - spread, 0));
-    const light = context.createRadialGradient(cx - 0.3 * short, cy - 0.5 * short, 0, cx, cy, long * 1.05);
-    light.addColorStop(0, tones[part.tone][0]);
-    light.addColorStop(1, tones[part.tone][1]);
+    // The root of the ellipse's matrix takes the circle there, its light still from above.
+    const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
+    const by = scale / Math.sqrt(part.xx + part.yy + 2 * det);
+    context.setTransform(screen);
+    context.transform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), x + scale * part.x, y - scale * part.y);
     context.beginPath();
-    context.ellipse(cx, cy, long, short, -angle, 0, 2 * Math.PI);
-    context.fillStyle = light;
+    context.arc(0, 0, 1, 0, 2 * Math.PI);
+    context.fillStyle = light[part.tone];
     context.fill();
   }
+  context.restore();
+}
+
+/** How large a canvas is, CSS pixels: measured when that changes, as asking lays the page out. */
+const sizes = new WeakMap();
+const measured = new ResizeObserver((entries) => entries.forEach(({ target }) => sizes.delete(target)));
+function sizeOf(canvas) {
+  if (!sizes.has(canvas)) {
+    sizes.set(canvas, { width: canvas.clientWidth, height: canvas.clientHeight });
+    measured.observe(canvas);
+  }
+  return sizes.get(canvas);
 }
 
 /** Sizes a canvas for the screen's pixels and returns its context, in CSS pixels, cleared. */
 function freshContext(canvas) {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
-  const { clientWidth, clientHeight } = canvas;
-  if (canvas.width !== Math.round(clientWidth * ratio)) canvas.width = Math.round(clientWidth * ratio);
-  if (canvas.height !== Math.round(clientHeight * ratio)) canvas.height = Math.round(clientHeight * ratio);
+  const { width, height } = sizeOf(canvas);
+  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
   const context = canvas.getContext('2d');
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, clientWidth, clientHeight);
+  context.clearRect(0, 0, width, height);
   return context;
 }
 
@@ -80,10 +99,37 @@ function readTheme() {
 }
 const css = (name) => theme[name.slice(2)];
 
+const GLYPH = 18; // CSS pixels of a letter's box
+
+/** The ball's letters, those in front above those behind, drawn once a theme: text is slow. */
+let glyphsMade = null;
+function glyphsOf() {
+  const ratio = Math.min(3, window.devicePixelRatio || 1);
+  if (glyphsMade?.tones === theme.tones && glyphsMade.ratio === ratio) return glyphsMade;
+  const glyphs = document.createElement('canvas');
+  const letters = Object.keys(ENDS);
+  [glyphs.width, glyphs.height] = [letters.length * GLYPH * ratio, 2 * GLYPH * ratio];
+  const context = glyphs.getContext('2d');
+  context.scale(ratio, ratio);
+  context.font = '650 12px system-ui, sans-serif';
+  context.textAlign = 'center';
+  context.textBaseline = 'middle';
+  ['--ink', '--soft'].forEach((colour, row) => {
+    context.fillStyle = css(colour);
+    letters.forEach((letter, i) => context.fillText(letter, (i + 0.5) * GLYPH, (row + 0.5) * GLYPH));
+  });
+  glyphsMade = { glyphs, ratio, tones: theme.tones };
+  return glyphsMade;
+}
+
 /** The ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
+let drawn = ''; // what it shows
 function drawBall(canvas, toEye, gravity) {
+  const { width: size } = sizeOf(canvas);
+  const now = [size, window.devicePixelRatio, theme.ink, ...[...toEye, ...gravity].map((x) => x.toFixed(5))].join();
+  if (now === drawn) return;
+  drawn = now;
   const context = freshContext(canvas);
-  const size = canvas.clientWidth;
   const centre = size / 2;
   const radius = size / 2 - 9;
   const glass = context.createRadialGradient(centre - radius * 0.35, centre - radius * 0.45, radius * 0.1, centre, centre, radius);
@@ -117,30 +163,25 @@ function drawBall(canvas, toEye, gravity) {
     context.lineWidth = 1;
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
-    for (const [p, q] of [[[1, 0, 0], [0, 1, 0]], [[0, 1, 0], [0, 0, 1]], [[0, 0, 1], [1, 0, 0]]]) {
-      const [a, b] = [rotate(toEye, p), rotate(toEye, q)];
+    for (const axis of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
+      // A circle about n is seen as an ellipse, the near half of which lies away from n.
+      const n = rotate(toEye, axis);
+      const from = n[2] > 0 === front ? Math.PI : 0;
       context.beginPath();
-      for (let i = 0, pen = false; i <= 90; ++i) {
-        const t = (i / 90) * 2 * Math.PI;
-        const at = a.map((v, j) => v * Math.cos(t) + b[j] * Math.sin(t));
-        const here = at[2] >= 0 === front;
-        if (here) context[pen ? 'lineTo' : 'moveTo'](centre + radius * at[0], centre - radius * at[1]);
-        pen = here;
-      }
+      context.ellipse(centre, centre, radius, radius * Math.abs(n[2]), Math.atan2(-n[0], -n[1]), from, from + Math.PI);
       context.stroke();
     }
     context.globalAlpha = 1;
   };
   const letters = (front) => {
-    context.font = '650 12px system-ui, sans-serif';
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    for (const [letter, end] of Object.entries(ENDS)) {
+    const { glyphs, ratio } = glyphsOf();
+    Object.values(ENDS).forEach((end, i) => {
       const at = rotate(toEye, end);
-      if (at[2] >= 0 !== front) continue;
-      context.fillStyle = front ? css('--ink') : css('--soft');
-      context.fillText(letter, centre + (radius - 9) * at[0], centre - (radius - 9) * at[1]);
-    }
+      if (at[2] >= 0 !== front) return;
+      const [x, y] = [centre + (radius - 9) * at[0], centre - (radius - 9) * at[1]];
+      const box = GLYPH * ratio;
+      context.drawImage(glyphs, i * box, front ? 0 : box, box, box, x - GLYPH / 2, y - GLYPH / 2, GLYPH, GLYPH);
+    });
   };
   graticule(false);
   letters(false);
@@ -166,7 +207,7 @@ function lowestPart(q) {
 /** The icon of a posture: the figure as it lies in the room on a table, seen from its side. */
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
-  const { clientWidth: width, clientHeight: height } = canvas;
+  const { width, height } = sizeOf(canvas);
   const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // room -> eye
   const q = compose(camera, bodyToRoom);
   const along = rotate(q, [0, 0, 0.86]);

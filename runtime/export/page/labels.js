@@ -12,12 +12,43 @@ function project(pane, [x, y, z], ratio) {
 }
 
 const placed = (element, at, shown) => {
+  const where = shown ? `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -50%)` : '';
+  if (element.where === where) return;
+  element.where = where;
   element.hidden = !shown;
-  if (shown) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -50%)`;
+  if (shown) element.style.transform = where;
 };
 
-/** L, R, A, P, H and F around the lungs of each pane, always within the picture; those that point at
- * the viewer or away are left out. */
+const LETTER_RADIUS = 12; // CSS pixels, with a little air
+const ARROW_RADIUS = 13;  // of gravity's arrow, at its head
+
+/** Out of a plate that it would overlap, the shortest way up, down, right or left that stays in the
+ * picture. */
+function offPlate(at, plate, box) {
+  const r = LETTER_RADIUS;
+  if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
+  const ways = [{ x: at.x, y: plate.top - r }, { x: at.x, y: plate.bottom + r }, { x: plate.right + r, y: at.y }, { x: plate.left - r, y: at.y }]
+    .filter(({ x, y }) => x >= box.left + r && x <= box.right - r && y >= box.top + r && y <= box.bottom - r);
+  const far = (way) => Math.hypot(way.x - at.x, way.y - at.y);
+  return ways.reduce((best, way) => (far(way) < far(best) ? way : best), ways[0] ?? at);
+}
+
+/** Beside an arrow that it would overlap. */
+function offArrow(at, [from, to], box) {
+  const [dx, dy] = [to.x - from.x, to.y - from.y];
+  const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));
+  const [nx, ny] = [from.x + along * dx, from.y + along * dy];
+  const far = LETTER_RADIUS + ARROW_RADIUS;
+  if (Math.hypot(at.x - nx, at.y - ny) >= far) return at;
+  const size = Math.hypot(dx, dy) || 1;
+  const side = (at.x - nx) * -dy + (at.y - ny) * dx < 0 ? -1 : 1;
+  const beside = (way) => ({ x: nx - (way * far * dy) / size, y: ny + (way * far * dx) / size });
+  const inside = ({ x, y }) => x >= box.left + 12 && x <= box.right - 12 && y >= box.top + 12 && y <= box.bottom - 12;
+  return inside(beside(side)) ? beside(side) : beside(-side);
+}
+
+/** L, R, A, P, H and F around the lungs of each pane, always within the picture and off what lies over
+ * it; those that point at the viewer or away are left out. */
 class Letters {
   constructor(parent, panes) {
     this.sets = Array.from({ length: panes }, () => Object.keys(ENDS).map((letter) => {
@@ -30,17 +61,21 @@ class Letters {
     }));
   }
 
-  show(panes, { centre, half }, ratio) {
+  show(panes, { centre, half }, ratio, plates) {
     this.sets.forEach((set, i) => {
       const pane = panes[i];
       const middle = pane && project(pane, centre, ratio);
+      const box = pane && { left: pane.box[0] / ratio, right: (pane.box[0] + pane.box[2]) / ratio, top: 0, bottom: pane.canvasHeight / ratio };
+      const arrow = pane?.arrowEnds.map((end) => project(pane, end, ratio));
       Object.values(ENDS).forEach((end, j) => {
         const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // past the arrow
-        const at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
+        let at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
         const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
         if (at) { // at the picture's edge where it would be beyond
-          at.x = Math.max(pane.box[0] / ratio + 15, Math.min((pane.box[0] + pane.box[2]) / ratio - 15, at.x));
-          at.y = Math.max(15, Math.min(pane.canvasHeight / ratio - 15, at.y));
+          at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
+          at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
+          if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
+          for (const plate of plates) at = offPlate(at, plate, box);
         }
         placed(set[j], at, Boolean(far));
       });

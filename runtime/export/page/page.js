@@ -53,7 +53,7 @@ function start() {
   let panes = [];
   const marks = [];
 
-  const ratio = () => canvas.width / Math.max(1, canvas.clientWidth);
+  const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
   const modelTurn = (q = state.q) => slerp(IDENTITY, q, blend());
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
@@ -61,9 +61,16 @@ function start() {
 
   /** How far the lungs reach along gravity, mm: some of their vertices, as they are. */
   function lowest(moment) {
-    let reach = -Infinity;
+    const { rest, direction, coefficients, modes } = basis;
+    const { weights, gravity: [x, y, z] } = moment;
     const stride = Math.ceil(basis.vertices / 400);
-    for (let i = 0; i < basis.vertices; i += stride) reach = Math.max(reach, dot(moment.gravity, placeOf(basis, moment, i)));
+    let reach = -Infinity;
+    for (let i = 0; i < basis.vertices; i += stride) {
+      let amount = 0;
+      for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[i * modes + k];
+      const at = 3 * i;
+      reach = Math.max(reach, x * (rest[at] + amount * direction[at]) + y * (rest[at + 1] + amount * direction[at + 1]) + z * (rest[at + 2] + amount * direction[at + 2]));
+    }
     return reach;
   }
 
@@ -82,14 +89,15 @@ function start() {
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
     const tailAt = rotate(toRoom, centre.map((c, i) => c + gravity[i] * tail));
     const arrow = rigid(compose(toRoom, arrowTurn(gravity)), tailAt.map((x, i) => x + offset[i]));
-    for (let i = 0; i < 12; ++i) arrow[i] *= radius * 0.34;
+    const length = 0.34 * radius;
+    for (let i = 0; i < 12; ++i) arrow[i] *= length;
     const reach = 2.5 * radius + Math.hypot(...pivot.map((x, i) => x - centre[i]));
     const { axis, at } = state.cut;
     const kind = KINDS[state.kind];
     return {
-      name, state: name, origin: state.kind === 'difference' ? 'pinned' : 'ghost', box, canvasHeight: canvas.height,
+      name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'ghost', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
-      arrowToEye: arrow, gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
+      arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), body.low[axis] + at * (body.high[axis] - body.low[axis])],
@@ -281,7 +289,7 @@ function start() {
 
   function frame(now) {
     requestAnimationFrame(frame);
-    if (!picture) return;
+    if (!picture || inHeadset) return;
     point();
     const moving = state.advance(before === null ? 0 : (now - before) / 1000);
     if (moving) stale = unseen = true;
@@ -323,12 +331,36 @@ function start() {
     if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
   }
 
+  /* What lies over the picture, CSS pixels; measured when its size changes. */
+  let covers = null;
+  const covered = new ResizeObserver(() => { covers = null; look(); });
+  for (const plate of ['legend', 'title']) covered.observe($(plate));
+  function plates() {
+    covers ??= ['legend', 'title'].map((id) => ({ left: $(id).offsetLeft, top: $(id).offsetTop, right: $(id).offsetLeft + $(id).offsetWidth, bottom: $(id).offsetTop + $(id).offsetHeight }));
+    return covers;
+  }
+
   function draw() {
     panes = makePanes();
     picture.draw(panes);
-    letters.show(panes, body, ratio());
+    letters.show(panes, body, ratio(), plates());
     if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
   }
+
+  let inHeadset = false;
+  /** What a headset shows of a frame at a time, ms. */
+  function headsetFrame(now) {
+    if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
+      state.compute();
+      deform();
+      showState();
+    }
+    inHeadset = true;
+    before = now;
+    stale = false;
+    return state.moment && picture ? makePane('now', state.moment, state.q, [0, 0, 1, 1]) : null;
+  }
+  offerXr($('vr'), () => picture, headsetFrame, () => { inHeadset = false; before = null; touch(); });
 
   function keepLink() {
     try {
@@ -344,7 +376,7 @@ function start() {
     state.camera.elevation = Math.max(-RIGHT_ANGLE, Math.min(RIGHT_ANGLE, state.camera.elevation + dy));
     look();
   };
-  const boxSize = () => (state.beside ? { width: canvas.clientWidth / 2, height: canvas.clientHeight } : { width: canvas.clientWidth, height: canvas.clientHeight });
+  const boxSize = () => ({ width: sizeOf(canvas).width / (state.beside ? 2 : 1), height: sizeOf(canvas).height });
   const shift = (dx, dy) => { // CSS pixels
     const { width, height } = boxSize();
     const mm = (2 * tangent * distanceNow(width / height)) / height;
@@ -592,7 +624,7 @@ function start() {
     /** Weights with the breath scale in them, and the scale. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */
-    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio()); showState(); },
+    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio(), plates()); showState(); },
     rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }

@@ -372,11 +372,11 @@ class Picture {
     }
   }
 
-  draw(panes) {
-    const { gl, canvas } = this;
+  /** Draws panes on the canvas, or where else. */
+  draw(panes, framebuffer = null) {
+    const { gl } = this;
     this.beginTiming();
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);

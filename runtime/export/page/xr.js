@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// The lungs in a headset, at their own size, where the browser has WebXR.
+
+const XR_AWAY = 0.7; // metres, in front of the viewer's first place
+
+/** a b of 4 x 4 matrices by columns. */
+const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
+  let sum = 0;
+  for (let k = 0; k < 4; ++k) sum += a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k];
+  return sum;
+});
+
+/** What an eye of the headset sees of a pane of the page: the pane's millimetres in front of its
+ * viewer become metres in the room. */
+function xrPane(pane, view, { x, y, width, height }) {
+  const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
+  const toEye = product(view.transform.inverse.matrix, room);
+  return {
+    ...pane, box: [x, y, width, height], toEye: product(toEye, pane.toEye), arrowToEye: product(toEye, pane.arrowToEye),
+    projection: view.projectionMatrix, dark: true,
+  };
+}
+
+/** Shows `button` where headsets are. `frame(time)` moves the state on and says what one pane of the
+ * page would show; `over()` comes after the session. */
+async function offerXr(button, getPicture, frame, over) {
+  if (!(await navigator.xr?.isSessionSupported('immersive-vr').catch(() => false))) return;
+  button.hidden = false;
+  let session = null;
+  button.addEventListener('click', async () => {
+    if (session) {
+      session.end();
+      return;
+    }
+    try {
+      session = await navigator.xr.requestSession('immersive-vr');
+    } catch {
+      return; // the viewer declined
+    }
+    const { gl } = getPicture();
+    await gl.makeXRCompatible?.();
+    const layer = new XRWebGLLayer(session, gl);
+    session.updateRenderState({ baseLayer: layer, depthNear: 0.05, depthFar: 20 });
+    const space = await session.requestReferenceSpace('local');
+    button.textContent = 'Leave VR';
+    session.addEventListener('end', () => {
+      session = null;
+      button.textContent = 'Enter VR';
+      over();
+    });
+    const draw = (time, seen) => {
+      session?.requestAnimationFrame(draw);
+      const views = seen.getViewerPose(space)?.views ?? [];
+      const pane = views.length ? frame(time) : null;
+      if (pane) getPicture().draw(views.map((view) => xrPane(pane, view, layer.getViewport(view))), layer.framebuffer);
+    };
+    session.requestAnimationFrame(draw);
+  });
+}
