@@ -3,30 +3,78 @@
 #include <string.h>
 
 #include "runtime/internal.h"
+#include "runtime/kernels/compact.h"
+
+static bool fits(const supine_basis *basis) {
+  return !basis->info.vector && basis->info.mode_count <= SUPINE_GL_MODES;
+}
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                              float *attributes) {
   const size_t modes = basis->info.mode_count;
-  if (basis->info.vector || modes > SUPINE_GL_MODES) {
+  size_t lung = 0;
+  if (!fits(basis)) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  float *to = attributes;
-  for (size_t i = begin; i < end; ++i, to += SUPINE_GL_FLOATS) {
+  for (size_t i = begin; i < end; ++i) {
+    float *to = attributes + (i - begin) * (SUPINE_GL_FLOATS + modes);
+    while (i >= basis->lung_begin[lung + 1]) {
+      ++lung;
+    }
     memcpy(to, basis->info.vertices + 3 * i, 3 * sizeof *to);
-    memcpy(to + 3, basis->info.direction + 3 * i, 3 * sizeof *to);
-    memset(to + 6, 0, SUPINE_GL_MODES * sizeof *to);
-    memcpy(to + 6, basis->info.coefficients + i * modes, modes * sizeof *to);
+    to[3] = (float)lung;
+    memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
+    memcpy(to + SUPINE_GL_FLOATS, basis->info.coefficients + i * modes, modes * sizeof *to);
   }
   return SUPINE_OK;
 }
 
-supine_status supine_gl_weights(const supine_basis *basis, const double *weights, double scale,
-                                float *uniforms) {
-  if (basis->info.vector || basis->info.mode_count > SUPINE_GL_MODES) {
+supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
+                                const double *scales, float *uniforms) {
+  const size_t modes = basis->info.mode_count;
+  const size_t room = (modes + 3) / 4 * 4;
+  if (!fits(basis)) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  for (size_t k = 0; k < SUPINE_GL_MODES; ++k) {
-    uniforms[k] = k < basis->info.mode_count ? (float)(scale * weights[k]) : 0;
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    for (size_t k = 0; k < room; ++k) {
+      uniforms[lung * room + k] = k < modes ? (float)(scales[lung] * weights[k]) : 0;
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
+                                     uint32_t *words) {
+  const size_t count = supine_tiles_normal_words(basis->info.normal_count);
+  if (count == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t word = 0; word < count; ++word) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        *words++ = supine_basis_normal_word(basis, i, axis, word);
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_gl_normal_weights(const supine_basis *basis, const double *weights,
+                                       const double *scales, float *uniforms) {
+  const size_t modes = basis->info.normal_count;
+  const size_t words = supine_tiles_normal_words(modes);
+  double v[SUPINE_LUNGS_MAX * SUPINE_NORMAL_MODES_MAX];
+  if (words == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  supine_basis_normal_weights(basis, weights, scales, v);
+  memset(uniforms, 0, 3 * words * basis->info.lung_count * sizeof *uniforms);
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    for (size_t j = 0; j < modes; ++j) {
+      uniforms[3 * (lung * words + j % words) + j / words] =
+          (float)(normal_unit() * v[lung * modes + j]);
+    }
   }
   return SUPINE_OK;
 }

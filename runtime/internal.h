@@ -47,6 +47,11 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
+/** Three modes of a vertex's normal along one axis: compact.h, word of supine_tiles_normal_words.
+ */
+uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
+                                  size_t word);
+
 /** Zeroed memory for tiles, aligned to lines, in huge pages where it fills some. */
 unsigned char *supine_tiles_allocate(size_t bytes);
 

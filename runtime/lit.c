@@ -7,21 +7,25 @@
 
 enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
 
+uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
+                                  size_t word) {
+  const size_t count = basis->info.normal_count;
+  const int16_t *n = basis->info.normals + (3 * vertex + axis) * count;
+  double three[3] = {0, 0, 0};
+  for (size_t j = word, which = 0; j < count; j += supine_tiles_normal_words(count), ++which) {
+    three[which] = n[j] / normal_unit();
+  }
+  return normal_narrow(three[0], three[1], three[2]);
+}
+
 /* Word `word` of 16 vertices along one axis. */
 static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
                       unsigned char *at) {
-  const size_t count = basis->info.normal_count;
-  const size_t words = supine_tiles_normal_words(count);
   const size_t last = basis->info.vertex_count - 1;
   uint32_t packed[TILE];
   for (size_t v = 0; v < TILE; ++v) {
-    const size_t i = tile * TILE + v < last ? tile * TILE + v : last;
-    const int16_t *n = basis->info.normals + (3 * i + axis) * count;
-    double three[3] = {0, 0, 0};
-    for (size_t j = word, which = 0; j < count; j += words, ++which) {
-      three[which] = n[j] / normal_unit();
-    }
-    packed[v] = normal_narrow(three[0], three[1], three[2]);
+    const size_t i = tile * TILE + v;
+    packed[v] = supine_basis_normal_word(basis, i < last ? i : last, axis, word);
   }
   memcpy(at, packed, sizeof packed);
 }

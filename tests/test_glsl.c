@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine.glsl off screen, in GLSL ES 3.00 and GLSL 3.30 core: positions by transform feedback equal
- * the C evaluator's within rounding. Skips where EGL gives no such context. */
+/* supine.glsl off screen, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals by transform
+ * feedback equal the C evaluator's within rounding, of lungs at different scales in one draw. Skips
+ * where EGL gives no such context. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -20,7 +21,7 @@
 
 #include "runtime_fixture.h"
 
-enum { VERTICES = 1003 };
+enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
 
 /* Functions common to both APIs, from the context's own library. */
 #define GL_FUNCTIONS(F)                                                                            \
@@ -58,8 +59,10 @@ enum { VERTICES = 1003 };
   F(PFNGLRENDERBUFFERSTORAGEPROC, RenderbufferStorage)                                             \
   F(PFNGLSHADERSOURCEPROC, ShaderSource)                                                           \
   F(PFNGLTRANSFORMFEEDBACKVARYINGSPROC, TransformFeedbackVaryings)                                 \
+  F(PFNGLUNIFORM3FVPROC, Uniform3fv)                                                               \
   F(PFNGLUNIFORM4FVPROC, Uniform4fv)                                                               \
   F(PFNGLUSEPROGRAMPROC, UseProgram)                                                               \
+  F(PFNGLVERTEXATTRIBIPOINTERPROC, VertexAttribIPointer)                                           \
   F(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)
 
 typedef struct gl_api {
@@ -105,11 +108,11 @@ static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, 
   return true;
 }
 
-static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, const char *library,
-                          const char *text) {
-  const char *const parts[] = {version, library, text};
+static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, const char *defines,
+                          const char *library, const char *text) {
+  const char *const parts[] = {version, defines, library, text};
   const GLuint shader = gl->CreateShader(kind);
-  gl->ShaderSource(shader, 3, parts, NULL);
+  gl->ShaderSource(shader, 4, parts, NULL);
   gl->CompileShader(shader);
   GLint good = 0;
   gl->GetShaderiv(shader, GL_COMPILE_STATUS, &good);
@@ -121,24 +124,39 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
-static GLuint make_program(const gl_api *gl, const char *version, const char *library) {
-  static const char vertex[] =
-      "in vec3 rest; in vec3 direction; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3;\n"
-      "out vec3 position;\n"
-      "void main() {\n"
-      "  position = supine_displace(rest, direction, c0, c1, c2, c3);\n"
-      "  gl_Position = vec4(position, 1.0);\n"
-      "}\n";
+/* One that displaces by the function for `vectors` vec4s of coefficients. */
+static GLuint make_program(const gl_api *gl, const char *version, const char *library,
+                           size_t vectors) {
+  static const char *const arguments[] = {"c0", "c0, c1", "c0, c1, c2", "c0, c1, c2, c3"};
   static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
-  static const char *const names[] = {"rest", "direction", "c0", "c1", "c2", "c3"};
-  static const char *const varyings[] = {"position"};
+  static const char *const names[] = {"rest", "direction", "c0", "c1", "c2",
+                                      "c3",   "n0",        "n1", "n2"};
+  static const char *const varyings[] = {"position", "normal"};
+  char vertex[1024];
+  char defines[256];
+  (void)snprintf(defines, sizeof defines,
+                 "#define SUPINE_LUNGS %d\n#define SUPINE_VECTORS %zu\n#define SUPINE_WORDS %d\n",
+                 LUNGS, vectors, WORDS);
+  (void)snprintf(
+      vertex, sizeof vertex,
+      "in vec4 rest; in vec3 direction; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3;\n"
+      "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
+      "out vec3 position;\n"
+      "out vec3 normal;\n"
+      "void main() {\n"
+      "  position = supine_displace(rest, direction, %s);\n"
+      "  normal = normalize(supine_normal(rest, 0, n0) + supine_normal(rest, 1, n1) +\n"
+      "                     supine_normal(rest, 2, n2));\n"
+      "  gl_Position = vec4(position, 1.0);\n"
+      "}\n",
+      arguments[vectors - 1]);
   const GLuint program = gl->CreateProgram();
-  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, library, vertex));
-  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", fragment));
-  for (GLuint i = 0; i < 6; ++i) {
+  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
+  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
+  for (GLuint i = 0; i < sizeof names / sizeof *names; ++i) {
     gl->BindAttribLocation(program, i, names[i]);
   }
-  gl->TransformFeedbackVaryings(program, 1, varyings, GL_INTERLEAVED_ATTRIBS);
+  gl->TransformFeedbackVaryings(program, 2, varyings, GL_INTERLEAVED_ATTRIBS);
   gl->LinkProgram(program);
   GLint good = 0;
   gl->GetProgramiv(program, GL_LINK_STATUS, &good);
@@ -162,30 +180,60 @@ static void make_framebuffer(const gl_api *gl) {
   gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
 }
 
-/* Positions of every vertex by the shader. */
-static void run_shader(const gl_api *gl, GLuint program, const float *attributes,
-                       const float *uniforms, float *xyz) {
-  static const GLint sizes[] = {3, 3, 4, 4, 4, 4};
-  const GLsizei stride = SUPINE_GL_FLOATS * sizeof(float);
-  const GLsizeiptr output = (GLsizeiptr)(3 * VERTICES * sizeof(float));
+/* What a program draws with. */
+typedef struct model {
+  size_t modes;
+  float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] */
+  uint32_t *words;   /* [VERTICES, WORDS, 3] */
+  float weights[LUNGS * SUPINE_GL_MODES];
+  float normal_weights[LUNGS * WORDS * 3];
+} model;
+
+/* Vertex arrays of the model. */
+static void load_model(const gl_api *gl, const model *m) {
+  const size_t floats = SUPINE_GL_FLOATS + m->modes;
+  const GLsizei stride = (GLsizei)(floats * sizeof(float));
   GLuint array = 0;
   GLuint buffers[2] = {0, 0};
   gl->GenVertexArrays(1, &array);
   gl->BindVertexArray(array);
   gl->GenBuffers(2, buffers);
   gl->BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
-  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, attributes, GL_STATIC_DRAW);
-  uintptr_t offset = 0;
-  for (GLuint i = 0; i < 6; ++i) {
-    gl->EnableVertexAttribArray(i);
-    gl->VertexAttribPointer(i, sizes[i], GL_FLOAT, GL_FALSE, stride, (const void *)offset);
-    offset += (size_t)sizes[i] * sizeof(float);
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, m->attributes, GL_STATIC_DRAW);
+  gl->EnableVertexAttribArray(0);
+  gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, stride, NULL);
+  gl->EnableVertexAttribArray(1);
+  gl->VertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, (const void *)(4 * sizeof(float)));
+  for (size_t k = 0; k < m->modes; k += 4) {
+    const uintptr_t offset = (SUPINE_GL_FLOATS + k) * sizeof(float);
+    gl->EnableVertexAttribArray((GLuint)(2 + k / 4));
+    gl->VertexAttribPointer((GLuint)(2 + k / 4), m->modes - k < 4 ? (GLint)(m->modes - k) : 4,
+                            GL_FLOAT, GL_FALSE, stride, (const void *)offset);
   }
-  gl->BindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, buffers[1]);
+  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[1]);
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(VERTICES * WORDS * 3 * sizeof *m->words), m->words,
+                 GL_STATIC_DRAW);
+  for (GLuint j = 0; j < WORDS; ++j) {
+    gl->EnableVertexAttribArray(6 + j);
+    gl->VertexAttribIPointer(6 + j, 3, GL_UNSIGNED_INT, (GLsizei)(WORDS * 3 * sizeof *m->words),
+                             (const void *)((uintptr_t)j * 3 * sizeof *m->words));
+  }
+}
+
+/* Position and normal of every vertex by the shader, [VERTICES, 6], in one draw. */
+static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
+  const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
+  const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
+  GLuint buffer = 0;
+  load_model(gl, m);
+  gl->GenBuffers(1, &buffer);
+  gl->BindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, buffer);
   gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
-  gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffers[1]);
+  gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
   gl->UseProgram(program);
-  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), 4, uniforms);
+  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), LUNGS * vectors, m->weights);
+  gl->Uniform3fv(gl->GetUniformLocation(program, "supine_normal_weights"), LUNGS * WORDS,
+                 m->normal_weights);
   gl->Enable(GL_RASTERIZER_DISCARD);
   gl->BeginTransformFeedback(GL_POINTS);
   gl->DrawArrays(GL_POINTS, 0, VERTICES);
@@ -194,7 +242,58 @@ static void run_shader(const gl_api *gl, GLuint program, const float *attributes
   assert_int_equal(gl->GetError(), GL_NO_ERROR);
   const void *mapped = gl->MapBufferRange(GL_TRANSFORM_FEEDBACK_BUFFER, 0, output, GL_MAP_READ_BIT);
   assert_non_null(mapped);
-  memcpy(xyz, mapped, (size_t)output);
+  memcpy(captured, mapped, (size_t)output);
+}
+
+/* The GPU's normals have the numbers of the C evaluator's words; products and the root round: less
+ * than this, of sums that random modes make cancel tenfold. */
+static const double normal_rounding = 1e-4;
+
+static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
+  const GLuint program = make_program(gl, version, library, (modes + 3) / 4);
+  fixture *f = fixture_create(VERTICES, modes, 3, LUNGS, false, false, 9, 21);
+  fixture_add_normals(f, NORMALS, 5);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
+  model m = {.modes = modes};
+  m.attributes = fixture_allocate(VERTICES * (SUPINE_GL_FLOATS + modes), sizeof *m.attributes);
+  m.words = fixture_allocate((size_t)VERTICES * WORDS * 3, sizeof *m.words);
+  float *gpu = fixture_allocate(6 * VERTICES, sizeof *gpu);
+  float *cpu = fixture_allocate(6 * VERTICES, sizeof *cpu);
+  assert_int_equal(supine_gl_pack(basis, 0, VERTICES, m.attributes), SUPINE_OK);
+  assert_int_equal(supine_gl_pack_normals(basis, 0, VERTICES, m.words), SUPINE_OK);
+  const double gravity[3] = {0.6, -0.3, 0.2};
+  const double scales[LUNGS] = {1.7, -0.9};
+  double weights[SUPINE_GL_MODES];
+  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, weights, scales, m.weights), SUPINE_OK);
+  assert_int_equal(supine_gl_normal_weights(basis, weights, scales, m.normal_weights), SUPINE_OK);
+  run_shader(gl, program, &m, gpu);
+  assert_int_equal(supine_deform_lit(basis, weights, scales, cpu, cpu + 3 * VERTICES), SUPINE_OK);
+  double moved = 0;
+  /* Both round as supine_basis_error says, so they differ by at most twice that. */
+  const double bound = 2 * supine_basis_error(basis, weights, scales);
+  assert_true(bound < 1e-3);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float *normal = cpu + 3 * VERTICES;
+      assert_true(fabs((double)gpu[6 * i + axis] - (double)cpu[3 * i + axis]) <= bound);
+      assert_true(fabs((double)gpu[6 * i + 3 + axis] - (double)normal[3 * i + axis]) <=
+                  normal_rounding);
+      moved = fmax(moved, fabs((double)gpu[6 * i + axis] - (double)f->vertex[3 * i + axis]));
+    }
+  }
+  assert_true(moved > 1);
+  free(m.attributes);
+  free(m.words);
+  free(gpu);
+  free(cpu);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
 }
 
 static void check_glsl(EGLenum api, const char *version) {
@@ -211,42 +310,9 @@ static void check_glsl(EGLenum api, const char *version) {
   size_t length = 0;
   unsigned char *library = fixture_read(SUPINE_GLSL, &length);
   library[length] = '\0';
-  const GLuint program = make_program(&gl, version, (const char *)library);
-  static const size_t modes[] = {1, 5, 16};
-  for (size_t m = 0; m < 3; ++m) {
-    fixture *f = fixture_create(VERTICES, modes[m], 3, 1, false, false, 9, 21);
-    size_t size = 0;
-    unsigned char *bytes = fixture_bytes(f, &size);
-    const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
-    supine_basis *basis = NULL;
-    assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
-    float *attributes = fixture_allocate(VERTICES * SUPINE_GL_FLOATS, sizeof *attributes);
-    float *gpu = fixture_allocate(3 * VERTICES, sizeof *gpu);
-    float *cpu = fixture_allocate(3 * VERTICES, sizeof *cpu);
-    assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_OK);
-    const double gravity[3] = {0.6, -0.3, 0.2};
-    const double scale = 1.7;
-    double weights[16];
-    float uniforms[SUPINE_GL_MODES];
-    assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-    assert_int_equal(supine_gl_weights(basis, weights, scale, uniforms), SUPINE_OK);
-    run_shader(&gl, program, attributes, uniforms, gpu);
-    supine_deform(basis, weights, &scale, cpu);
-    double moved = 0;
-    /* Both round as supine_basis_error says, so they differ by at most twice that. */
-    const double bound = 2 * supine_basis_error(basis, weights, &scale);
-    assert_true(bound < 1e-3);
-    for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
-      assert_true(fabs((double)gpu[i] - (double)cpu[i]) <= bound);
-      moved = fmax(moved, fabs((double)gpu[i] - (double)f->vertex[i]));
-    }
-    assert_true(moved > 1);
-    free(attributes);
-    free(gpu);
-    free(cpu);
-    supine_basis_close(basis);
-    free(bytes);
-    fixture_destroy(f);
+  static const size_t modes[] = {1, 4, 6, 11, 16};
+  for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
+    check_modes(&gl, version, (const char *)library, modes[i]);
   }
   free(library);
   (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -254,20 +320,20 @@ static void check_glsl(EGLenum api, const char *version) {
   (void)eglTerminate(display);
 }
 
-static void test_glsl_es300_positions_equal_evaluator(void **state) {
+static void test_glsl_es300_equals_evaluator(void **state) {
   (void)state;
   check_glsl(EGL_OPENGL_ES_API, "#version 300 es\nprecision highp float;\n");
 }
 
-static void test_glsl_330_core_positions_equal_evaluator(void **state) {
+static void test_glsl_330_core_equals_evaluator(void **state) {
   (void)state;
   check_glsl(EGL_OPENGL_API, "#version 330 core\n");
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_glsl_es300_positions_equal_evaluator),
-      cmocka_unit_test(test_glsl_330_core_positions_equal_evaluator),
+      cmocka_unit_test(test_glsl_es300_equals_evaluator),
+      cmocka_unit_test(test_glsl_330_core_equals_evaluator),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

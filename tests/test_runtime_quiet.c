@@ -137,8 +137,12 @@ static void use_all(const supine_basis *basis, float *xyz) {
   supine_deform_batch(basis, 1, weights, scales, 0, n, xyz);
   supine_step(n, xyz + 3 * n, xyz);
   supine_normals(basis, xyz, xyz + 3 * n);
+  (void)supine_deform_lit(basis, weights, scales, xyz, xyz + 3 * n);
+  (void)supine_deform_lit_batch(basis, 1, weights, scales, 0, n, xyz, xyz + 3 * n);
   (void)supine_gl_pack(basis, 0, n, xyz);
-  (void)supine_gl_weights(basis, weights, 1, xyz);
+  (void)supine_gl_weights(basis, weights, scales, xyz);
+  (void)supine_gl_pack_normals(basis, 0, n, (uint32_t *)(void *)xyz);
+  (void)supine_gl_normal_weights(basis, weights, scales, xyz);
   (void)supine_basis_metadata(basis, "kind");
   (void)supine_basis_vertices(basis);
   (void)supine_basis_triangles(basis);
@@ -154,8 +158,9 @@ typedef struct setting {
 static setting setting_open(void) {
   setting s = {.f = fixture_create(100, 5, 2, 2, false, true, 5, 9), .folder = fixture_folder()};
   (void)snprintf(s.path, sizeof s.path, "%s/a", s.folder);
+  fixture_add_normals(s.f, 6, 4);
   fixture_write(s.f, s.path);
-  s.xyz = calloc(100 * SUPINE_GL_FLOATS, sizeof *s.xyz);
+  s.xyz = calloc(100 * (SUPINE_GL_FLOATS + 5), sizeof *s.xyz);
   assert_non_null(s.xyz);
   return s;
 }

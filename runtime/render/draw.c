@@ -169,19 +169,22 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 }
 
 static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {
+  float weights[SUPINE_LUNGS_MAX * SUPINE_GL_MODES] = {0};
   size_t begin;
   size_t end;
   shown_lungs(r, scene, &begin, &end);
-  for (size_t lung = begin; lung < end; ++lung) {
-    float weights[SUPINE_GL_MODES] = {1};
-    if (r->packed) {
-      (void)supine_gl_weights(r->basis, scene->weights, scene->scales[lung], weights);
+  if (r->packed) {
+    (void)supine_gl_weights(r->basis, scene->weights, scene->scales, weights);
+  } else {
+    for (size_t lung = 0; lung < r->weight_count; ++lung) {
+      weights[4 * lung] = 1;
     }
-    glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), 4, weights);
-    glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[lung + 1] - r->index_begin[lung])),
-                   GL_UNSIGNED_INT,
-                   (const void *)(uintptr_t)(3 * r->index_begin[lung] * sizeof(uint32_t)));
   }
+  glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), (GLsizei)r->weight_count,
+               weights);
+  glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[end] - r->index_begin[begin])),
+                 GL_UNSIGNED_INT,
+                 (const void *)(uintptr_t)(3 * r->index_begin[begin] * sizeof(uint32_t)));
 }
 
 /* A framebuffer to draw on and read from. */

@@ -31,8 +31,9 @@ enum {
   ATTRIBUTE_COUNT
 };
 
-/* Compiles and links; 0 after filling `error`. */
-GLuint supine_render_gl_program(supine_error *error);
+/* Compiles and links, for `lungs` whose weights are `vectors` vec4s each (supine.glsl); 0 after
+ * filling `error`. */
+GLuint supine_render_gl_program(size_t lungs, size_t vectors, supine_error *error);
 
 struct supine_renderer {
   const supine_basis *basis;
@@ -43,6 +44,7 @@ struct supine_renderer {
   GLuint buffer[4]; /* vertices; displacements, where not packed; normals, values; triangles */
   GLuint colours[SUPINE_COLOURS_COUNT];
   bool packed; /* the basis has at most 16 modes and one direction a vertex: the GPU displaces */
+  size_t weight_count; /* vec4s of supine_weights: of two lungs at least, see load_vertices */
   size_t index_begin[SUPINE_LUNGS_MAX + 1]; /* triangles of each lung */
   float *scratch;                           /* [N, 7]: positions, normals, values */
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Where a vertex of the lungs stands in the picture.
-layout(location = 0) in vec3 rest;
+layout(location = 0) in vec4 rest;
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec4 c0;
 layout(location = 3) in vec4 c1;
@@ -16,7 +16,12 @@ out vec3 v_normal;
 out vec3 v_eye;
 out float v_value;
 void main() {
-  vec3 p = view * (supine_displace(rest, direction, c0, c1, c2, c3) - centre);
+  vec4 c[4] = vec4[4](c0, c1, c2, c3);
+  float amount = 0.0;
+  for (int i = 0; i < SUPINE_VECTORS; ++i) {
+    amount += supine_amount(rest, i, c[i]);
+  }
+  vec3 p = view * (rest.xyz + amount * direction - centre);
   float w = depth.x - p.z;
   float near = depth.x - depth.y;
   float far = depth.x + depth.y;

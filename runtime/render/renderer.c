@@ -47,27 +47,29 @@ static void group_triangles(supine_renderer *r, uint32_t *grouped) {
   r->index_begin[info->lung_count] = count;
 }
 
-/* Rest positions and, where the GPU displaces, directions and coefficients of every vertex. */
+/* Rest positions, lungs and, where the GPU displaces, directions and coefficients. */
 static supine_status load_vertices(supine_renderer *r, supine_error *error) {
   const size_t n = r->info->vertex_count;
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
-  if (!r->packed) {
+  if (!r->packed) { /* without w, which reads 1: one weight serves both lungs */
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->info->vertices,
                  GL_STATIC_DRAW);
     attribute(ATTRIBUTE_REST, 3, 3, 0);
     return SUPINE_OK;
   }
-  float *packed = calloc(n, SUPINE_GL_FLOATS * sizeof *packed);
+  const size_t modes = r->info->mode_count;
+  const size_t floats = SUPINE_GL_FLOATS + modes;
+  float *packed = calloc(n, floats * sizeof *packed);
   if (packed == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   const supine_status status = supine_gl_pack(r->basis, 0, n, packed);
-  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(SUPINE_GL_FLOATS * n * sizeof *packed), packed,
-               GL_STATIC_DRAW);
-  attribute(ATTRIBUTE_REST, 3, SUPINE_GL_FLOATS, 0);
-  attribute(ATTRIBUTE_DIRECTION, 3, SUPINE_GL_FLOATS, 3);
-  for (GLuint k = 0; k < 4; ++k) {
-    attribute(ATTRIBUTE_COEFFICIENTS + k, 4, SUPINE_GL_FLOATS, 6 + 4 * (size_t)k);
+  glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(floats * n * sizeof *packed), packed, GL_STATIC_DRAW);
+  attribute(ATTRIBUTE_REST, 4, floats, 0);
+  attribute(ATTRIBUTE_DIRECTION, 3, floats, 4);
+  for (size_t k = 0; k < modes; k += 4) { /* missing ones read (0, 0, 0, 1) and get weight 0 */
+    attribute(ATTRIBUTE_COEFFICIENTS + (GLuint)k / 4, modes - k < 4 ? (GLint)(modes - k) : 4,
+              floats, SUPINE_GL_FLOATS + k);
   }
   free(packed);
   return status;
@@ -119,7 +121,10 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  r->program = supine_render_gl_program(error);
+  const size_t lungs = r->info->lung_count < 2 ? 2 : r->info->lung_count;
+  const size_t vectors = r->packed ? (r->info->mode_count + 3) / 4 : 1;
+  r->weight_count = lungs * vectors;
+  r->program = supine_render_gl_program(lungs, vectors, error);
   status = r->program != 0 ? load_surface(r, error) : SUPINE_ERROR_UNSUPPORTED;
   if (status == SUPINE_OK) {
     glGenTextures(SUPINE_COLOURS_COUNT, r->colours);

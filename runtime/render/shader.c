@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The GPU's part: displacement, projection, light and colour. */
+#include <stdio.h>
 #include <string.h>
 
 #include "runtime/render/gl.h"
@@ -14,11 +15,12 @@ static const char *source(const char *name) {
   return supine_template_asset(supine_render_assets, name, strlen(name))->bytes;
 }
 
-static GLuint compile(GLenum kind, const char *first, const char *second, supine_error *error) {
-  const char *text[3] = {version, first, second};
+static GLuint compile(GLenum kind, const char *defines, const char *first, const char *second,
+                      supine_error *error) {
+  const char *text[4] = {version, defines, first, second};
   GLint good = GL_FALSE;
   const GLuint shader = glCreateShader(kind);
-  glShaderSource(shader, 3, text, NULL);
+  glShaderSource(shader, 4, text, NULL);
   glCompileShader(shader);
   glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
   if (good != GL_TRUE) {
@@ -31,13 +33,16 @@ static GLuint compile(GLenum kind, const char *first, const char *second, supine
   return shader;
 }
 
-GLuint supine_render_gl_program(supine_error *error) {
+GLuint supine_render_gl_program(size_t lungs, size_t vectors, supine_error *error) {
   GLint good = GL_FALSE;
   GLuint program = 0;
+  char defines[128];
+  (void)snprintf(defines, sizeof defines, "#define SUPINE_LUNGS %zu\n#define SUPINE_VECTORS %zu\n",
+                 lungs, vectors);
   const GLuint vertex =
-      compile(GL_VERTEX_SHADER, source("supine.glsl"), source("lungs.vert.glsl"), error);
+      compile(GL_VERTEX_SHADER, defines, source("supine.glsl"), source("lungs.vert.glsl"), error);
   const GLuint fragment =
-      vertex != 0 ? compile(GL_FRAGMENT_SHADER, "", source("lungs.frag.glsl"), error) : 0;
+      vertex != 0 ? compile(GL_FRAGMENT_SHADER, "", "", source("lungs.frag.glsl"), error) : 0;
   if (fragment != 0) {
     program = glCreateProgram();
     glAttachShader(program, vertex);

@@ -284,23 +284,39 @@ SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size
  * Cost: one pass over the triangles, in the caller's thread. */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
-/** Modes that the GPU form has room for, and floats of one vertex's attributes. */
-enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 22 };
+/** Most modes that the GPU form has room for, and floats of one vertex's attributes before its
+ * coefficients. */
+enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
 /** Attributes of vertices begin <= i < end for supine.glsl, as one vertex buffer has them:
  *
- *     rest vec3 (offset 0), direction vec3 (offset 12), coefficients four vec4 (offset 24)
+ *     rest vec4 (offset 0; w is the lung's number), direction vec3 (offset 16),
+ *     coefficients (offset 28): (K + 3) / 4 vec4s, the last of which may have fewer numbers
  *
- * @param attributes  [end - begin, SUPINE_GL_FLOATS], written; 88 bytes a vertex
- * @retval SUPINE_ERROR_UNSUPPORTED  more than 16 modes, or a vector field */
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes a vertex of 4 modes
+ * @retval SUPINE_ERROR_UNSUPPORTED  more than SUPINE_GL_MODES modes, or a vector field */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
-/** The uniform supine_weights of supine.glsl, for lungs at one breath scale.
- * @param uniforms  [SUPINE_GL_MODES], written, for glUniform4fv(location, 4, uniforms)
+/** The uniform supine_weights of supine.glsl, whose SUPINE_VECTORS is V = (K + 3) / 4.
+ * @param scales    [G] breath scale of each lung
+ * @param uniforms  [G, 4 V], written, for glUniform4fv(location, G V, uniforms)
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
-                                           double scale, float *uniforms);
+                                           const double *scales, float *uniforms);
+
+/** The normals' modes of vertices begin <= i < end for supine.glsl, three to a word, in
+ * SUPINE_WORDS W = (Q + 2) / 3 attributes uvec3.
+ * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes of 6 modes
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
+SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
+                                                uint32_t *words);
+
+/** The uniform supine_normal_weights of supine.glsl.
+ * @param uniforms  [G, W, 3], written, for glUniform3fv(location, G W, uniforms)
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
+SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis, const double *weights,
+                                                  const double *scales, float *uniforms);
 
 #ifdef __cplusplus
 }
