@@ -24,6 +24,25 @@ static void write_tensor(FILE *file, const char *name, const void *bytes, size_t
   (void)fputs("</script>\n", file);
 }
 
+/* The normals' words, some vertices after the other: 12 bytes of each word and vertex, so that
+ * base64 has no remainder between. */
+static void write_normals(FILE *file, const export_source *s) {
+  enum { AT_ONCE = 256 };
+  uint32_t words[AT_ONCE * (SUPINE_NORMAL_MODES_MAX + 2)];
+  const size_t n = s->info->vertex_count;
+  const size_t modes = s->info->normal_count;
+  const size_t terms = (s->info->mode_count + 1) * (s->info->mode_count + 2) / 2;
+  (void)fputs("<script type=\"text/plain\" id=\"tensor-normals\">", file);
+  for (size_t i = 0; i < n; i += AT_ONCE) {
+    const size_t end = i + AT_ONCE < n ? i + AT_ONCE : n;
+    (void)supine_gl_pack_normals(s->basis, i, end, words);
+    supine_export_base64_write(words, (end - i) * ((modes + 2) / 3) * 3 * sizeof *words, file);
+  }
+  (void)fputs("</script>\n", file);
+  write_tensor(file, "normal-weights", s->info->normal_weights,
+               s->info->lung_count * modes * terms * sizeof(double));
+}
+
 /* Each map's 256 colours as hexadecimal digits. */
 static json_t *colours(void) {
   static const char *const names[SUPINE_COLOURS_COUNT] = {"displacement", "difference"};
@@ -74,14 +93,14 @@ static json_t *describe(const page *p) {
     }
   }
   json_t *title = json_string(p->title);
-  return json_pack("{s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o}", "vertices",
-                   (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
-                   "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band,
-                   "lungBegin", lungs, "hasVolume", (int)info->has_volume, "hasResting",
-                   (int)(p->source->resting != NULL), "colours", colours(), "breathVolume",
-                   p->breath->volume, "breathLargest", p->breath->largest, "breathScale",
-                   p->breath->scale, "metadata", metadata, "title",
-                   title != NULL ? title : json_string("lungs"));
+  return json_pack(
+      "{s:I, s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o}", "vertices",
+      (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count, "modes",
+      (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
+      (json_int_t)info->band, "lungBegin", lungs, "hasVolume", (int)info->has_volume, "hasResting",
+      (int)(p->source->resting != NULL), "colours", colours(), "breathVolume", p->breath->volume,
+      "breathLargest", p->breath->largest, "breathScale", p->breath->scale, "metadata", metadata,
+      "title", title != NULL ? title : json_string("lungs"));
 }
 
 /* {{tensors}} */
@@ -98,6 +117,9 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   write_tensor(file, "coefficients", s->coefficients, n * k * sizeof *s->coefficients);
   write_tensor(file, "triangles", s->triangles, 3 * s->info->triangle_count * sizeof *s->triangles);
   write_tensor(file, "modes", s->modes, k * s->terms * sizeof *s->modes);
+  if (s->info->normal_count > 0) {
+    write_normals(file, s);
+  }
   if (s->resting != NULL) {
     write_tensor(file, "resting", s->resting, EXPORT_RESTING_TERMS * sizeof *s->resting);
   }

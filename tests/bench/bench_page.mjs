@@ -3,7 +3,7 @@
 //
 //     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
 //
-// Needs playwright-core (npm install in tests/export). CHROMIUM's flags choose the graphics: with
+// Needs playwright-core (npm install in tests/export, or in the folder MODULES). CHROMIUM's flags choose the graphics: with
 // none, Chromium's software renderer; with a graphics card, --use-angle=gl or --use-angle=vulkan and
 // --enable-gpu, say. "still" draws the surface where it is, as a viewer of a plain mesh of as many
 // triangles would; "turning" is a frame in which the patient turns: weights, positions, normals and
@@ -18,7 +18,8 @@ if (!file) {
   console.error('usage: node bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]');
   process.exit(2);
 }
-const require = createRequire(fileURLToPath(new URL('../export/package.json', import.meta.url)));
+const modules = process.env.MODULES ?? fileURLToPath(new URL('../export', import.meta.url));
+const require = createRequire(resolve(modules, 'package.json'));
 const { chromium } = require('playwright-core');
 const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
 const browser = await chromium.launch({
@@ -43,7 +44,6 @@ const found = await page.evaluate(() => {
   };
   const passes = {
     weights,
-    positions: () => picture.capturePositions(state.moment, picture.state('now').moved),
     deform: () => picture.deform('now', state.moment),
     script: frameScript,
     still: () => picture.draw(panes()),

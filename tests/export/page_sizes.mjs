@@ -17,6 +17,36 @@ mkdirSync('page_sizes', { recursive: true });
 
 const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 
+/** Letters stay off what lies over the picture, gravity's arrow and each other. */
+async function checkLetters(page, what) {
+  const { letters, plates, arrow } = await page.evaluate(() => {
+    const middle = (box) => [box.x + box.width / 2, box.y + box.height / 2];
+    const stage = document.getElementById('stage').getBoundingClientRect();
+    const pane = window.supine.panes()[0];
+    const onScreen = ([x, y, z]) => {
+      const m = pane.toEye;
+      const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
+      const ndc = [0, 1].map((i) => (pane.projection[5 * i] * eye[i]) / -eye[2]);
+      return [stage.x + ((ndc[0] + 1) / 2) * stage.width, stage.y + ((1 - ndc[1]) / 2) * stage.height];
+    };
+    return {
+      letters: [...document.querySelectorAll('.letter:not([hidden])')].map((e) => ({ letter: e.textContent, at: middle(e.getBoundingClientRect()) })),
+      plates: ['legend', 'title'].map((id) => { const { left, right, top, bottom } = document.getElementById(id).getBoundingClientRect(); return { id, left, right, top, bottom }; }),
+      arrow: pane.arrowEnds.map(onScreen),
+    };
+  });
+  const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
+  const fromArrow = (at) => Math.min(...Array.from({ length: 41 }, (_, i) => apart(at, arrow[0].map((x, k) => x + (i / 40) * (arrow[1][k] - x)))));
+  assert.ok(letters.length >= 4, `${what}: ${letters.length} letters`);
+  letters.forEach(({ letter, at }, i) => {
+    for (const { id, left, right, top, bottom } of plates) {
+      assert.ok(at[0] < left - 11 || at[0] > right + 11 || at[1] < top - 11 || at[1] > bottom + 11, `${what}: ${letter} is on the ${id}`);
+    }
+    assert.ok(fromArrow(at) > 20, `${what}: ${letter} is on the arrow`);
+    for (const other of letters.slice(i + 1)) assert.ok(apart(at, other.at) > 20, `${what}: ${letter} is on ${other.letter}`);
+  });
+}
+
 const sizes = [[1400, 900], [900, 600], [844, 390], [390, 844]];
 for (const [width, height] of sizes) {
   for (const colorScheme of ['light', 'dark']) {
@@ -30,7 +60,11 @@ for (const [width, height] of sizes) {
       await sized.waitForFunction(() => window.supine.state.probes.length === 1);
       assert.equal(await sized.evaluate(() => window.supine.state.camera.azimuth), azimuth);
     }
-    await settled(sized);
+    for (const key of ['1', '4', '5', '3']) {
+      await sized.keyboard.press(key);
+      await settled(sized);
+      await checkLetters(sized, `${width} x ${height}, posture ${key}`);
+    }
     writeFileSync(join('page_sizes', `${width}x${height}-${colorScheme}.png`), await sized.screenshot());
     assert.deepEqual(said, []);
     await sized.close();

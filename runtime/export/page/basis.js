@@ -62,6 +62,9 @@ function readBasis() {
     basis.quadratic = takeTensor('quadratic', Float64Array);
     basis.cubic = takeTensor('cubic', Float64Array);
   }
+  basis.words = Math.ceil(basis.normalModes / 3);
+  basis.normals = basis.words ? takeTensor('normals', Uint32Array) : new Uint32Array(0);
+  basis.turns = basis.words ? takeTensor('normal-weights', Float64Array) : null;
   basis.resting = basis.hasResting ? takeTensor('resting', Float64Array) : null;
   basis.lungs = basis.lungBegin.length - 1;
   const names = (basis.metadata.lungs ?? '').split(',');
@@ -206,6 +209,29 @@ function momentFor(basis, gravity, depth) {
     scale = (depth / basis.breathLargest) * basis.breathScale;
   }
   return { gravity, scale, gains, weights: w.map((x) => x * scale) };
+}
+
+/** What supine.glsl multiplies by, for each lung: the weights, and those of the normal's modes, quadratic
+ * in the weights, three to a word: modes j, j + words and j + 2 words. */
+function uniformsOf(basis, moment) {
+  const { modes: k, words, lungs, normalModes } = basis;
+  const room = 4 * Math.ceil(k / 4);
+  const weights = new Float32Array(room * lungs);
+  const turns = new Float32Array(3 * words * lungs);
+  const q = [1, ...moment.weights];
+  for (let lung = 0, at = 0; lung < lungs; ++lung) {
+    weights.set(moment.weights, lung * room);
+    for (let j = 0; j < normalModes; ++j) {
+      let sum = 0;
+      for (let a = 0; a <= k; ++a) {
+        let row = 0;
+        for (let b = a; b <= k; ++b) row += basis.turns[at++] * q[b];
+        sum += row * q[a];
+      }
+      turns[3 * (lung * words + (j % words)) + Math.floor(j / words)] = sum;
+    }
+  }
+  return { weights, turns };
 }
 
 /** Where a vertex is. */

@@ -74,8 +74,10 @@ class Letters {
         if (at) { // at the picture's edge where it would be beyond
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
+          const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
+          off(); // which may be onto the arrow, and beside that onto a plate again
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
-          for (const plate of plates) at = offPlate(at, plate, box);
+          off();
         }
         placed(set[j], at, Boolean(far));
       });

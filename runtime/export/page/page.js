@@ -218,7 +218,7 @@ function start() {
   function addProbe(found) {
     if (!found || state.probes.length === 8) return;
     const moment = paneAt(pointer ?? { x: 0, y: 0 }).pane.name === 'pinned' ? state.pinned : state.moment;
-    state.probes.push(nearestVertex(basis, picture.readPositions(moment), found.at));
+    state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
     look();
   }
 
@@ -586,6 +586,7 @@ function start() {
   for (const end of ['tidal', 'tidal-number']) $(end).min = $(end).step = state.tidal / 50;
   for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
   for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
+  document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
   if (!basis.hasVolume) {
     document.querySelector('[for="tidal"]').textContent = 'Depth';
     document.querySelector('[for="depth"]').textContent = 'Largest displacement';
@@ -620,7 +621,9 @@ function start() {
     get picture() { return picture; },
     panes: () => panes,
     /** Positions as the graphics card computes them: xyz of each vertex, mm LPS. */
-    positions: (gravity, volume) => picture.readPositions(momentFor(basis, unit(gravity), volume)),
+    positions: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[0],
+    /** Unit normals, likewise. */
+    normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
     /** Weights with the breath scale in them, and the scale. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */

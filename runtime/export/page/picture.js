@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Everything on the graphics card. A change of gravity or volume costs two passes over the vertices
-// there, positions and normals, both kept by transform feedback; turning the camera costs neither.
+// Everything on the graphics card. A change of gravity or volume costs a pass over the vertices there,
+// whose positions and normals transform feedback keeps; turning the camera costs none.
 
 const source = (id) => document.getElementById(id).textContent;
 
@@ -14,14 +14,12 @@ class Picture {
     this.gl = gl;
     this.canvas = canvas;
     this.basis = basis;
-    this.moving = this.program('position.vert.glsl', null, 'moved');
-    this.turning = this.program('normal.vert.glsl', null, 'turned');
+    this.moving = this.program('vertex.vert.glsl', null, ['moved', 'turned']);
     this.surface = this.program('surface.vert.glsl', 'surface.frag.glsl');
     this.picker = this.program('surface.vert.glsl', 'pick.frag.glsl');
     this.solid = this.program('solid.vert.glsl', 'solid.frag.glsl');
     this.feedback = gl.createTransformFeedback();
     this.makeInputs();
-    this.makeRings();
     this.makeOutputs();
     this.makePick();
     this.maps = Object.fromEntries(Object.keys(basis.colours).map((name) => [name, this.makeMap(name)]));
@@ -31,7 +29,18 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  program(vertex, fragment, output) {
+  /** supine.glsl for this basis, and the words of its normals as attributes from location 6 on. */
+  library() {
+    const { basis } = this;
+    const { words } = basis;
+    const all = Array.from({ length: words }, (_, j) => j);
+    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, words)}`,
+      source('supine.glsl'), source('vertex.vert.glsl'),
+      ...all.map((j) => `layout(location = ${6 + j}) in uvec3 n${j};`),
+      `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(rest, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
+  }
+
+  program(vertex, fragment, outputs) {
     const { gl } = this;
     const program = gl.createProgram();
     const attach = (type, text) => {
@@ -41,9 +50,9 @@ class Picture {
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${vertex}: ${gl.getShaderInfoLog(shader)}`);
       gl.attachShader(program, shader);
     };
-    attach(gl.VERTEX_SHADER, (vertex === 'position.vert.glsl' ? source('supine.glsl') : '') + source(vertex));
+    attach(gl.VERTEX_SHADER, outputs ? this.library() : source(vertex));
     attach(gl.FRAGMENT_SHADER, fragment ? source(fragment) : 'precision highp float; void main() {}');
-    if (output) gl.transformFeedbackVaryings(program, [output], gl.SEPARATE_ATTRIBS);
+    if (outputs) gl.transformFeedbackVaryings(program, outputs, gl.SEPARATE_ATTRIBS);
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(`${vertex}: ${gl.getProgramInfoLog(program)}`);
     const at = {};
@@ -62,13 +71,14 @@ class Picture {
     return made;
   }
 
-  /** A vertex array; each attribute is [buffer, size, stride, offset, instances each], whole numbers
-   * where `whole`. */
-  array(attributes, whole = false) {
+  /** A vertex array; each attribute is [buffer, size, stride, offset, instances each], null for none. */
+  array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
     gl.bindVertexArray(made);
-    attributes.forEach(([buffer, size, stride, offset, divisor = 0], i) => {
+    attributes.forEach((attribute, i) => {
+      if (!attribute) return;
+      const [buffer, size, stride, offset, divisor = 0, whole = false] = attribute;
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.enableVertexAttribArray(i);
       if (whole) gl.vertexAttribIPointer(i, size, gl.UNSIGNED_INT, stride, offset);
@@ -79,22 +89,29 @@ class Picture {
     return made;
   }
 
-  /** Rest, direction and up to 16 coefficients, of every vertex and of a few for arrows; missing ones
-   * read (0, 0, 0, 1) and get weight 0. */
+  /** Rest and lung, direction, up to 16 coefficients and the normal's words, of every vertex and of a few
+   * for arrows; missing coefficients read (0, 0, 0, 1) and get weight 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
-    const inputs = (rest, direction, coefficients) => {
-      const buffer = this.buffer(coefficients);
-      const attributes = [[this.buffer(rest), 3, 12, 0], [this.buffer(direction), 3, 12, 0]];
-      for (let first = 0; first < k; first += 4) attributes.push([buffer, Math.min(4, k - first), 4 * k, 4 * first]);
+    const { words } = basis;
+    const inputs = (rest, direction, coefficients, normals) => {
+      const [buffer, turns] = [this.buffer(coefficients), this.buffer(normals)];
+      const attributes = [[this.buffer(rest), 4, 16, 0], [this.buffer(direction), 3, 12, 0]];
+      for (let first = 0; first < 16; first += 4) attributes.push(first < k ? [buffer, Math.min(4, k - first), 4 * k, 4 * first] : null);
+      for (let j = 0; j < words; ++j) attributes.push([turns, 3, 12 * words, 12 * j, 0, true]);
       return this.array(attributes);
     };
+    const rest = new Float32Array(4 * basis.vertices);
+    for (let i = 0, lung = 0; i < basis.vertices; ++i) {
+      while (i >= basis.lungBegin[lung + 1]) ++lung;
+      rest.set([basis.rest[3 * i], basis.rest[3 * i + 1], basis.rest[3 * i + 2], lung], 4 * i);
+    }
     const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
     this.fewCount = Math.ceil(basis.vertices / every);
-    const few = (values, size) => Float32Array.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
-    this.inputs = inputs(basis.rest, basis.direction, basis.coefficients);
-    this.fewInputs = inputs(few(basis.rest, 3), few(basis.direction, 3), few(basis.coefficients, k));
+    const few = (values, size) => values.constructor.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
+    this.inputs = inputs(rest, basis.direction, basis.coefficients, basis.normals);
+    this.fewInputs = inputs(few(rest, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
   texture(internal, format, type, width, height, data) {
@@ -108,43 +125,19 @@ class Picture {
     return made;
   }
 
-  /** For each vertex the two others of its triangles, in a texture, and where its own begin. */
-  makeRings() {
-    const { gl, basis } = this;
-    const { corners } = basis;
-    const spans = new Uint32Array(2 * basis.vertices);
-    for (const v of corners) ++spans[2 * v + 1];
-    for (let v = 1; v < basis.vertices; ++v) spans[2 * v] = spans[2 * v - 2] + spans[2 * v - 1];
-    const width = Math.min(4096, gl.getParameter(gl.MAX_TEXTURE_SIZE));
-    const height = Math.max(1, Math.ceil(corners.length / width));
-    const pairs = new Uint32Array(2 * width * height);
-    const next = Uint32Array.from({ length: basis.vertices }, (_, v) => spans[2 * v]);
-    for (let t = 0; t < corners.length; t += 3) {
-      for (let i = 0; i < 3; ++i) {
-        const at = 2 * next[corners[t + i]]++;
-        pairs[at] = corners[t + ((i + 1) % 3)];
-        pairs[at + 1] = corners[t + ((i + 2) % 3)];
-      }
-    }
-    this.ring = this.texture(gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, width, height, pairs);
-    this.spans = this.array([[this.buffer(spans), 2, 8, 0]], true);
-  }
-
   /** Where the surface is in a state: positions, and normals with areas, four floats each. */
   makeOutputs() {
     const { gl, basis } = this;
-    this.width = Math.min(2048, basis.vertices);
-    this.height = Math.ceil(basis.vertices / this.width);
-    this.places = this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, this.width, this.height, null);
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // normals of which nothing is shown
     this.edges = null;
     this.states = {};
     this.arrays = {};
   }
 
   state(name) {
-    const { gl } = this;
-    const room = 16 * this.width * this.height;
+    const { gl, basis } = this;
+    const room = 16 * basis.vertices;
     this.states[name] ??= { moved: this.buffer(room, gl.DYNAMIC_COPY), turned: this.buffer(room, gl.DYNAMIC_COPY), few: this.buffer(16 * this.fewCount, gl.DYNAMIC_COPY) };
     return this.states[name];
   }
@@ -225,62 +218,46 @@ class Picture {
     return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
   }
 
-  /** Runs a program over every vertex into a buffer. */
-  capture(program, array, target, count = this.basis.vertices) {
-    const { gl } = this;
+  /** Every vertex of `array` into buffers: positions, normals. */
+  capture(moment, array, targets, count) {
+    const { gl, basis, moving } = this;
+    gl.useProgram(moving.program);
+    const { weights, turns } = uniformsOf(basis, moment);
+    gl.uniform4fv(moving.at.supine_weights, weights);
+    if (basis.words) gl.uniform3fv(moving.at.supine_normal_weights, turns);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, target);
+    targets.forEach((target, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, target));
     gl.enable(gl.RASTERIZER_DISCARD);
     gl.beginTransformFeedback(gl.POINTS);
     gl.drawArrays(gl.POINTS, 0, count);
     gl.endTransformFeedback();
     gl.disable(gl.RASTERIZER_DISCARD);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
+    targets.forEach((_, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, null));
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
     gl.bindVertexArray(null);
   }
 
-  capturePositions(moment, target, few = null) {
-    const { gl, moving } = this;
-    const weights = new Float32Array(16);
-    weights.set(moment.weights);
-    gl.useProgram(moving.program);
-    gl.uniform4fv(moving.at.supine_weights, weights);
-    this.capture(moving, this.inputs, target);
-    if (few) this.capture(moving, this.fewInputs, few, this.fewCount);
-  }
-
   /** Moves a state's surface. */
   deform(name, moment) {
-    const { gl } = this;
-    const state = this.state(name);
-    this.capturePositions(moment, state.moved, state.few);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.places);
-    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, state.moved);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.width, this.height, gl.RGBA, gl.FLOAT, 0);
-    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.ring);
-    gl.useProgram(this.turning.program);
-    gl.uniform1i(this.turning.at.positions, 0);
-    gl.uniform1i(this.turning.at.ring, 1);
-    this.capture(this.turning, this.spans, state.turned);
-    gl.activeTexture(gl.TEXTURE0);
+    const { moved, turned, few } = this.state(name);
+    this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
+    this.capture(moment, this.fewInputs, [few, this.unread], this.fewCount);
   }
 
-  /** Positions on the graphics card, xyz of each vertex, mm LPS. */
-  readPositions(moment) {
+  /** What the graphics card makes of a moment: positions, mm LPS, and unit normals, xyz of each vertex. */
+  read(moment) {
     const { gl, basis } = this;
-    const target = this.buffer(16 * basis.vertices, gl.DYNAMIC_READ);
-    this.capturePositions(moment, target);
-    const four = new Float32Array(4 * basis.vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, target);
-    gl.getBufferSubData(gl.ARRAY_BUFFER, 0, four);
-    gl.deleteBuffer(target);
-    return new Float32Array(3 * basis.vertices).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
+    const targets = [0, 1].map(() => this.buffer(16 * basis.vertices, gl.DYNAMIC_READ));
+    this.capture(moment, this.inputs, targets, basis.vertices);
+    return targets.map((target) => {
+      const four = new Float32Array(4 * basis.vertices);
+      gl.bindBuffer(gl.ARRAY_BUFFER, target);
+      gl.getBufferSubData(gl.ARRAY_BUFFER, 0, four);
+      gl.deleteBuffer(target);
+      return new Float32Array(3 * basis.vertices).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
+    });
   }
 
   /** Sets a program up for a pane of the picture. */

@@ -17,7 +17,8 @@ out vec4 colour;
 
 void main() {
   if (dot(body, cut.xyz) > cut.w) discard;
-  vec3 n = normalize(facing);
+  // A basis without normals is shown by its triangles'.
+  vec3 n = normalize(dot(facing, facing) > 0.0 ? facing : cross(dFdx(eye), dFdy(eye)));
   vec3 view = normalize(-eye);
   n = dot(n, view) < 0.0 ? -n : n;
   float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);

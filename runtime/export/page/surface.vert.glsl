@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The deformed surface on the screen, or on the one pixel under the pointer.
 layout(location = 0) in vec3 moved;
-layout(location = 1) in vec4 turned; // normal, area of the triangles around
+layout(location = 1) in vec4 turned; // normal; area around, beside that of the basis' own surface
 layout(location = 2) in vec3 origin; // what the colour measures from: rest, or the reference posture
 layout(location = 3) in vec4 before; // as `turned`, there
 uniform mat4 toEye;

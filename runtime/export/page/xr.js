@@ -32,13 +32,15 @@ async function offerXr(button, getPicture, frame, over) {
       session.end();
       return;
     }
+    const { gl } = getPicture();
     try {
       session = await navigator.xr.requestSession('immersive-vr');
-    } catch {
-      return; // the viewer declined
+      await gl.makeXRCompatible();
+    } catch { // the viewer declined, or this graphics card has no headset
+      session?.end();
+      session = null;
+      return;
     }
-    const { gl } = getPicture();
-    await gl.makeXRCompatible?.();
     const layer = new XRWebGLLayer(session, gl);
     session.updateRenderState({ baseLayer: layer, depthNear: 0.05, depthFar: 20 });
     const space = await session.requestReferenceSpace('local');
@@ -49,7 +51,8 @@ async function offerXr(button, getPicture, frame, over) {
       over();
     });
     const draw = (time, seen) => {
-      session?.requestAnimationFrame(draw);
+      if (!session) return; // over since this was asked for
+      session.requestAnimationFrame(draw);
       const views = seen.getViewerPose(space)?.views ?? [];
       const pane = views.length ? frame(time) : null;
       if (pane) getPicture().draw(views.map((view) => xrPane(pane, view, layer.getViewport(view))), layer.framebuffer);
