@@ -437,24 +437,28 @@ static void test_deform_batch_each_orientation_within_stated_error(void **state)
   check_batch(90, 256, true, 3, 1, 90); /* one widened tile outgrows the block */
 }
 
-/* Five modes in the sixteen slots of a GPU's vertex: what is there before does not stay. */
+/* Five modes in two vec4s of each lung: what is there before does not stay. */
 static void test_gl_pack_slots_without_a_mode_are_zero(void **state) {
   (void)state;
-  enum { VERTICES = 40, MODES = 5 };
+  enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
-  float attributes[VERTICES * SUPINE_GL_FLOATS];
-  float uniforms[SUPINE_GL_MODES];
-  double weights[MODES] = {0.3, -0.7, 1.9, 0.4, -2.2};
+  float attributes[VERTICES * FLOATS];
+  float uniforms[2 * SLOTS];
+  const double weights[MODES] = {0.3, -0.7, 1.9, 0.4, -2.2};
+  const double scales[2] = {2.0, -0.5};
   memset(attributes, 0x77, sizeof attributes);
   memset(uniforms, 0x77, sizeof uniforms);
   assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_OK);
-  assert_int_equal(supine_gl_weights(basis, weights, 2.0, uniforms), SUPINE_OK);
-  for (size_t k = 0; k < SUPINE_GL_MODES; ++k) {
-    assert_true(uniforms[k] == (k < MODES ? (float)(2.0 * weights[k]) : 0.0F));
-    for (size_t i = 0; i < VERTICES; ++i) {
-      assert_true(attributes[SUPINE_GL_FLOATS * i + 6 + k] ==
-                  (k < MODES ? o.f->coefficient[MODES * i + k] : 0.0F));
+  assert_int_equal(supine_gl_weights(basis, weights, scales, uniforms), SUPINE_OK);
+  for (size_t k = 0; k < 2 * SLOTS; ++k) {
+    const size_t mode = k % SLOTS;
+    assert_true(uniforms[k] == (mode < MODES ? (float)(scales[k / SLOTS] * weights[mode]) : 0.0F));
+  }
+  for (size_t i = 0; i < VERTICES; ++i) {
+    assert_true(attributes[FLOATS * i + 3] == (float)o.f->lung[i]);
+    for (size_t k = 0; k < MODES; ++k) {
+      assert_true(attributes[FLOATS * i + SUPINE_GL_FLOATS + k] == o.f->coefficient[MODES * i + k]);
     }
   }
   supine_basis_close(basis);
