@@ -45,11 +45,17 @@ const found = await page.evaluate(() => {
   const passes = {
     weights,
     deform: () => picture.deform('now', state.moment),
-    script: frameScript,
     still: () => picture.draw(panes()),
     turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
-  const times = Object.fromEntries(Object.keys(passes).map((name) => [name, Infinity]));
+  const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
+  for (let i = 0; i < 300; ++i) { // as a page that has run for some seconds, the patient turning
+    tilt += 1;
+    state.settle(state.standing.q, tilt % 60, 0);
+    const begin = performance.now();
+    frameScript();
+    times.script = Math.min(times.script, performance.now() - begin);
+  }
   const end = performance.now() + 30000;
   for (let round = 0; round < 5 || (round < 30 && performance.now() < end); ++round) {
     for (const [name, run] of Object.entries(passes)) {
