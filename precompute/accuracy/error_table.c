@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
@@ -11,7 +12,7 @@
 #include "precompute/accuracy/error_table.h"
 #include "precompute/projection/compression.h"
 
-enum { VERTICES_MAX = 4096 };
+enum { VERTICES_MAX = 4096, LANES = 8 }; /* vertices side by side: sums wait for each other */
 
 void supine_accuracy_error_table_free(supine_error_table *table) {
   free(table->harmonics);
@@ -25,7 +26,7 @@ typedef struct table_work {
   const supine_compression *field;
   const double *directions; /* [N, 3] */
   size_t count, stride;     /* vertices looked at */
-  double *coefficients;     /* [count, P] */
+  double *coefficients;     /* [count / LANES, P, LANES], 0 past the last vertex */
   double *y;                /* [D, P] */
   double *weights;          /* [D, K] */
   double *sums;             /* [D, 1 + bands + K]: squares of the field and of each error */
@@ -39,15 +40,14 @@ static void coefficients_range(void *context, size_t begin, size_t end, size_t t
   const size_t terms = supine_sh_count(projection->band);
   for (size_t i = begin; i < end; ++i) {
     const double *row = projection->columns + i * work->stride * projection->rank;
-    double *out = work->coefficients + i * terms;
-    if (projection->functions == NULL) {
-      memcpy(out, row, terms * sizeof *out);
-      continue;
-    }
-    memset(out, 0, terms * sizeof *out);
+    double *out = work->coefficients + i / LANES * terms * LANES + i % LANES;
     for (size_t r = 0; r < projection->rank; ++r) {
+      if (projection->functions == NULL) {
+        out[r * LANES] = row[r];
+        continue;
+      }
       for (size_t t = 0; t < terms; ++t) {
-        out[t] += row[r] * projection->functions[r * terms + t];
+        out[t * LANES] += row[r] * projection->functions[r * terms + t];
       }
     }
   }
@@ -64,6 +64,22 @@ static double true_value(const supine_truth *truth, size_t vertex_count, size_t 
   return sum;
 }
 
+/* left -= c y of a few terms, and how much is left in all. */
+SUPINE_CLONES static double take_off(const double *c, const double *y, size_t terms,
+                                     const double square[LANES], double left[LANES]) {
+  double sum = 0.0;
+  for (size_t t = 0; t < terms; ++t) {
+    for (size_t k = 0; k < LANES; ++k) {
+      left[k] -= c[t * LANES + k] * y[t];
+    }
+  }
+  for (size_t k = 0; k < LANES; ++k) {
+    sum += square[k] * left[k] * left[k];
+  }
+  return sum;
+}
+
+/* Some vertices side by side, which every direction looks at while they are near. */
 static void errors_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const table_work *work = context;
@@ -71,29 +87,35 @@ static void errors_range(void *context, size_t begin, size_t end, size_t thread)
   const size_t bands = work->projection->band + 1;
   const size_t terms = bands * bands;
   const size_t modes = work->field->mode_count;
-  for (size_t d = begin; d < end; ++d) {
-    double *sums = work->sums + d * (1 + bands + modes);
-    const double *y = work->y + d * terms;
-    const double *w = work->weights + d * modes;
-    for (size_t i = 0; i < work->count; ++i) {
-      const size_t vertex = i * work->stride;
-      const double *u = work->directions + 3 * vertex;
-      const double square = supine_dot(u, u);
-      const double truth = true_value(work->truth, n, d, vertex);
-      const double *c = work->coefficients + i * terms;
-      const float *m = work->field->coefficients + vertex * modes;
-      sums[0] += square * truth * truth;
-      double left = truth;
-      for (size_t l = 0, t = 0; l < bands; ++l) {
-        for (; t < (l + 1) * (l + 1); ++t) {
-          left -= c[t] * y[t];
-        }
-        sums[1 + l] += square * left * left;
-      }
-      left = truth;
+  for (size_t first = 0; first < work->count; first += LANES) {
+    const size_t count = work->count - first < LANES ? work->count - first : LANES;
+    const double *c = work->coefficients + first * terms;
+    double m[SUPINE_MODES_MADE_MAX * LANES] = {0.0};
+    double square[LANES] = {0.0};
+    for (size_t j = 0; j < count; ++j) {
+      const size_t vertex = (first + j) * work->stride;
+      square[j] = supine_dot(work->directions + 3 * vertex, work->directions + 3 * vertex);
       for (size_t k = 0; k < modes; ++k) {
-        left -= (double)m[k] * w[k];
-        sums[1 + bands + k] += square * left * left;
+        m[k * LANES + j] = (double)work->field->coefficients[vertex * modes + k];
+      }
+    }
+    for (size_t d = begin; d < end; ++d) {
+      double *sums = work->sums + d * (1 + bands + modes);
+      const double *y = work->y + d * terms;
+      double truth[LANES] = {0.0};
+      double left[LANES];
+      for (size_t j = 0; j < count; ++j) {
+        truth[j] = true_value(work->truth, n, d, (first + j) * work->stride);
+        sums[0] += square[j] * truth[j] * truth[j];
+      }
+      memcpy(left, truth, sizeof left);
+      for (size_t l = 0; l < bands; ++l) {
+        sums[1 + l] += take_off(c + l * l * LANES, y + l * l, 2 * l + 1, square, left);
+      }
+      memcpy(left, truth, sizeof left);
+      for (size_t k = 0; k < modes; ++k) {
+        sums[1 + bands + k] +=
+            take_off(m + k * LANES, work->weights + d * modes + k, 1, square, left);
       }
     }
   }
@@ -126,7 +148,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                      stride, NULL,       NULL,        NULL,       NULL};
   supine_error_table made = {bands, malloc(bands * sizeof(double)), modes,
                              malloc(modes * sizeof(double))};
-  work.coefficients = malloc(work.count * bands * bands * sizeof(double));
+  work.coefficients = calloc((work.count + LANES) * bands * bands, sizeof(double));
   work.y = malloc(count * bands * bands * sizeof(double));
   work.weights = malloc(count * modes * sizeof(double));
   work.sums = calloc(count * width, sizeof(double));
