@@ -9,6 +9,7 @@
 #include <supine/sh.h>
 
 #include "runtime/internal.h"
+#include "runtime/platform/platform.h"
 
 /* The file that is being checked, and where its name and a failure go. */
 typedef struct check {
@@ -468,8 +469,8 @@ void supine_basis_close(supine_basis *basis) {
     return;
   }
   supine_safetensors_close(basis->file);
-  free(basis->tiles.bytes);
-  free(basis->lit.bytes);
+  supine_platform_free(basis->tiles.bytes);
+  supine_platform_free(basis->lit.bytes);
   free(basis);
 }
 

@@ -2,14 +2,13 @@
 /* Packing a basis into tiles, and what that costs in accuracy. */
 #include <math.h>
 #include <stdlib.h>
-#include <sys/mman.h>
 
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
+#include "runtime/platform/platform.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */
-  HUGE_PAGE = 1 << 21,
   FLOAT_FRACTION_BITS = 23
 };
 
@@ -293,16 +292,9 @@ static void measure(supine_basis *basis, const source *was, const source *is) {
 }
 
 unsigned char *supine_tiles_allocate(size_t bytes) {
-  const size_t alignment = bytes >= 2 * (size_t)HUGE_PAGE ? HUGE_PAGE : 64;
-  const size_t rounded = (bytes + alignment - 1) / alignment * alignment;
-  unsigned char *memory = aligned_alloc(alignment, rounded);
+  unsigned char *memory = supine_platform_allocate(bytes);
   if (memory != NULL) {
-#ifdef MADV_HUGEPAGE
-    if (alignment == HUGE_PAGE) {
-      (void)madvise(memory, rounded, MADV_HUGEPAGE);
-    }
-#endif
-    memset(memory, 0, rounded);
+    memset(memory, 0, bytes);
   }
   return memory;
 }
@@ -314,7 +306,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   source *was = malloc(sizeof *was);
   source *is = malloc(sizeof *is);
   units *u = calloc(1, sizeof *u);
-  free(tiles->bytes);
+  supine_platform_free(tiles->bytes);
   supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
   tiles->bytes = supine_tiles_allocate(count * tiles->stride);
   if (was == NULL || is == NULL || u == NULL || tiles->bytes == NULL) {

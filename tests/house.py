@@ -65,6 +65,17 @@ def check_includes(rooms, files):
                 faults.append(f"{file} includes {name}: {room} may not use {used}")
 
 
+def check_systems(files):
+    """The library asks an operating system in one room alone."""
+    library = PUBLIC + ("runtime", "runtime/words", "runtime/safetensors", "runtime/kernels", "runtime/compare")
+    for file in files:
+        if os.path.dirname(file) in library:
+            with open(os.path.join(source, file), encoding="utf-8") as text:
+                for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
+                                       text.read(), re.M):
+                    faults.append(f"{file} includes {name}, which runtime/platform is for")
+
+
 def check_files_apart(files):
     """No two files that include each other, nor longer circles."""
     graph = {f: set() for f in files}
@@ -102,6 +113,7 @@ def check_names(rooms):
 rooms = read_table()
 files = tracked()
 check_includes(rooms, files)
+check_systems(files)
 check_files_apart(files)
 check_names(rooms)
 for fault in faults:

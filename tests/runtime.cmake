@@ -41,6 +41,13 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 
+# For Windows, where there is a compiler.
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
+  add_test(NAME windows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_windows.sh ${CMAKE_COMMAND}
+    ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER})
+  set_tests_properties(windows PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+endif()
+
 supine_test(runtime_quiet runtime_fixture)
 foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open close)
   target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})

@@ -1,27 +1,30 @@
 /* SPDX-License-Identifier: MIT */
 /* Safetensors files: mapping them, and asking what they hold. */
-#include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/safetensors_file.h"
 
-/* Takes the bytes, mapped or not, whatever comes of it. */
-static supine_status open_bytes(const void *bytes, size_t size, void *mapping, const char *name,
-                                supine_safetensors **result, supine_error *error) {
+static char *copy_text(const char *text) {
+  const size_t size = strlen(text) + 1;
+  char *copy = malloc(size);
+  if (copy != NULL) {
+    memcpy(copy, text, size);
+  }
+  return copy;
+}
+
+/* Takes the mapping, if there is one, whatever comes of it. */
+static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
+                                const char *name, supine_safetensors **result,
+                                supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_safetensors *file = calloc(1, sizeof *file);
-  char *copy = strdup(name);
+  char *copy = copy_text(name);
   if (file == NULL || copy == NULL) {
     (void)supine_error_set(error, status, "%s: out of memory", name);
-    if (mapping != NULL) {
-      (void)munmap(mapping, size);
-    }
+    supine_platform_unmap(&mapping);
     free(copy);
     goto cleanup;
   }
@@ -43,51 +46,24 @@ cleanup:
 
 supine_status supine_safetensors_open_memory(const void *bytes, size_t size, const char *name,
                                              supine_safetensors **file, supine_error *error) {
-  return open_bytes(bytes, size, NULL, name, file, error);
+  return open_bytes(bytes, size, (supine_platform_file){NULL, 0}, name, file, error);
 }
 
 supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                       supine_error *error) {
-  supine_status status = SUPINE_ERROR_READ;
-  struct stat about = {0};
+  supine_platform_file mapping;
   *file = NULL;
-  const int descriptor = open(path, O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0 || fstat(descriptor, &about) != 0) {
-    (void)supine_error_set(error, status, "%s: cannot read: %s", path,
-                           strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
-    goto cleanup;
-  }
-  if (!S_ISREG(about.st_mode)) {
-    (void)supine_error_set(error, status, "%s: not a file: give a basis file's path", path);
-    goto cleanup;
-  }
-  const size_t size = (size_t)about.st_size;
-  if (size == 0) { /* nothing to map */
-    status = open_bytes("", 0, NULL, path, file, error);
-    goto cleanup;
-  }
-  void *bytes = mmap(NULL, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
-  if (bytes == MAP_FAILED) {
-    (void)supine_error_set(error, status, "%s: cannot map: %s", path,
-                           strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
-    goto cleanup;
-  }
-  status = open_bytes(bytes, size, bytes, path, file, error);
-
-cleanup:
-  if (descriptor >= 0) {
-    (void)close(descriptor);
-  }
-  return status;
+  const supine_status status = supine_platform_map(path, &mapping, error);
+  return status != SUPINE_OK ? status
+                             : open_bytes(mapping.bytes == NULL ? "" : mapping.bytes, mapping.size,
+                                          mapping, path, file, error);
 }
 
 void supine_safetensors_close(supine_safetensors *file) {
   if (file == NULL) {
     return;
   }
-  if (file->mapping != NULL) {
-    (void)munmap(file->mapping, file->size);
-  }
+  supine_platform_unmap(&file->mapping);
   for (size_t i = 0; file->copies != NULL && i < file->tensor_count; ++i) {
     free(file->copies[i]);
   }

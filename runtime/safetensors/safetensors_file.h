@@ -4,6 +4,7 @@
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 
+#include "runtime/platform/platform.h"
 #include "runtime/safetensors/dtype.h"
 
 /** A tensor and where the header says that it lies. */
@@ -16,8 +17,8 @@ struct supine_safetensors {
   char *name;
   const unsigned char *bytes;
   size_t size;
-  void *mapping; /**< the same bytes where they are mapped, else NULL */
-  char *header;  /**< a copy, in which strings are decoded */
+  supine_platform_file mapping; /**< the same bytes where they are mapped */
+  char *header;                 /**< a copy, in which strings are decoded */
   supine_tensor *tensors;
   void **copies; /**< of tensors that lie misaligned; NULL elsewhere */
   size_t tensor_count;

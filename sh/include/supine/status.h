@@ -8,12 +8,19 @@
 extern "C" {
 #endif
 
-/** Marks the symbols that a shared library shows. */
-#if defined(__GNUC__)
+/** Marks the symbols that a shared library shows; SUPINE_EXPORTS while Windows' is built. */
+#if defined(_WIN32) && defined(SUPINE_EXPORTS)
+#define SUPINE_API __declspec(dllexport)
+#elif defined(__GNUC__) && !defined(_WIN32)
 #define SUPINE_API __attribute__((visibility("default")))
-#define SUPINE_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define SUPINE_API
+#endif
+#if defined(__MINGW32__) && !defined(__clang__)
+#define SUPINE_PRINTF(text, first) __attribute__((format(gnu_printf, text, first)))
+#elif defined(__GNUC__)
+#define SUPINE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
 #define SUPINE_PRINTF(text, first)
 #endif
 
