@@ -45,7 +45,7 @@ endif()
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME windows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_windows.sh ${CMAKE_COMMAND}
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER})
-  set_tests_properties(windows PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+  set_tests_properties(windows PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77)
 endif()
 
 supine_test(runtime_quiet runtime_fixture)

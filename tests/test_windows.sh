@@ -37,7 +37,7 @@ cp "$dll" "$source/tests/golden/basis_2.safetensors" "$work"
 cd "$work"
 export WINEPREFIX="$work/wine" WINEDEBUG=-all
 run() {
-  timeout 120 "$wine" "$@"
+  timeout 400 "$wine" "$@"
 }
 printf '#include <stdio.h>\nint main(void) { return puts("here") < 0; }\n' >hello.c
 x86_64-w64-mingw32-gcc hello.c -o hello.exe
