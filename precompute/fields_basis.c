@@ -7,6 +7,7 @@
 #include "precompute/projection/compression.h"
 #include "precompute/writer/basis_file.h"
 
+/* Eight parameters: those of supine_precompute, the fields and how they are fitted. */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *made_by,
                                        const char *path, supine_fit_report *report,

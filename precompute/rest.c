@@ -24,6 +24,7 @@ static void add_cubics(const supine_volume_forms *forms, const double *share, co
   }
 }
 
+/* Nine parameters: all that a basis is made of, before it is one. */
 static supine_status rest_along(const supine_lungs *lungs, const supine_model *model,
                                 const supine_reference *reference,
                                 const supine_compression *compression,

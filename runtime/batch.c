@@ -18,7 +18,8 @@ typedef struct block {
   float held[GROUP][16]; /* see supine_target */
 } block;
 
-/* Whole tiles of one lung; `positions` is orientation 0's first, `apart` numbers to the next. */
+/* Whole tiles of one lung; `positions` is orientation 0's first, `apart` numbers to the next. Nine
+ * parameters: a range of tiles and where it goes, in the innermost call but one. */
 static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
                         size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;

@@ -80,6 +80,7 @@ void supine_deform(const supine_basis *basis, const double *weights, const doubl
   supine_deform_range(basis, weights, scales, 0, basis->info.vertex_count, xyz);
 }
 
+/* Eight parameters: those of supine_deform_range, with a place for each axis. */
 void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *x, float *y, float *z) {
   const supine_target target = {

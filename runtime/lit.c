@@ -121,6 +121,7 @@ supine_status supine_deform_lit(const supine_basis *basis, const double *weights
   return supine_deform_lit_range(basis, weights, scales, 0, basis->info.vertex_count, xyz, normals);
 }
 
+/* Eight parameters: those of supine_deform_batch, with the normals. */
 supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
                                       const double *weights, const double *scales, size_t begin,
                                       size_t end, float *xyz, float *normals) {

@@ -64,6 +64,7 @@ static void split_order(size_t width, const double *restrict plus, const double 
   }
 }
 
+/* Eight parameters: a pair of rings and where its numbers lie, in the innermost loop but one. */
 void supine_sh_ring_forward(const supine_sh_transform *plan, const supine_sh_workspace *work,
                             size_t fields, size_t stride, const double *north, const double *south,
                             size_t row, size_t rows) {
@@ -123,6 +124,7 @@ static void part(size_t width, const double *restrict z, double *restrict north,
   }
 }
 
+/* Nine parameters: as its counterpart, with what to do with the lower ring. */
 void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_workspace *work,
                             size_t fields, size_t stride, supine_sh_mode mode, double *north,
                             double *south, size_t row, size_t rows) {

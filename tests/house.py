@@ -110,8 +110,29 @@ def check_names(rooms):
         faults.append(f"only {checked} objects in {build}")
 
 
+def check_sizes(files):
+    """No function above 60 lines, none of more than 7 parameters, unless the comment above it says
+    why: a sentence with "lines" or "parameters" in it."""
+    begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)[A-Za-z_][^;{}=#]*?\b(\w+)\(([^;{}]*)\) \{$", re.M)
+    for file in files:
+        if not file.endswith(".c"):
+            continue
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = opened.read()
+        for found in begin.finditer(text):
+            name, parameters = found.groups()
+            lines = text.count("\n", found.start(), text.index("\n}", found.end())) + 2
+            before = text[:found.start()].rstrip()
+            comment = before[before.rfind("/*"):] if before.endswith("*/") else ""
+            if parameters.count(",") + 1 > 7 and "parameters" not in comment:
+                faults.append(f"{file}: {name} has {parameters.count(',') + 1} parameters")
+            if lines > 60 and "lines" not in comment:
+                faults.append(f"{file}: {name} has {lines} lines")
+
+
 rooms = read_table()
 files = tracked()
+check_sizes(files)
 check_includes(rooms, files)
 check_systems(files)
 check_files_apart(files)

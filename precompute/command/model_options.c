@@ -576,6 +576,7 @@ static int load_maps(supine_model_options *options, const char *command, load_wo
   return result;
 }
 
+/* Over 60 lines: one step after another, each with its message. */
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
                               size_t count, bool keep, supine_lungs *lungs) {
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};

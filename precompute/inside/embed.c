@@ -106,9 +106,10 @@ static void take_back(embedding *e, size_t begin, size_t end, const double *valu
   }
 }
 
-/* Points [begin, end) of the order, all of one lung, at most BLOCK. In `space`: positions
- * [2 BLOCK, 3], values [2 BLOCK, R]; the second half are the surface's points nearest to those
- * whose distance is less than `reach`. */
+/* Points [begin, end) of the order, all of one lung, at most BLOCK. In `space`: positions [2
+ * BLOCK, 3], values [2 BLOCK, R]; the second half are the surface's points nearest to those whose
+ * distance is less than `reach`. Eight parameters and the error: a block is no more than its
+ * range. */
 static supine_status move_block(embedding *e, const supine_inside_shell *shell,
                                 const double *displacement, const supine_inside_biharmonic *fit,
                                 double reach, size_t begin, size_t end, double *space,

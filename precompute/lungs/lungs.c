@@ -186,6 +186,7 @@ static supine_status group(supine_lungs *lungs, const component *parts, supine_e
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
+/* Over 60 lines: joining, parting, checking and measuring, each of which may end it. */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
   component *parts = NULL;

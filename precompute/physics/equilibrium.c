@@ -528,6 +528,7 @@ static size_t iterate(solve_pass *pass, double tolerance) {
   return steps;
 }
 
+/* Eight parameters: the system, its right-hand sides, how exactly, and what comes of it. */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double tolerance, bool warm,
                                                double *catch_, supine_solve_report *report,

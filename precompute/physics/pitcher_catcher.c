@@ -138,6 +138,8 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
+/* Twelve parameters and over 60 lines: the paper's algorithm with the paper's quantities, step by
+ * step; for tests alone. */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,

@@ -8,6 +8,7 @@
 
 #include "precompute/projection/sampler.h"
 
+/* Over 60 lines: memory for the whole route is taken in one place. */
 supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_model *model,
                                         size_t band, supine_progress_function *progress,
                                         void *context, supine_projection *projection,

@@ -47,7 +47,8 @@ static supine_status check_folds(const supine_lungs *lungs, const supine_mesh *s
       100.0 * share, 100.0 * folded_share, folded * gain, gain);
 }
 
-/* One step of the fixed point: the field of the full surface so far, laid on the scan. */
+/* One step of the fixed point: the field of the full surface so far, laid on the scan. Eight
+ * parameters: what is known of the scan, and what the step changes. */
 static supine_status step(supine_lungs *lungs, const supine_lungs *scan, const supine_model *model,
                           const double g[3], double gain, double *scale, double *change,
                           supine_error *error) {

@@ -38,7 +38,8 @@ static void assign(const supine_lungs *lungs, const placed *order, const double 
   }
 }
 
-/* rows: x, y, z and expandability of the file's vertices. */
+/* rows: x, y, z and expandability of the file's vertices. Nine parameters: the file's rows, and
+ * the lungs' vertices in the order that finds them. */
 static supine_status assign_all(const char *path, const char *property, const double *rows,
                                 size_t count, const supine_lungs *lungs, const placed *order,
                                 const double scale[3], double *a, supine_error *error) {

@@ -194,6 +194,7 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
+/* Over 60 lines: the format from its first tensor to its last, in the order of the file. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;

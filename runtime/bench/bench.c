@@ -349,6 +349,7 @@ typedef struct list {
   size_t count;
 } list;
 
+/* Eight parameters: one a column of the table of tasks. */
 static supine_bench_row *add(list *l, bench *work, const char *what, const supine_basis *basis,
                              size_t threads, supine_range_function *range, size_t count,
                              double bytes) {

@@ -50,6 +50,7 @@ void supine_breath_course_free(breath_course *course) {
   *course = (breath_course){0};
 }
 
+/* Eight parameters: the relation, the breath, the turn, and how many frames of how many lungs. */
 supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
                                           const breath_turn *turn, double rate, size_t count,
                                           size_t lungs, breath_course *course,

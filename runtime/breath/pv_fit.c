@@ -130,6 +130,7 @@ static supine_status fit_curve(problem *limb, double span, double confidence,
   return status;
 }
 
+/* Nine parameters, over 60 lines: samples, how to fit them, and what comes of it, limb by limb. */
 supine_status supine_breath_fit(size_t count, const double *pressures, const double *volumes,
                                 const size_t *lines, const char *name, double confidence,
                                 supine_pv_curve *curve, supine_pv_report *report,

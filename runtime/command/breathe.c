@@ -240,6 +240,7 @@ static void warn_of_size(const request *wanted, const breath_content *content) {
   }
 }
 
+/* Over 60 lines: what a breath needs is made in one place and freed in one. */
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
                           supine_error *error) {

@@ -61,6 +61,24 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
+/* In every form that is wanted. */
+static int tell(const supine_comparison *comparison, const request *wanted) {
+  if (!wanted->json) {
+    supine_report_text(comparison, stdout);
+  } else if (!supine_report_json(comparison, stdout)) {
+    supine_options_say(name, "cannot print JSON");
+    return SUPINE_EXIT_OUTPUT;
+  }
+  int result = supine_options_finish(name);
+  if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
+    result = write_file(wanted->csv, comparison, supine_report_csv);
+  }
+  if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
+    result = write_file(wanted->html, comparison, supine_report_html);
+  }
+  return result;
+}
+
 static int compare(const char *path, const supine_basis *basis, const request *wanted) {
   supine_comparison comparison = {.path = path,
                                   .command = name,
@@ -105,21 +123,7 @@ static int compare(const char *path, const supine_basis *basis, const request *w
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  if (wanted->json && !supine_report_json(&comparison, stdout)) {
-    supine_options_say(name, "cannot print JSON");
-    result = SUPINE_EXIT_OUTPUT;
-    goto cleanup;
-  }
-  if (!wanted->json) {
-    supine_report_text(&comparison, stdout);
-  }
-  result = supine_options_finish(name);
-  if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
-    result = write_file(wanted->csv, &comparison, supine_report_csv);
-  }
-  if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
-    result = write_file(wanted->html, &comparison, supine_report_html);
-  }
+  result = tell(&comparison, wanted);
 cleanup:
   supine_report_free(&comparison);
   return result;

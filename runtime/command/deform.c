@@ -95,6 +95,7 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
   return SUPINE_EXIT_OK;
 }
 
+/* Over 60 lines: what a surface needs is made in one place and freed in one. */
 static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double weights[SUPINE_MODES_MAX];

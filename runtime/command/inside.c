@@ -42,6 +42,7 @@ static void add_part(const supine_command_names *names, size_t part, const size_
   out->mark[out->marks.count++] = middle;
 }
 
+/* Eight parameters: two states of the same content. */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names, const double *weights,
                                         const double *scales, const double *reference_weights,

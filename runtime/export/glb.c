@@ -248,6 +248,7 @@ static supine_status write_file(glb *g, const char *path, const char *text, size
   return status;
 }
 
+/* Over 60 lines: the file from its first part to its last. */
 supine_status supine_export_glb_write(const char *path, const export_source *source,
                                       const export_glb_options *options, export_glb_report *report,
                                       supine_error *error) {

@@ -14,6 +14,7 @@ json_t *supine_export_glb_numbers(const double *values, size_t count) {
   return array;
 }
 
+/* Eight parameters: an accessor's properties in the terms of glTF. */
 size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
                                   int target, size_t axes, const double *low, const double *high) {
   const size_t size = component == GLTF_SHORT ? SHORT_STRIDE : 4 * axes;

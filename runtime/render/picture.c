@@ -173,7 +173,8 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
-/* Discs and specks at what is inside, then the names, so that none is covered. */
+/* Discs and specks at what is inside, then the names, so that none is covered. Eight parameters:
+ * where, what, and in which colours. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *look) {
@@ -217,6 +218,8 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   return SUPINE_OK;
 }
 
+/* Thirteen parameters: a panel, the view of it, and its place in the picture, which cell() has
+ * just worked out. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -257,6 +260,7 @@ cleanup:
   return status;
 }
 
+/* Nine parameters: the picture, and which part of it. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
