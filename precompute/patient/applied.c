@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <lapacke.h>
 
 #include "precompute/patient/applied.h"
 
@@ -157,10 +157,9 @@ static bool fit_force(const block *blocks, size_t count, supine_patient_applied 
     mean += blocks[b].area * blocks[b].force;
   }
   mean /= weight;
-  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, COLUMNS, COLUMNS);
-  gsl_vector_view k_view = gsl_vector_view_array(k, COLUMNS);
-  if (count <= COLUMNS || gsl_linalg_cholesky_decomp1(&matrix_view.matrix) != GSL_SUCCESS ||
-      gsl_linalg_cholesky_svx(&matrix_view.matrix, &k_view.vector) != GSL_SUCCESS || k[0] == 0.0) {
+  if (count <= COLUMNS ||
+      LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', COLUMNS, 1, matrix, COLUMNS, k, COLUMNS) != 0 ||
+      k[0] == 0.0) {
     return false;
   }
   for (size_t b = 0; b < count; ++b) {

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Whether pairs of points can be two states of one chest. */
 #include <math.h>
+#include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <cblas.h>
+#include <lapacke.h>
 
 #include "precompute/patient/pairs.h"
 
 #include "mesh/mesh.h"
+#include "sh/base/vec3.h"
 
 enum { PAIRS_LEAST = 12 };          /* an affine map has as many unknowns as 4 pairs; thrice that */
 static const double flattest = 1.0; /* mm RMS across the plane that fits best */
@@ -60,64 +63,40 @@ static double second_moment(const supine_patient_pairs *pairs, const summary *s,
 /* The affine map that fits best, and the rotation in it: with M = U S V^T, U V^T. */
 static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
   double covariance[9];
+  double decomposed[9];
+  double cross[9];
   double map[9];
-  double v[9];
   double width[3];
-  double work[3];
-  double explained = 0.0;
-  gsl_matrix_view covariance_view = gsl_matrix_view_array(covariance, 3, 3);
-  gsl_matrix_view map_view = gsl_matrix_view_array(map, 3, 3);
-  gsl_matrix_view v_view = gsl_matrix_view_array(v, 3, 3);
-  gsl_vector_view width_view = gsl_vector_view_array(width, 3);
-  gsl_vector_view work_view = gsl_vector_view_array(work, 3);
+  double u[9];
+  double vt[9];
+  double rotation[9];
   for (size_t a = 0; a < 3; ++a) {
     for (size_t b = 0; b < 3; ++b) {
       covariance[3 * a + b] = second_moment(pairs, s, 0, a, 0, b);
-      map[3 * a + b] = second_moment(pairs, s, 1, a, 0, b); /* row a: to_a against from */
+      cross[3 * a + b] = second_moment(pairs, s, 1, a, 0, b); /* row a: to_a against from */
     }
   }
-  double copy[9];
-  for (size_t k = 0; k < 9; ++k) {
-    copy[k] = covariance[k];
-  }
-  gsl_matrix_view copy_view = gsl_matrix_view_array(copy, 3, 3);
-  if (gsl_linalg_SV_decomp(&copy_view.matrix, &v_view.matrix, &width_view.vector,
-                           &work_view.vector) != GSL_SUCCESS) {
+  memcpy(decomposed, covariance, sizeof covariance);
+  memcpy(map, cross, sizeof cross);
+  if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'L', 3, decomposed, 3, width) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
-  s->thinnest = sqrt(width[2]);
+  s->thinnest = sqrt(fmax(0.0, width[0]));
   if (s->thinnest < flattest) {
     return SUPINE_OK; /* said by the caller */
   }
-  if (gsl_linalg_cholesky_decomp1(&covariance_view.matrix) != GSL_SUCCESS) {
+  /* By columns, the rows of the map are the right-hand sides. */
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, covariance, 3, map, 3) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
-  for (size_t a = 0; a < 3; ++a) {
-    gsl_vector_view row = gsl_vector_view_array(map + 3 * a, 3);
-    double cross[3] = {row.vector.data[0], row.vector.data[1], row.vector.data[2]};
-    (void)gsl_linalg_cholesky_svx(&covariance_view.matrix, &row.vector);
-    for (size_t b = 0; b < 3; ++b) {
-      explained += cross[b] * map[3 * a + b];
-    }
-  }
-  s->left = sqrt(fmax(0.0, s->spread[1] * s->spread[1] - explained));
-  if (gsl_linalg_SV_decomp(&map_view.matrix, &v_view.matrix, &width_view.vector,
-                           &work_view.vector) != GSL_SUCCESS) {
+  s->left = sqrt(fmax(0.0, s->spread[1] * s->spread[1] - cblas_ddot(9, cross, 1, map, 1)));
+  if (LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'A', 3, 3, map, 3, width, u, 3, vt, 3) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
-  double rotation[9];
-  double trace = 0.0;
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t b = 0; b < 3; ++b) {
-      rotation[3 * a + b] =
-          map[3 * a] * v[3 * b] + map[3 * a + 1] * v[3 * b + 1] + map[3 * a + 2] * v[3 * b + 2];
-    }
-    trace += rotation[4 * a];
-  }
-  const double *r = rotation;
-  s->mirrored = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
-                    r[2] * (r[3] * r[7] - r[4] * r[6]) <
-                0.0;
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, 3, 3, 3, 1.0, u, 3, vt, 3, 0.0, rotation,
+              3);
+  const double trace = rotation[0] + rotation[4] + rotation[8];
+  s->mirrored = supine_triple(rotation, rotation + 3, rotation + 6) < 0.0;
   s->turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (trace - 1.0)))) * 180.0 / 3.14159265358979323846;
   return SUPINE_OK;
 }
@@ -132,6 +111,7 @@ static double motion(const supine_patient_pairs *pairs, const summary *s, bool m
   return sqrt(sum / (double)pairs->count);
 }
 
+/* Over 60 lines: one doubt after another, each with its message. */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
                                          supine_error *error) {
   summary s = {0};

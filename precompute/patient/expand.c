@@ -506,6 +506,7 @@ static supine_status settle(supine_patient_matching *m, study *s, bool with, hol
   return status;
 }
 
+/* Eight parameters: what is fitted to, how to tell of it, and what comes of it. */
 supine_status supine_patient_expand(supine_patient_matching *matching, supine_patient_moved moved,
                                     supine_patient_progress *progress, void *context,
                                     supine_patient_power *power,

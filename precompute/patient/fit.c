@@ -407,6 +407,7 @@ static supine_status prepare(study *s, supine_error *error) {
   return status;
 }
 
+/* Eight parameters: what is fitted, to what, how, and what comes of it. */
 supine_status supine_patient_fit(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, size_t components,
                                  const supine_patient_fit_options *options, supine_patient *patient,

@@ -239,6 +239,7 @@ static void take(problem *p, const gsl_vector *q, supine_patient_power *fit) {
   }
 }
 
+/* Eight parameters: the rows, the bounds, and what comes of them. */
 supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t count,
                                        supine_patient_moved moved, const double powers[P],
                                        size_t steps, double tolerance, supine_patient_power *fit,

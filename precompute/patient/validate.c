@@ -4,14 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <cblas.h>
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
+#include <lapacke.h>
 
 #include "precompute/patient/validate.h"
 
 #include "precompute/inside/surface.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT] = {
     "predicted", "none", "translation", "rigid+scale", "affine"};
@@ -33,40 +35,18 @@ static void apply(const map *by, const double *from, double *to) {
 /* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, the last column of U
  * turned where that would mirror; scale tr(S) over the spread. */
 static bool similarity(double cross[9], double spread, double m[9]) {
-  double v[9];
   double s[3];
-  double work[3];
   double u[9];
-  gsl_matrix_view cross_view = gsl_matrix_view_array(cross, 3, 3);
-  gsl_matrix_view v_view = gsl_matrix_view_array(v, 3, 3);
-  gsl_vector_view s_view = gsl_vector_view_array(s, 3);
-  gsl_vector_view work_view = gsl_vector_view_array(work, 3);
-  if (gsl_linalg_SV_decomp(&cross_view.matrix, &v_view.matrix, &s_view.vector, &work_view.vector) !=
-      GSL_SUCCESS) {
+  double vt[9];
+  if (LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'A', 3, 3, cross, 3, s, u, 3, vt, 3) != 0) {
     return false;
   }
-  memcpy(u, cross, sizeof u);
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) {
-        m[3 * a + b] =
-            u[3 * a] * v[3 * b] + u[3 * a + 1] * v[3 * b + 1] + u[3 * a + 2] * v[3 * b + 2];
-      }
-    }
-    const double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) -
-                               m[1] * (m[3] * m[8] - m[5] * m[6]) +
-                               m[2] * (m[3] * m[7] - m[4] * m[6]);
-    if (determinant > 0.0) {
-      break;
-    }
-    u[2] = -u[2];
-    u[5] = -u[5];
-    u[8] = -u[8];
+  if (supine_triple(u, u + 3, u + 6) * supine_triple(vt, vt + 3, vt + 6) < 0.0) {
+    cblas_dscal(3, -1.0, u + 2, 3);
     s[2] = -s[2];
   }
-  for (int k = 0; k < 9; ++k) {
-    m[k] *= (s[0] + s[1] + s[2]) / spread;
-  }
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, 3, 3, 3, (s[0] + s[1] + s[2]) / spread, u,
+              3, vt, 3, 0.0, m, 3);
   return true;
 }
 
@@ -97,13 +77,9 @@ static bool fit_map(supine_patient_map kind, size_t count, const double *from, c
   if (kind == SUPINE_PATIENT_MAP_SIMILARITY) {
     right = similarity(cross, own[0] + own[4] + own[8], found->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    gsl_matrix_view own_view = gsl_matrix_view_array(own, 3, 3);
-    right = gsl_linalg_cholesky_decomp1(&own_view.matrix) == GSL_SUCCESS;
-    for (size_t a = 0; a < 3 && right; ++a) {
-      gsl_vector_view row = gsl_vector_view_array(cross + 3 * a, 3);
-      (void)gsl_linalg_cholesky_svx(&own_view.matrix, &row.vector);
-      memcpy(found->m + 3 * a, cross + 3 * a, 3 * sizeof(double));
-    }
+    /* by columns, the rows of the map are the right-hand sides */
+    right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, own, 3, cross, 3) == 0;
+    memcpy(found->m, cross, sizeof cross);
   }
   double moved[3];
   apply(found, mean[0], moved);

@@ -81,6 +81,7 @@ static void add_links(const supine_network *net, size_t i, const double *give, c
   }
 }
 
+/* Eight parameters: the system, the two fields that meet in it, and what comes of them. */
 supine_status supine_physics_inverse_gradient(const supine_network *network,
                                               supine_equilibrium *equilibrium,
                                               const double *stiffness, const double *catch_,
