@@ -92,6 +92,20 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
+# Other postures tell the gain: by surfaces, by landmarks, or both; one posture does not.
+"$supine" precompute rest.ply --scanned none --law deep --constants 5,2.2,9,1.1,20,1.4 --base 0.9 \
+  --gain 0.4 --box-force 0,-0.2,0 --band 15 -o known.safetensors >/dev/null || fail "a known law"
+"$supine" deform known.safetensors --posture supine --volume 900 -o wide.ply >/dev/null || fail deform
+"$supine" deform known.safetensors --posture prone --volume 600 -o down.ply >/dev/null || fail deform
+"$supine" deform known.safetensors --posture supine --volume 500 -o half.ply >/dev/null || fail deform
+"$supine" fit rest.ply --state supine:wide.ply --state prone:+600:down.ply -o two.json --json \
+  >fit.json || fail "fit two states"
+near "$(number gain fit.json)" 0.4 0.03 || fail "gain $(number gain fit.json)"
+near "$(number gain_standard_error fit.json)" 0.02 0.02 || fail "its error"
+"$supine" fit rest.ply wide.ply half.ply >fit.txt || fail "fit more operands"
+grep -q 'supine: breath scale 0.5' fit.txt || fail "half a breath: $(grep scale fit.txt)"
+grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"
+
 # Landmarks: vertices of the two, every second, with half a millimetre of noise.
 vertices() { # FILE: x y z of its vertices
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
@@ -134,7 +148,8 @@ refused 1 'against what' validate points.safetensors
 refused 1 'make a basis of it first' validate points.json --state state.ply
 refused 1 'knows its own posture only' validate points.json --landmarks pairs.csv --posture prone
 refused 1 'what to fit to' fit rest.ply
-refused 1 'is the one that was fitted' fit --landmarks pairs.csv --third supine:pairs.csv
+refused 1 'tell the gain' fit --landmarks pairs.csv --gain 0.3 --state prone:pairs.csv
+refused 1 'name the one at rest' fit --landmarks pairs.csv --state prone:state.ply
 refused 2 'the same as the one at rest' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--direction normal' '--scanned full' '--resting prone=0.5'; do

@@ -19,8 +19,11 @@ typedef struct request {
   double midline, gain, reach;
   supine_mesh_load_options load;
 
-  supine_patient_scan rest, state, third;
-  const char *third_path;
+  supine_patient_scan rest, state;
+  size_t count; /* of further states, or of all where no other was named */
+  supine_patient_scan further[SUPINE_PATIENT_OTHERS_MAX];
+  const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
+  const char *rest_path, *state_path; /* surfaces; NULL: none */
 } request;
 
 /* "supine", "prone:rest", "supine+15:-3000" */
@@ -48,17 +51,23 @@ static int read_scan(const char *command, const char *text, void *field) {
 
 static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
 
-/* "prone:PAIRS.csv", into the whole request. */
-static int read_third(const char *command, const char *text, void *field) {
+/* "prone:PAIRS.csv", "prone:rest:PRONE.ply", into the whole request. */
+static int read_state(const char *command, const char *text, void *field) {
   request *wanted = field;
-  const char *colon = strchr(text, ':');
-  char posture[SUPINE_PATIENT_TEXT];
-  if (colon == NULL || colon[1] == '\0' || (size_t)(colon - text) >= sizeof posture) {
+  const char *colon = strrchr(text, ':');
+  char posture[2 * SUPINE_PATIENT_TEXT];
+  if (wanted->count == SUPINE_PATIENT_OTHERS_MAX || colon == NULL || colon[1] == '\0' ||
+      (size_t)(colon - text) >= sizeof posture) {
     return SUPINE_OPTION_MISFIT;
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
-  wanted->third_path = colon + 1;
-  return read_scan(command, posture, &wanted->third);
+  wanted->further_path[wanted->count] = colon + 1;
+  return read_scan(command, posture, &wanted->further[wanted->count++]);
+}
+
+static bool is_landmarks(const char *path) {
+  const size_t length = strlen(path);
+  return length > 4 && strcmp(path + length - 4, ".csv") == 0;
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
@@ -92,9 +101,12 @@ static const supine_option table[] = {
      "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
      "stays with the body; default 0.4, the 'deep' law's",
      FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
-    {"third", 0, "POSTURE:FILE",
-     "landmarks from the same rest to a third scan in another posture: they tell the gain",
-     .read = read_third, .wants = "a posture, a colon and a file of landmarks"},
+    {"state", 0, "POSTURE[:VOLUME]:FILE",
+     "a further state from the same rest, its surface or its landmarks (.csv); may be repeated, up "
+     "to 8. In another posture than the fitted state it tells the gain. Without another state to "
+     "fit to, the first is that",
+     .read = read_state, .alias = "third",
+     .wants = "(at most 8) a posture, perhaps :full, :rest or :ML, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
     {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
@@ -197,15 +209,18 @@ static void print_applied(const supine_patient_surface_fit *found) {
                c[0], c[1], c[2]);
 }
 
-static void print_gain(const supine_patient_record *record, const supine_patient_gain *found,
-                       bool given) {
-  if (found != NULL) {
-    (void)printf("gain %.2f +- %.2f turns with gravity, by the third scan: %.1f mm RMS left there, "
-                 "%.1f were it 0\n",
-                 found->gain, found->error, found->left, found->left_without);
+static void print_gain(const supine_patient_record *record, bool given) {
+  for (size_t k = 0; k < record->told_count; ++k) {
+    const supine_patient_told *told = &record->told[k];
+    (void)printf("%s: breath scale %.2f, leaves %.1f mm RMS, %.1f were no force to turn\n",
+                 told->posture, told->scale, told->left, told->left_without);
+  }
+  if (record->gain_told) {
+    (void)printf("gain %.2f +- %.2f turns with gravity, by the states in other postures\n",
+                 record->force.gain, record->gain_error);
   } else if (!given) {
     (void)printf("one posture cannot tell what turns with gravity from what stays with the body:\n"
-                 "gain %.2g is the deep law's, or --gain, or --third\n",
+                 "gain %.2g is the deep law's, or --gain, or of a --state in another posture\n",
                  record->force.gain);
   }
 }
@@ -266,8 +281,7 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
   return status;
 }
 
-static supine_status fit_surfaces(const request *wanted, const supine_arguments *given,
-                                  const supine_patient_pairs *pairs,
+static supine_status fit_surfaces(const request *wanted, const supine_patient_pairs *pairs,
                                   const supine_patient_fit_options *options,
                                   supine_patient_surface_fit *found, supine_error *error) {
   supine_lungs rest = {0};
@@ -275,9 +289,9 @@ static supine_status fit_surfaces(const request *wanted, const supine_arguments 
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
-  supine_status status = load_lungs(wanted, given->operand[0], &rest, error);
+  supine_status status = load_lungs(wanted, wanted->rest_path, &rest, error);
   if (status == SUPINE_OK) {
-    status = load_lungs(wanted, given->operand[1], &state, error);
+    status = load_lungs(wanted, wanted->state_path, &state, error);
   }
   if (status == SUPINE_OK) {
     supine_patient_surface_task task = {.rest = &rest,
@@ -315,32 +329,78 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* The gain of a third scan's landmarks into the record. */
-static supine_status find_gain(const request *wanted, supine_patient_record *record,
-                               supine_patient_gain *gain, supine_error *error) {
-  const bool moved = wanted->translation || wanted->rigid;
-  supine_patient_pairs pairs = {0};
-  supine_status status =
-      supine_patient_pairs_load(wanted->third_path, wanted->reverse, &pairs, error);
-  if (status == SUPINE_OK) {
-    status = supine_patient_pairs_check(&pairs, moved, error);
+/* Further states: what of the force turns. */
+typedef struct further_work {
+  supine_patient_pairs pairs[SUPINE_PATIENT_OTHERS_MAX];
+  supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX], rest;
+  supine_patient_other other[SUPINE_PATIENT_OTHERS_MAX];
+} further_work;
+
+static supine_status load_further(const request *wanted, bool moved, further_work *work,
+                                  supine_error *error) {
+  supine_status status = SUPINE_OK;
+  for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
+    const char *path = wanted->further_path[k];
+    memcpy(work->other[k].gravity, wanted->further[k].gravity, sizeof work->other[k].gravity);
+    if (is_landmarks(path)) {
+      status = supine_patient_pairs_load(path, wanted->reverse, &work->pairs[k], error);
+      if (status == SUPINE_OK) {
+        status = supine_patient_pairs_check(&work->pairs[k], moved, error);
+      }
+      work->other[k].pairs = &work->pairs[k];
+      continue;
+    }
+    if (work->rest.mesh.vertex_count == 0) {
+      status = load_lungs(wanted, wanted->rest_path, &work->rest, error);
+    }
+    if (status == SUPINE_OK) {
+      status = load_lungs(wanted, path, &work->lungs[k], error);
+      work->other[k].surface = &work->lungs[k].mesh;
+    }
   }
-  if (status == SUPINE_OK) {
-    status = supine_patient_gain_fit(record, &pairs, wanted->third.gravity, moved, gain, error);
-  }
-  if (status == SUPINE_OK) {
-    record->force = supine_patient_force(&record->patient, gain->gain, record->state.gravity);
-  }
-  supine_patient_pairs_free(&pairs);
   return status;
 }
 
-static void keep(const request *wanted, const supine_arguments *given,
-                 const supine_patient_surface_fit *found, supine_patient_record *record) {
+static supine_status find_gain(const request *wanted, supine_patient_record *record,
+                               supine_error *error) {
+  const bool moved = wanted->translation || wanted->rigid;
+  further_work *work = calloc(1, sizeof *work);
+  supine_patient_gain gain = {0};
+  supine_status status =
+      work == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for further states")
+                   : load_further(wanted, moved, work, error);
+  if (status == SUPINE_OK) {
+    status = supine_patient_gain_fit(record, &work->rest, wanted->reach, moved, work->other,
+                                     wanted->count, &gain, error);
+  }
+  if (status == SUPINE_OK) {
+    record->gain_told = gain.told;
+    record->gain_error = gain.error;
+    record->force = supine_patient_force(&record->patient, gain.gain, record->state.gravity);
+    record->told_count = wanted->count;
+    for (size_t k = 0; k < wanted->count; ++k) {
+      const supine_patient_other *other = &work->other[k];
+      record->told[k] = (supine_patient_told){"", other->scale, other->left, other->left_without};
+      memcpy(record->told[k].posture, wanted->further[k].posture, sizeof record->told[k].posture);
+    }
+  }
+  for (size_t k = 0; work != NULL && k < SUPINE_PATIENT_OTHERS_MAX; ++k) {
+    supine_patient_pairs_free(&work->pairs[k]);
+    supine_lungs_free(&work->lungs[k]);
+  }
+  if (work != NULL) {
+    supine_lungs_free(&work->rest);
+  }
+  free(work);
+  return status;
+}
+
+static void keep(const request *wanted, const supine_patient_surface_fit *found,
+                 supine_patient_record *record) {
   const supine_patient_fit_report *report = &found->report;
   const supine_patient_law law = found->patient.law;
   const supine_patient_scores *held = &report->held_out;
-  const char *source = wanted->landmarks != NULL ? wanted->landmarks : given->operand[1];
+  const char *source = wanted->landmarks != NULL ? wanted->landmarks : wanted->state_path;
   const char *slash = strrchr(source, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
                  wanted->name != NULL ? wanted->name
@@ -352,7 +412,7 @@ static void keep(const request *wanted, const supine_arguments *given,
   record->applied = found->applied;
   record->rest = wanted->rest;
   record->state = wanted->state;
-  record->from_surface = given->count > 0;
+  record->from_surface = wanted->state_path != NULL;
   record->inflation = supine_patient_inflation(&record->patient);
   record->force = supine_patient_force(
       &record->patient, wanted->has_gain ? wanted->gain : usual_gain, wanted->state.gravity);
@@ -365,7 +425,7 @@ static void keep(const request *wanted, const supine_arguments *given,
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
                          supine_patient_surface_fit *found, supine_patient_record *record,
-                         supine_patient_gain *gain, supine_error *error) {
+                         supine_error *error) {
   const supine_patient_fit_options options = {.law_given = wanted->has_law,
                                               .law = (supine_patient_law)wanted->law,
                                               .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
@@ -381,14 +441,14 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
     }
   }
   if (status == SUPINE_OK) {
-    status = given->count > 0 ? fit_surfaces(wanted, given, pairs.count > 0 ? &pairs : NULL,
-                                             &options, found, error)
-                              : fit_landmarks(wanted, &pairs, &options, found, error);
+    status = wanted->state_path != NULL
+                 ? fit_surfaces(wanted, pairs.count > 0 ? &pairs : NULL, &options, found, error)
+                 : fit_landmarks(wanted, &pairs, &options, found, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, given, found, record);
-    if (wanted->third_path != NULL) {
-      status = find_gain(wanted, record, gain, error);
+    keep(wanted, found, record);
+    if (wanted->count > 0) {
+      status = find_gain(wanted, record, error);
     }
     if (status == SUPINE_OK && wanted->path != NULL) {
       status = supine_patient_write(wanted->path, record, &found->report, given->made_by, error);
@@ -398,21 +458,62 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
-  const request *wanted = chosen;
-  supine_patient_record record = {0};
-  supine_patient_surface_fit found = {0};
-  supine_patient_gain gain = {0};
-  supine_error error;
-  if (given->count == 1 || (given->count == 0 && wanted->landmarks == NULL)) {
+/* Which surfaces and landmarks the law is fitted to, and which states are further ones. */
+static int arrange(request *wanted, const supine_arguments *given) {
+  size_t next = 1;
+  wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
+  if (given->count > 1) {
+    wanted->state_path = given->operand[next++];
+  } else if (wanted->landmarks == NULL && wanted->count > 0) { /* the first state is the one */
+    *(is_landmarks(wanted->further_path[0]) ? &wanted->landmarks : &wanted->state_path) =
+        wanted->further_path[0];
+    wanted->state = wanted->further[0];
+    --wanted->count;
+    memmove(wanted->further, wanted->further + 1, wanted->count * sizeof *wanted->further);
+    memmove(wanted->further_path, wanted->further_path + 1,
+            wanted->count * sizeof *wanted->further_path);
+  }
+  for (; next < given->count; ++next) { /* more in the same posture */
+    if (wanted->count == SUPINE_PATIENT_OTHERS_MAX) {
+      return supine_options_usage(name, "more than %d further states", SUPINE_PATIENT_OTHERS_MAX);
+    }
+    wanted->further[wanted->count] = wanted->state;
+    wanted->further_path[wanted->count++] = given->operand[next];
+  }
+  if (wanted->landmarks == NULL && wanted->state_path == NULL) {
     return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
                                       "and the one in the other state, or both");
   }
-  if (wanted->expandability && given->count == 0) {
+  for (size_t k = 0; k < wanted->count; ++k) {
+    if (!is_landmarks(wanted->further_path[k]) && wanted->rest_path == NULL) {
+      return supine_options_usage(name, "%s is a surface: name the one at rest as well",
+                                  wanted->further_path[k]);
+    }
+  }
+  if (wanted->state_path != NULL && wanted->rest_path == NULL) {
+    return supine_options_usage(name, "%s is a surface: name the one at rest as well",
+                                wanted->state_path);
+  }
+  if (wanted->expandability && wanted->state_path == NULL) {
     return supine_options_usage(name, "--expandability is of surfaces: name the one at rest and "
                                       "the one in the other state");
   }
-  if (fit(wanted, given, &found, &record, &gain, &error) != SUPINE_OK) {
+  if (wanted->has_gain && wanted->count > 0) {
+    return supine_options_usage(name, "--gain or --state: further states tell the gain");
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  supine_patient_record record = {0};
+  supine_patient_surface_fit found = {0};
+  supine_error error;
+  const int result = arrange(wanted, given);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  if (fit(wanted, given, &found, &record, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   if (wanted->json) {
@@ -420,15 +521,15 @@ static int run(void *chosen, const supine_arguments *given) {
     (void)puts(text != NULL ? text : "{}");
     free(text);
   } else {
-    if (given->count > 0) {
+    if (wanted->state_path != NULL) {
       print_surface(&found.surface, wanted->landmarks != NULL);
     }
     print_text(&record, &found.report, wanted);
-    if (given->count > 0) {
+    if (wanted->state_path != NULL) {
       print_expandability(&found.expand, &found.stiffness);
       print_applied(&found);
     }
-    print_gain(&record, wanted->third_path != NULL ? &gain : NULL, wanted->has_gain);
+    print_gain(&record, wanted->has_gain);
   }
   return supine_options_finish(name);
 }
@@ -437,7 +538,7 @@ const supine_command supine_command_fit = {
     name,
     "a person's own law, from scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
-             "REST STATE -o patient.json [OPTIONS]",
+             "REST STATE... [--state POSTURE:FILE]... -o patient.json [OPTIONS]",
     .about =
         "Fits how one person's lungs move to matched points of two scans, and says how much of "
         "the motion of points that it has not seen each law explains. 'supine precompute "
@@ -446,9 +547,11 @@ const supine_command supine_command_fit = {
     .notes = "Example:\n"
              "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
              "--other supine:full -o patient.json\n"
+             "  supine fit rest.ply --state supine:full:full.ply --state prone:rest:prone.ply \\\n"
+             "      --landmarks pairs.csv -o patient.json\n"
              "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
-    .operands_most = 2,
-    .operands_missing = "one surface at rest and one in the other state",
+    .operands_most = 2 + SUPINE_PATIENT_OTHERS_MAX,
+    .operands_missing = "one surface at rest and some in other states",
     .request_size = sizeof(request),
     .run = run};

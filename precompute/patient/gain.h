@@ -1,33 +1,45 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * How much of a patient's force turns with gravity: what two scans in one posture leave open, and a
- * third in another posture tells. */
+ * How much of a patient's force turns with gravity: what two scans in one posture leave open, and
+ * others in other postures tell. */
 #ifndef SUPINE_PATIENT_GAIN_H
 #define SUPINE_PATIENT_GAIN_H
 
 #include "precompute/patient/patient_file.h"
 
+/** A further state of the same lungs, from the same rest: its points or its surface. */
+typedef struct supine_patient_other {
+  double gravity[3];
+  const supine_patient_pairs *pairs; /**< or NULL */
+  const supine_mesh *surface;        /**< where there are no pairs */
+  double scale; /**< found: breath scale, 1 where it is as far from rest as the fitted state */
+  double left;  /**< found: mm RMS; of a surface along its normals */
+  double left_without; /**< found: the same at a gain of 0: all of the force fixed to the body */
+} supine_patient_other;
+
 typedef struct supine_patient_gain {
+  bool told; /**< some state is in another posture than the fitted one */
   double gain;
   double error; /**< its standard error, by leaving each block of 40 mm out (jackknife) */
-  double scale; /**< breath scale of the third scan: 1 where it is as far from rest as the second */
-  double left;  /**< mm RMS */
-  double left_without; /**< the same at a gain of 0: all of the force fixed to the body */
 } supine_patient_gain;
 
-/** Finds the gain from points in a third state, with the law's field u as it was fitted:
+/** Finds the gain from further states, with the law's field u as it was fitted:
  *
- *     u_3(p) = s f(g_3, p) / f(g, p) u(p) (+ t),    f of supine_patient_force at that gain
+ *     u_j(p) = s_j f(g_j, p) / f(g, p) u(p) (+ t_j)      f of supine_patient_force at that gain,
+ *                                                        of a surface what it comes to (its catch)
  *
- * s and the translation t by linear least squares, the gain by search between 0 and 2.
- * @param record   with its posture; its force is not used
- * @param pairs    from the same rest to the third state
- * @param gravity  of the third state
- * @param moved    a translation between the scans is found as well
- * @retval SUPINE_ERROR_ARGUMENT  the posture is the one that was fitted
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_patient_gain_fit(const supine_patient_record *record,
-                                      const supine_patient_pairs *pairs, const double gravity[3],
-                                      bool moved, supine_patient_gain *found, supine_error *error);
+ * s_j and the translations t_j by linear least squares, the gain by search between 0 and 2; points
+ * of surfaces are found anew in rounds.
+ * @param record  with its posture, its stiffness and a force whose gain is kept where none is told
+ * @param rest    the surface at rest; NULL where no state is a surface
+ * @param reach   spreading length of its force, mm
+ * @param moved   a translation between the scans is found as well
+ * @param others  [count] what was found is written into them
+ * @retval SUPINE_ERROR_MESH    next to no compatible points
+ * @retval SUPINE_ERROR_MEMORY, those of the solve */
+supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
+                                      double reach, bool moved, supine_patient_other *others,
+                                      size_t count, supine_patient_gain *found,
+                                      supine_error *error);
 
 #endif

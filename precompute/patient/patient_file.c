@@ -115,6 +115,17 @@ static json_t *applied(const supine_patient_applied *of) {
                    numbers(of->slopes, 3), "left_rms", of->left, "spread_rms", of->spread);
 }
 
+static json_t *further(const supine_patient_record *record) {
+  json_t *all = json_array();
+  for (size_t k = 0; k < record->told_count; ++k) {
+    const supine_patient_told *told = &record->told[k];
+    (void)json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f}", "posture", told->posture,
+                                               "scale", told->scale, "left_rms_mm", told->left,
+                                               "left_without_gain_mm", told->left_without));
+  }
+  return all;
+}
+
 bool supine_patient_is_uneven(const supine_patient_record *record) {
   return record->stiffness.count[0] > 0 || record->stiffness.count[1] > 0;
 }
@@ -145,6 +156,12 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   (void)json_object_set_new(root, "lengths_mm", numbers(patient->lengths, 3));
   (void)json_object_set_new(root, "powers", numbers(patient->powers, SUPINE_PATIENT_POWERS));
   (void)json_object_set_new(root, "polynomial_mm", polynomial(patient));
+  if (record->told_count > 0) {
+    (void)json_object_set_new(root, "further_states", further(record));
+  }
+  if (record->gain_told) {
+    (void)json_object_set_new(root, "gain_standard_error", json_real(record->gain_error));
+  }
   if (record->expand.tried || supine_patient_is_uneven(record)) {
     (void)json_object_set_new(root, "expandability", expandability(record));
   }

@@ -19,6 +19,15 @@ typedef struct supine_patient_scan {
   double gravity[3];
 } supine_patient_scan;
 
+/** What a further state told. */
+typedef struct supine_patient_told {
+  char posture[SUPINE_PATIENT_TEXT];
+  double scale;              /**< 1 where it is as far from rest as the fitted state */
+  double left, left_without; /**< mm RMS, with the gain and without */
+} supine_patient_told;
+
+enum { SUPINE_PATIENT_OTHERS_MAX = 8 };
+
 /** What patient.json holds. */
 typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT]; /**< whose */
@@ -32,6 +41,10 @@ typedef struct supine_patient_record {
   supine_patient_stiffness stiffness;                    /**< counts 0: even */
   supine_patient_expand_report expand; /**< written, where it was tried; not read */
   supine_patient_applied applied;      /**< written, where there are blocks; not read */
+  size_t told_count;                   /**< further states; written, not read */
+  supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
+  bool gain_told;    /**< some of them in another posture */
+  double gain_error; /**< standard error of the gain */
 } supine_patient_record;
 
 /** Whether the record has a stiffness of its own. */
