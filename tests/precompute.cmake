@@ -21,6 +21,12 @@ add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
 set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+# The same for a dataset in BIDS's folders.
+if(Python3_FOUND)
+  add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_bids.sh $<TARGET_FILE:supine>
+    ${PROJECT_SOURCE_DIR}/cohort)
+  set_tests_properties(bids PROPERTIES TIMEOUT 900)
+endif()
 add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_no_data_lost.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(no_data_lost PROPERTIES TIMEOUT 900)

@@ -16,6 +16,7 @@
 #include <targets.h>
 
 #include "export_helpers.h"
+#include "runtime/export/targets.h"
 
 enum { MODES = 11, BAND = 4, VERTICES = 40 };
 
@@ -172,6 +173,44 @@ static void test_glb_clamp_safe_and_quantised_targets_do_too(void **state) {
   check_positions(open_surface, 0.05, 0.01);
 }
 
+/* Between the directions that are tried a weight may go past their extremes: a fiftieth of the
+ * range is kept free at either end. */
+static void test_glb_clamp_safe_weights_keep_a_margin(void **state) {
+  (void)state;
+  enum { TRIED = 4096 };
+  export_source source = {0};
+  export_targets targets = {0};
+  assert_int_equal(supine_export_source_open(open_surface, &source, NULL), SUPINE_OK);
+  export_glb_options options = {.clamp_safe = true};
+  assert_int_equal(supine_export_breath_set(&source, 500.0, 30.0, &options.breath, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_export_targets_choose(&source, &options, &targets, NULL), SUPINE_OK);
+  double low[SUPINE_MODES_MAX];
+  double high[SUPINE_MODES_MAX];
+  for (size_t j = 0; j < targets.count; ++j) {
+    low[j] = 1.0;
+    high[j] = 0.0;
+  }
+  for (size_t i = 0; i < 2 * (size_t)TRIED; ++i) {
+    double g[3];
+    export_pose pose;
+    supine_export_direction(i / 2, TRIED, g);
+    assert_int_equal(supine_export_targets_at(&source, &options.breath, &targets, g,
+                                              (double)(i % 2), &pose, NULL),
+                     SUPINE_OK);
+    for (size_t j = 0; j < targets.count; ++j) {
+      low[j] = fmin(low[j], pose.weights[j]);
+      high[j] = fmax(high[j], pose.weights[j]);
+    }
+  }
+  for (size_t j = 0; j < targets.count; ++j) {
+    assert_true(fabs(low[j] - 0.02 / 1.04) < 1e-9);
+    assert_true(fabs(high[j] - 1.02 / 1.04) < 1e-9);
+  }
+  supine_export_targets_free(&targets);
+  supine_export_source_close(&source);
+}
+
 /* Modes 8 to 10 made copies of others: eight carry the rest exactly. */
 static void test_glb_eight_targets_carry_a_basis_of_rank_eight(void **state) {
   (void)state;
@@ -274,6 +313,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_glb_raw_targets_make_the_library_s_positions),
       cmocka_unit_test(test_glb_clamp_safe_and_quantised_targets_do_too),
+      cmocka_unit_test(test_glb_clamp_safe_weights_keep_a_margin),
       cmocka_unit_test(test_glb_eight_targets_carry_a_basis_of_rank_eight),
       cmocka_unit_test(test_targets_reduce_states_its_loss),
       cmocka_unit_test(test_glb_animation_has_its_channels),

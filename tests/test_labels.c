@@ -629,6 +629,9 @@ static void test_labels_bad_maps_refused(void **state) {
   box_set(&image, (const size_t[3]){60, 5, 5}, (const size_t[3]){61, 40, 50}, 2);
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
+  image.step[2][2] *= 100.0; /* as a header in other units has it */
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "check the size of the voxels");
   supine_image_free(&image);
 }
 

@@ -94,6 +94,28 @@ static void test_write_then_open_same_content(void **state) {
   fixture_folder_remove(folder);
 }
 
+/* Numbers begin at a multiple of 8 bytes, however long the header's text is. */
+static void test_write_header_of_any_length_is_padded_to_eight_bytes(void **state) {
+  (void)state;
+  char *folder = fixture_folder();
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/padded", folder);
+  for (size_t length = 0; length < 16; ++length) {
+    char value[17] = "0123456789abcdef";
+    value[length] = '\0';
+    write_sample(path, value);
+    size_t size = 0;
+    unsigned char *bytes = fixture_read(path, &size);
+    uint64_t header = 0;
+    memcpy(&header, bytes, sizeof header);
+    assert_int_equal(header % 8, 0);
+    assert_memory_equal(bytes + 8 + header, two, sizeof two); /* doubles come first */
+    free(bytes);
+  }
+  (void)remove(path);
+  fixture_folder_remove(folder);
+}
+
 static void test_write_bytes_outside_utf8_become_question_marks(void **state) {
   (void)state;
   char *folder = fixture_folder();
@@ -363,6 +385,7 @@ static void test_checksum_sample_literal(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_write_then_open_same_content),
+      cmocka_unit_test(test_write_header_of_any_length_is_padded_to_eight_bytes),
       cmocka_unit_test(test_write_bytes_outside_utf8_become_question_marks),
       cmocka_unit_test(test_write_bad_arguments_refused),
       cmocka_unit_test(test_open_valid_headers_accepted),

@@ -9,7 +9,8 @@
 static const double least_edge = 0.2; /* mm: a hundredth of it would be a billion vertices */
 static const double most_edge = 20.0; /* of what is larger no lung is left */
 static const double most_closing = 20.0;
-static const double least_lung = 1.0; /* mL: anything less is no lung */
+static const double least_lung = 1.0;      /* mL: anything less is no lung */
+static const double longest_lung = 1000.0; /* mm: its cubes would fill any memory */
 
 enum { MARGIN = 2 };
 
@@ -297,6 +298,18 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                               w->path, value == LABELS_LEFT ? "left" : "right", lung->mask);
     supine_labels_mask_free(&mask);
     return status;
+  }
+  for (int a = 0; a < 3 && status == SUPINE_OK; ++a) {
+    const double length = (double)mask.size[a] * mask.spacing[a];
+    if (!(length <= longest_lung + 2.0 * (double)margin * mask.spacing[a])) {
+      status = supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: the %s lung is %.3g mm long: check the size of the voxels in "
+                                "the image's header",
+                                w->path, value == LABELS_LEFT ? "left" : "right",
+                                length - 2.0 * (double)margin * mask.spacing[a]);
+      supine_labels_mask_free(&mask);
+      return status;
+    }
   }
   status = status == SUPINE_OK ? extract_surface(w, &mask, lung, mesh) : status;
   supine_labels_mask_free(&mask);

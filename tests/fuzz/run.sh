@@ -13,14 +13,15 @@ folder=${2:-$source/build/fuzz}
 cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DSUPINE_FUZZ=ON -DSUPINE_SANITIZE=address,undefined > "$folder.log" 2>&1
 targets=""
-for reader in ply stl off obj text basis; do
+readers="ply stl off obj nrrd nii message text basis"
+for reader in $readers; do
   targets="$targets fuzz_$reader libfuzzer_$reader"
 done
 cmake --build "$folder" --target $targets >> "$folder.log" 2>&1
 cd "$folder"
 failed=0
-for reader in ply stl off obj text basis; do
-  case $reader in ply | stl | off | obj) dictionary=mesh ;; *) dictionary=$reader ;; esac
+for reader in $readers; do
+  case $reader in ply | stl | off | obj) dictionary=mesh ;; nrrd | nii) dictionary=image ;; message) dictionary=text ;; *) dictionary=$reader ;; esac
   mkdir -p "corpus/$reader"
   "tests/fuzz/fuzz_$reader" -seeds "corpus/$reader" > /dev/null
   if "tests/fuzz/libfuzzer_$reader" -dict="$source/tests/fuzz/$dictionary.dict" -max_total_time="$seconds" \

@@ -1,0 +1,27 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What readers of the code that do not run it say: tests/analyse.sh [cppcheck|clang-tidy|clang]
+#
+# cppcheck and clang-tidy (.clang-tidy) on every source, and a build of all by clang whose warnings
+# are errors; all three where none is named. Says nothing and ends with 0 where nothing is found.
+set -eu
+cd "$(dirname "$0")/.."
+what=${1:-all}
+mkdir -p build
+if [ "$what" = all ] || [ "$what" = cppcheck ]; then
+  # zlib fills the buffer that cppcheck takes for unset.
+  cppcheck --std=c11 --enable=warning,performance,portability --inline-suppr --quiet --error-exitcode=1 \
+    --suppress=missingIncludeSystem --suppress=uninitvar:mesh/image/nifti.c \
+    -I . -I sh/include -I runtime/include -D_GNU_SOURCE sh mesh precompute runtime packaging supine.c
+fi
+if [ "$what" = all ] || [ "$what" = clang ] || [ "$what" = clang-tidy ]; then
+  cmake -S . -B build/clang -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=Debug \
+    -DSUPINE_WERROR=ON >build/clang.log
+fi
+if [ "$what" = all ] || [ "$what" = clang ]; then
+  cmake --build build/clang >>build/clang.log || { grep -E 'error|warning' build/clang.log; exit 1; }
+fi
+if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
+  git ls-files 'sh/*.c' 'mesh/*.c' 'precompute/*.c' 'runtime/*.c' supine.c |
+    xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang 2>/dev/null
+fi

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Images and label maps; FUZZ_ENDING says of which format. Small ones also become lungs. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "mesh/image/image.h"
+#include "mesh/labels/labels.h"
+
+#include "fuzz.h"
+
+enum { SMALL = 1 << 15 }; /* voxels: more take longer than a fuzzer has */
+
+static void expect_words(supine_status status, const supine_error *error) {
+  supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
+                                             strchr(error->message, '\n') == NULL),
+                     "a message of one line");
+}
+
+static void expect_lungs(const char *path) {
+  const supine_labels_options options = {.edge = 0.0};
+  supine_mesh surfaces[2] = {0};
+  supine_labels_report report = {0};
+  supine_error error = {0};
+  const supine_status status =
+      supine_labels_surfaces(&path, 1, &options, surfaces, &report, &error);
+  expect_words(status, &error);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    for (size_t i = 0; i < 3 * surfaces[lung].vertex_count; ++i) {
+      supine_fuzz_expect(isfinite(surfaces[lung].vertices[i]), "a vertex");
+    }
+    supine_mesh_free(&surfaces[lung]);
+  }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
+  const char *path = supine_fuzz_file(bytes, size, FUZZ_ENDING);
+  supine_image image = {0};
+  supine_error error = {0};
+  const supine_status status = supine_image_read(path, &image, &error);
+  expect_words(status, &error);
+  if (status == SUPINE_OK) {
+    const size_t count = image.size[0] * image.size[1] * image.size[2];
+    double sum = 0.0;
+    for (size_t i = 0; i < count * image.channels; ++i) {
+      sum += supine_image_get(&image, i); /* every number is there */
+    }
+    supine_fuzz_expect(count > 0 && (sum == sum || sum != sum), "voxels");
+    if (count <= SMALL) {
+      expect_lungs(path);
+    }
+  }
+  supine_image_free(&image);
+  (void)unlink(path);
+  return 0;
+}
+
+/* Two boxes, of label 1 and 2, in a map whose numbers are of one kind or another. */
+uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
+  static const supine_image_voxel voxels[] = {SUPINE_VOXEL_U8, SUPINE_VOXEL_I16, SUPINE_VOXEL_F32};
+  enum { SEEDS = sizeof voxels / sizeof *voxels, X = 16, Y = 9, Z = 10 };
+  if (index >= SEEDS) {
+    return NULL;
+  }
+  supine_image image = {.size = {X, Y, Z},
+                        .origin = {-60.0, -40.0, -50.0},
+                        .step = {{8.0, 0.0, 0.0}, {0.0, 9.0, 0.0}, {0.0, 0.0, 10.0}},
+                        .voxel = voxels[index],
+                        .channels = 1};
+  image.values = calloc(X * Y * Z, supine_image_voxel_size(image.voxel));
+  supine_fuzz_expect(image.values != NULL, "memory for a seed");
+  for (size_t i = 0; i < X * Y * Z; ++i) {
+    const size_t x = i % X;
+    const size_t y = i / X % Y;
+    const size_t z = i / X / Y;
+    const bool inside = y > 0 && y < Y - 1 && z > 0 && z < Z - 1;
+    supine_image_set(&image, i,
+                     inside && x > 0 && x < 7       ? 2.0
+                     : inside && x > 8 && x < X - 1 ? 1.0
+                                                    : 0.0);
+  }
+  const char *path = supine_fuzz_file((const uint8_t *)"", 0, FUZZ_ENDING);
+  const supine_status status = supine_image_write(path, &image, "a seed", NULL);
+  supine_image_free(&image);
+  return status == SUPINE_OK ? supine_fuzz_take(path, size) : NULL;
+}

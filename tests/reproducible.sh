@@ -1,0 +1,23 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Built twice, in folders of other names and at other times: is every installed byte the same?
+#
+#     tests/reproducible.sh
+set -eu
+source=$(cd "$(dirname "$0")/.." && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+for place in one/here another/place/altogether; do
+  mkdir -p "$work/$place"
+  git -C "$source" archive HEAD | tar -x -C "$work/$place"
+  (cd "$work/$place" && cmake --preset package && cmake --build --preset package &&
+    DESTDIR="$work/$place/installed" cmake --install build/package) >"$work/log" 2>&1 ||
+    { tail -20 "$work/log"; exit 1; }
+  (cd "$work/$place/installed" && find . -type f | LC_ALL=C sort | xargs sha256sum) >"$work/$(basename "$place").sums"
+done
+if cmp "$work/here.sums" "$work/altogether.sums"; then
+  echo "$(wc -l <"$work/here.sums") installed files, the same bytes from either folder"
+else
+  diff "$work/here.sums" "$work/altogether.sums"
+  exit 1
+fi
