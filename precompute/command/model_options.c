@@ -31,7 +31,7 @@ static void choose_law(supine_model_options *options) {
     options->scan.kind = SUPINE_SCAN_FULL;
   }
   if (options->law_choice == SUPINE_LAW_COUNT) {
-    options->law_choice = by_scan[options->scan.kind];
+    options->law_choice = (int)by_scan[options->scan.kind];
   }
   const supine_model law = supine_physics_model((supine_law)options->law_choice);
   supine_model *model = &options->model;

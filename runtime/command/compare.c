@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine compare: how far postures differ, and where the lungs ventilate in each. */
+#include <errno.h>
 #include <string.h>
 
 #include "sh/base/output.h"
@@ -66,7 +67,8 @@ static int tell(const supine_comparison *comparison, const request *wanted) {
   if (!wanted->json) {
     supine_report_text(comparison, stdout);
   } else if (!supine_report_json(comparison, stdout)) {
-    supine_options_say(name, "cannot print JSON");
+    supine_options_say(name, "cannot print JSON: %s",
+                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
     return SUPINE_EXIT_OUTPUT;
   }
   int result = supine_options_finish(name);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine info: what a basis file holds and how exact it is. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -268,7 +269,8 @@ static int run(void *chosen, const supine_arguments *given) {
     goto cleanup;
   }
   if (wanted->json && !print_json(path, basis, energy)) {
-    supine_options_say(name, "cannot print JSON");
+    supine_options_say(name, "cannot print JSON: %s",
+                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }

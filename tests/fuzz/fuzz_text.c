@@ -59,8 +59,8 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const char *const texts[] = {
       "expandability\n1\n0.5\n# half\n2e-1\n", "vertex,expandability\n0,1\n2,0.25\n1,3\n",
       "vertex,x,y,z\n0,1,0,0\n1,0,-1,0\n2,0.6,0,-0.8\n", "x,y,z\n1,0,0\n0,-1,0\n0.6,0,-0.8\n",
-      "pressure_cmH2O,volume_mL,limb\n0,100,inhale\n5,420,inhale\n10,900,inhale\n20,1500,inhale\n"
-      "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n"};
+      ("pressure_cmH2O,volume_mL,limb\n0,100,inhale\n5,420,inhale\n10,900,inhale\n20,1500,inhale\n"
+       "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n")};
   enum { TEXTS = sizeof texts / sizeof *texts };
   if (index < TEXTS) {
     return supine_fuzz_text(texts[index], size);

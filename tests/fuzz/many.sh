@@ -1,0 +1,28 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Every reader on many made inputs, without libFuzzer, and how many in all:
+#
+#     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 inputs for most readers by default
+#
+# Messages, which are quick, get five times as many; what takes a process or a surface each, a 200th.
+# Ends with 1 where an input crashed a reader, or took more than 10 s or 2 GB.
+set -u
+build=$1
+runs=${2:-110000}
+seed=${3:-1}
+source=$(cd "$(dirname "$0")" && pwd)
+all=0
+failed=0
+for reader in ply:mesh:200 stl:mesh:200 off:mesh:200 text:text:200 basis:basis:200 message:text:1000 obj:mesh:1 \
+  nrrd:image:1 nii:image:1; do
+  name=${reader%%:*}
+  dictionary=${reader#*:}
+  count=$((runs * ${dictionary#*:} / 200))
+  said=$("$build/tests/fuzz/fuzz_$name" -runs $count -seed "$seed" -dict "$source/${dictionary%:*}.dict" 2>&1) ||
+    { failed=1; echo "FOUND SOMETHING in $name: $(echo "$said" | tail -2)"; }
+  said=$(echo "$said" | grep 'inputs, slowest')
+  echo "$name: $said"
+  all=$((all + ${said%% *}))
+done
+echo "$all inputs in all"
+exit $failed
