@@ -17,6 +17,7 @@
 
 #include "export_helpers.h"
 #include "runtime/export/targets.h"
+#include "sh/base/vec3.h"
 
 enum { MODES = 11, BAND = 4, VERTICES = 40 };
 
@@ -194,7 +195,7 @@ static void test_glb_clamp_safe_weights_keep_a_margin(void **state) {
   for (size_t i = 0; i < 2 * (size_t)TRIED; ++i) {
     double g[3];
     export_pose pose;
-    supine_export_direction(i / 2, TRIED, g);
+    supine_spiral((double)(i / 2), TRIED, 0, g);
     assert_int_equal(supine_export_targets_at(&source, &options.breath, &targets, g,
                                               (double)(i % 2), &pose, NULL),
                      SUPINE_OK);
