@@ -357,6 +357,7 @@ static void conclude(problem *p, supine_patient_gain *found) {
       blocks > 0.0 ? sqrt(fmax(0.0, (blocks - 1.0) / blocks * (square - sum * sum / blocks))) : 0.0;
 }
 
+/* Its parameters are what is known of the person beside each other: law, surfaces, landmarks. */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       double reach, bool moved, supine_patient_other *others,
                                       size_t count, supine_patient_gain *found,
