@@ -166,6 +166,7 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     const double gained =
         1e-3 * (supine_mesh_volume(&p->anchored.mesh) - supine_mesh_volume(&lungs->mesh));
     p->reference.full_volume = p->options->reference->full_volume + gained;
+    p->reference.anchored = gained;
     p->reference.scan_volume = p->options->reference->scan_volume - gained;
     p->lungs = &p->anchored;
     supine_physics_volume_forms_free(&p->column_forms);

@@ -45,9 +45,11 @@ static supine_status rest_along(const supine_lungs *lungs, const supine_model *m
     add_cubics(forms, model->share, weights, ill[image], healthy);
   }
   const double share = supine_reference_along_axes(reference->resting.share, g);
-  const double full = (alone ? 2.0 : 1.0) * reference->full_volume;
+  const double sides = alone ? 2.0 : 1.0;
+  const double rest = share * (reference->full_volume - reference->anchored);
   supine_error inner = {0};
-  if (supine_volume_scale(healthy, (share - 1.0) * full, &scale, &inner) != SUPINE_OK) {
+  if (supine_volume_scale(healthy, sides * (rest - reference->full_volume), &scale, &inner) !=
+      SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "with gravity along %g,%g,%g the lungs cannot rest at %g of their full "
                             "volume: %s; give --resting, or take the scan as it is with --scanned "

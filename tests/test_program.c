@@ -269,6 +269,8 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   EXPECT(1, "cannot be", "precompute low.ply --scanned supine:-90000 -o b.safetensors");
   EXPECT(0, "tidal law; scan at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
+  EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply"); /* rest, as scanned */
+  assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
   EXPECT(0, "paper law; scan taken as the reference",
          "precompute lungs.ply --law paper --band 3 -o a.safetensors");
   EXPECT(0, "+500.00 mL", "deform a.safetensors --posture prone -o a.ply");

@@ -76,6 +76,8 @@ typedef struct supine_reference {
   supine_scan scan;
   supine_resting resting;
   double full_volume; /**< mL, of all (healthy) lungs together */
+  double anchored;    /**< mL of it that came with meeting the scan by a compressed field: rest is a
+                         share of full inflation without them */
   double scan_volume; /**< mL of the scan beyond full: at most 0 */
   double scan_scale;  /**< s of the scan: at most 0 */
   size_t steps;       /**< of the fixed point */
