@@ -21,6 +21,7 @@
 
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 #include "sh/transform.h"
 #include <supine/sh.h>
 
@@ -118,18 +119,6 @@ static void powers_at(const powers *p, size_t count, const double *directions,
   }
 }
 
-/* Directions along a spiral of golden angles, which are those of no grid. */
-static void spread(size_t count, double *directions) {
-  const double golden = M_PI * (3.0 - sqrt(5.0));
-  for (size_t i = 0; i < count; ++i) {
-    const double z = 1.0 - (2.0 * (double)i + 1.0) / (double)count;
-    const double radius = sqrt(1.0 - z * z);
-    directions[3 * i] = radius * cos(golden * (double)i);
-    directions[3 * i + 1] = radius * sin(golden * (double)i);
-    directions[3 * i + 2] = z;
-  }
-}
-
 /* Combinations of the powers that are orthonormal at the directions of the solves: with
  * Phi = U S V^T there, psi = S^-1 V^T phi, and the least squares are columns = U^T F. */
 typedef struct fit {
@@ -161,7 +150,9 @@ static supine_status fit_create(const powers *p, fit *made) {
       made->directions == NULL) {
     goto cleanup;
   }
-  spread(count, made->directions);
+  for (size_t i = 0; i < count; ++i) {
+    supine_spiral((double)i, (double)(count), 0.0, made->directions + 3 * i);
+  }
   status = supine_physics_height_range(p->lungs, p->law->pair, count, made->directions, range,
                                        range + count);
   if (status != SUPINE_OK) {
