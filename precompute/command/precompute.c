@@ -155,7 +155,12 @@ static int check_fields(const char *list, const char *output) {
   }
   while (result == SUPINE_EXIT_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
     char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
-    result = path != NULL ? supine_options_check_output(name, output, path) : SUPINE_EXIT_NUMERICAL;
+    if (path == NULL) {
+      supine_options_say(name, "out of memory");
+      result = SUPINE_EXIT_NUMERICAL;
+    } else {
+      result = supine_options_check_output(name, output, path);
+    }
     free(path);
   }
   supine_csv_close(&csv);

@@ -141,12 +141,14 @@ json_t *supine_export_glb_extras(const export_source *source, const export_glb_o
                                         supine_export_glb_numbers(source->info->resting_volume, 9),
                                         "scan", source->info->scan_volume));
   }
-  if (source->info->has_volume && count <= FORMS_MAX) {
-    (void)json_object_set_new(supine, "volume",
-                              json_pack("{s:s, s:o, s:o, s:o}", "text", volume_text, "linear",
-                                        form(source, targets, 1, source->linear), "quadratic",
-                                        form(source, targets, 2, source->quadratic), "cubic",
-                                        form(source, targets, 3, source->cubic)));
+  if (source->info->has_volume && count <= FORMS_MAX &&
+      json_object_set_new(supine, "volume",
+                          json_pack("{s:s, s:o, s:o, s:o}", "text", volume_text, "linear",
+                                    form(source, targets, 1, source->linear), "quadratic",
+                                    form(source, targets, 2, source->quadratic), "cubic",
+                                    form(source, targets, 3, source->cubic))) != 0) {
+    json_decref(supine);
+    return NULL;
   }
   return json_pack("{s:o, s:o}", "targetNames", target_names(source, targets), "supine", supine);
 }

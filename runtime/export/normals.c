@@ -22,12 +22,13 @@ enum { POSES = 96 };
 static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
 
 /* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
-static bool invert(size_t count, double *a) {
+static supine_status invert(size_t count, double *a) {
   const int j = (int)count;
   double *u = malloc(POSES * count * sizeof *u);
   double *vt = malloc(count * count * sizeof *vt);
   double *s = malloc(count * sizeof *s);
-  const bool good = u != NULL && vt != NULL && s != NULL && count <= POSES &&
+  const bool room = u != NULL && vt != NULL && s != NULL;
+  const bool good = room && count <= POSES &&
                     LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', POSES, j, a, j, s, u, j, vt, j) == 0;
   for (int i = 0; good && i < j; ++i) {
     cblas_dscal(POSES, s[i] > singular * s[0] ? 1 / s[i] : 0, u + i, j);
@@ -38,7 +39,7 @@ static bool invert(size_t count, double *a) {
   free(u);
   free(vt);
   free(s);
-  return good;
+  return good ? SUPINE_OK : room ? SUPINE_ERROR_NUMERICAL : SUPINE_ERROR_MEMORY;
 }
 
 /* Divides base and additions by the base's length, once `base` is n_0. */
@@ -107,8 +108,10 @@ supine_status supine_export_targets_normals(const export_source *source,
       a[p * targets->count + j] = pose[p].weights[j] + targets->offset[j] / targets->unit[j];
     }
   }
-  if (!invert(targets->count, a)) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the targets' normals were not found");
+  status = invert(targets->count, a);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "the targets' normals were not found: %s",
+                           supine_status_string(status));
     goto cleanup;
   }
   supine_normals(source->basis, source->vertices, base);
