@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Whose a label is: by the convention of the segmenter, or by where it lies. */
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "sh/base/text.h"
 
 #include "mesh/labels/mask.h"
 
@@ -19,16 +19,6 @@ static const struct {
                    {"totalsegmentator-v1", {13, 14}, {15, 16, 17}}};
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
-
-/* Adds to a sentence; what does not fit is left out. */
-SUPINE_PRINTF(3, 4)
-static void put(char *text, size_t size, const char *format, ...) {
-  const size_t used = strlen(text);
-  va_list arguments;
-  va_start(arguments, format);
-  (void)vsnprintf(text + used, size - used, format, arguments);
-  va_end(arguments);
-}
 
 /* Centre of the labels of a side, mm; false where there is no voxel. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
@@ -62,14 +52,14 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
       continue;
     }
     if (shown < SHOWN) {
-      put(text, size, "%s%zu", shown == 0 ? "" : ", ", label);
+      supine_text_add(text, size, "%s%zu", shown == 0 ? "" : ", ", label);
       ++shown;
     } else {
       ++more;
     }
   }
   if (more > 0) {
-    put(text, size, " and %zu more", more);
+    supine_text_add(text, size, " and %zu more", more);
   }
 }
 
@@ -270,14 +260,15 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   }
   taken[0] = '\0';
   if (list[2][0] != '\0') {
-    put(taken, 256, "%s both lungs", list[2]);
+    supine_text_add(taken, 256, "%s both lungs", list[2]);
     return SUPINE_OK;
   }
-  put(taken, 256, "%s%s%s%s%s", list[0], list[0][0] != '\0' ? " left" : "",
-      list[0][0] != '\0' && list[1][0] != '\0' ? "; " : "", list[1],
-      list[1][0] != '\0' ? " right" : "");
+  supine_text_add(taken, 256, "%s%s%s%s%s", list[0], list[0][0] != '\0' ? " left" : "",
+                  list[0][0] != '\0' && list[1][0] != '\0' ? "; " : "", list[1],
+                  list[1][0] != '\0' ? " right" : "");
   if (name != NULL) {
-    put(taken, 256, " (%s%s)", strcmp(name, "their sides") == 0 ? "by " : "as of ", name);
+    supine_text_add(taken, 256, " (%s%s)", strcmp(name, "their sides") == 0 ? "by " : "as of ",
+                    name);
   }
   return SUPINE_OK;
 }

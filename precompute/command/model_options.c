@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The options that choose the lungs and the model. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "sh/base/parallel.h"
+#include "sh/base/text.h"
 
 #include "precompute/command/model_options.h"
 #include "precompute/inside/surface.h"
@@ -475,16 +475,6 @@ void supine_command_model_options_free(supine_model_options *options) {
   options->model.lesions = NULL;
 }
 
-/* Adds to a sentence; what does not fit is left out. */
-SUPINE_PRINTF(3, 4)
-static void put(char *text, size_t size, const char *format, ...) {
-  const size_t used = strlen(text);
-  va_list arguments;
-  va_start(arguments, format);
-  (void)vsnprintf(text + used, size - used, format, arguments);
-  va_end(arguments);
-}
-
 /* The frame that all files share. */
 static supine_scan_frame frame_of(const supine_model_options *options,
                                   const supine_mesh_report *reports, size_t count) {
@@ -504,13 +494,14 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
   const size_t size = sizeof options->assumed;
   char *text = options->assumed;
   text[0] = '\0';
-  put(text, size, "%s axes (%s), %g mm a unit", report->axes == SUPINE_AXES_RAS ? "RAS" : "LPS",
+  supine_text_add(
+      text, size, "%s axes (%s), %g mm a unit", report->axes == SUPINE_AXES_RAS ? "RAS" : "LPS",
       options->load.axes != SUPINE_AXES_AUTO ? "as told"
       : report->axes_from_tag                ? "the file's tag"
                                              : "assumed",
       options->load.millimetres_per_unit == 0.0 ? 1.0 : options->load.millimetres_per_unit);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    put(text, size, "; %s lung in", supine_lungs_name(lungs, lung));
+    supine_text_add(text, size, "; %s lung in", supine_lungs_name(lungs, lung));
     for (size_t axis = 0; axis < 3; ++axis) {
       double low = INFINITY;
       double high = -INFINITY;
@@ -518,26 +509,27 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
         low = fmin(low, lungs->mesh.vertices[3 * i + axis]);
         high = fmax(high, lungs->mesh.vertices[3 * i + axis]);
       }
-      put(text, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",", "xyz"[axis], low, high);
+      supine_text_add(text, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",", "xyz"[axis], low,
+                      high);
     }
-    put(text, size, " mm");
+    supine_text_add(text, size, " mm");
   }
-  put(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
+  supine_text_add(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
   if (!reference->known) {
-    put(text, size, "taken as the reference of every posture");
+    supine_text_add(text, size, "taken as the reference of every posture");
     return;
   }
   if (reference->scan.kind == SUPINE_SCAN_FULL) {
-    put(text, size, "at full inflation, %.0f mL", reference->full_volume);
+    supine_text_add(text, size, "at full inflation, %.0f mL", reference->full_volume);
   } else {
     const double *g = reference->scan.gravity;
-    put(text, size, "%s%.0f mL below full (%.0f mL), gravity along %.3g,%.3g,%.3g",
-        reference->scan.kind == SUPINE_SCAN_REST ? "at rest, " : "", -reference->scan_volume,
-        reference->full_volume, g[0], g[1], g[2]);
+    supine_text_add(text, size, "%s%.0f mL below full (%.0f mL), gravity along %.3g,%.3g,%.3g",
+                    reference->scan.kind == SUPINE_SCAN_REST ? "at rest, " : "",
+                    -reference->scan_volume, reference->full_volume, g[0], g[1], g[2]);
   }
   static const double supine[3] = {0.0, 1.0, 0.0};
   const double share = supine_reference_along_axes(reference->resting.share, supine);
-  put(text, size, "; rest supine %.0f mL", share * reference->full_volume);
+  supine_text_add(text, size, "; rest supine %.0f mL", share * reference->full_volume);
 }
 
 /* Surfaces from files, all at once; an exit code. */
