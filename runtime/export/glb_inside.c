@@ -90,29 +90,27 @@ static void group_parts(glb_inside *inside, const export_source *content, const 
   inside->part_begin[inside->part_count] = at;
 }
 
-/* Normals of meshes, from their triangles; balls have theirs. */
-static void find_normals(glb_inside *inside, const export_source *content, const uint32_t *first) {
-  for (size_t t = 0; t < content->info->triangle_count; ++t) {
-    const uint32_t *corner = content->triangles + 3 * t;
-    const float *p = content->vertices + 3 * (size_t)corner[0];
-    const float *q = content->vertices + 3 * (size_t)corner[1];
-    const float *r = content->vertices + 3 * (size_t)corner[2];
-    for (size_t k = 0; k < 3; ++k) {
-      const size_t u = (k + 1) % 3;
-      const size_t v = (k + 2) % 3;
-      const float area = (q[u] - p[u]) * (r[v] - p[v]) - (q[v] - p[v]) * (r[u] - p[u]);
-      for (size_t c = 0; c < 3; ++c) {
-        inside->normals[3 * (size_t)first[corner[c]] + k] += area;
+/* Normals of meshes; balls have theirs. false: no memory. */
+static bool find_normals(glb_inside *inside, const export_source *content,
+                         const unsigned char *point, const uint32_t *first) {
+  const size_t n = content->info->vertex_count;
+  float *own = malloc(3 * n * sizeof *own);
+  if (own == NULL) {
+    return false;
+  }
+  supine_normals(content->basis, content->vertices, own);
+  for (size_t i = 0; i < n; ++i) {
+    float *to = inside->normals + 3 * (size_t)first[i];
+    const float *from = own + 3 * i;
+    if (!point[i]) {
+      memcpy(to, from, 3 * sizeof *to);
+      if (from[0] == 0.0F && from[1] == 0.0F && from[2] == 0.0F) {
+        to[2] = 1.0F; /* unit, as glTF wants */
       }
     }
   }
-  for (size_t i = 0; i < inside->info.vertex_count; ++i) {
-    float *n = inside->normals + 3 * i;
-    const float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (size_t k = 0; k < 3; ++k) {
-      n[k] = length > 0.0F ? n[k] / length : k == 2 ? 1.0F : 0.0F; /* unit, as glTF wants */
-    }
-  }
+  free(own);
+  return true;
 }
 
 supine_status supine_export_glb_inside_make(const export_source *content, const export_parts *parts,
@@ -146,12 +144,11 @@ supine_status supine_export_glb_inside_make(const export_source *content, const 
     ball(corner, triangle);
     place_vertices(inside, content, point, corner, first);
     group_parts(inside, content, parts, point, first, triangle);
-    find_normals(inside, content, first);
     inside->source = *content;
     inside->source.info = &inside->info;
     inside->source.vertices = inside->vertices;
     inside->source.coefficients = inside->coefficients;
-    status = SUPINE_OK;
+    status = find_normals(inside, content, point, first) ? SUPINE_OK : SUPINE_ERROR_MEMORY;
   }
 cleanup:
   free(point);
