@@ -4,6 +4,8 @@
 #ifndef SUPINE_EXPORT_H
 #define SUPINE_EXPORT_H
 
+#include <stdio.h>
+
 #include <supine/runtime.h>
 
 enum { EXPORT_RESTING_TERMS = 9 };
@@ -104,8 +106,15 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
 /** Most modes that the page carries: four vertex attributes of four. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
 
-/** Writes one self-contained page that shows the lungs in a browser (WebGL 2), without a network.
- * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, or more than EXPORT_PAGE_MODES_MAX modes
+/** Prints one self-contained page that shows the lungs in a browser (WebGL 2), without a network.
+ * Write errors stay in the stream.
+ * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, or more than EXPORT_PAGE_MODES_MAX modes */
+supine_status supine_export_html_print(FILE *file, const export_source *source,
+                                       const export_breath *breath, const char *title,
+                                       supine_error *error);
+
+/** Writes that page to a file.
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_export_html_print
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_write(const char *path, const export_source *source,
                                        const export_breath *breath, const char *title,

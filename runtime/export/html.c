@@ -130,7 +130,7 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   }
 }
 
-supine_status supine_export_html_write(const char *path, const export_source *source,
+supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_breath *breath, const char *title,
                                        supine_error *error) {
   const supine_basis_info *info = source->info;
@@ -141,22 +141,30 @@ supine_status supine_export_html_write(const char *path, const export_source *so
                             EXPORT_PAGE_MODES_MAX, info->vector ? "a vector basis" : "scalar",
                             info->mode_count, EXPORT_PAGE_MODES_MAX);
   }
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
   const page p = {source, breath, title};
   json_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
   json_t *data =
       json_pack("{s:O, s:s}", "title", json_object_get(description, "title"), "basis", text);
   const supine_template page_template = {supine_export_assets, data, write_tensors, source};
-  supine_template_fill(&page_template, "page.html", output.file);
+  supine_template_fill(&page_template, "page.html", file);
   free(text);
   json_decref(data);
   json_decref(description);
-  status = supine_output_commit(&output, error);
+  return SUPINE_OK;
+}
+
+supine_status supine_export_html_write(const char *path, const export_source *source,
+                                       const export_breath *breath, const char *title,
+                                       supine_error *error) {
+  supine_output output = {0};
+  supine_status status = supine_output_open(path, &output, error);
+  if (status == SUPINE_OK) {
+    status = supine_export_html_print(output.file, source, breath, title, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_output_commit(&output, error);
+  }
   supine_output_abandon(&output);
   return status;
 }

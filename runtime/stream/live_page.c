@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The exported page, allowed to open a socket to where it came from, and with live.js in it. */
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "runtime/export/export.h"
 #include "runtime/stream/live_page.h"
@@ -15,29 +15,6 @@ extern const supine_asset supine_stream_assets[]; /* live.js, put in by the buil
  * every browser. */
 static const char silent[] = "default-src 'none';";
 static const char talking[] = "default-src 'none'; connect-src 'self' ws: wss:;";
-
-static supine_status read_back(const char *path, char **bytes, size_t *size, supine_error *error) {
-  FILE *file = fopen(path, "rb");
-  long length = -1;
-  if (file != NULL && fseek(file, 0, SEEK_END) == 0) {
-    length = ftell(file);
-  }
-  *bytes = length < 0 ? NULL : malloc((size_t)length + 1);
-  *size = length < 0 ? 0 : (size_t)length;
-  bool good = false;
-  if (*bytes != NULL) {
-    rewind(file);
-    good = fread(*bytes, 1, *size, file) == *size;
-  }
-  if (file != NULL) {
-    (void)fclose(file);
-  }
-  if (!good) {
-    free(*bytes);
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot be read back", path);
-  }
-  return SUPINE_OK;
-}
 
 /* `page` with the first `from` replaced by `to`. */
 static char *replace(char *page, size_t *size, const char *from, const void *to, size_t to_size) {
@@ -55,28 +32,38 @@ static char *replace(char *page, size_t *size, const char *from, const void *to,
   return changed;
 }
 
+static supine_status print_page(const export_source *source, const export_breath *breath,
+                                const char *title, char **page, size_t *size, supine_error *error) {
+  FILE *file = open_memstream(page, size);
+  supine_status status = SUPINE_OK;
+  bool whole = file != NULL;
+  if (whole) {
+    status = supine_export_html_print(file, source, breath, title, error);
+    whole = ferror(file) == 0;
+    whole = fclose(file) == 0 && whole;
+  }
+  if (status == SUPINE_OK && !whole) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
+  }
+  if (status != SUPINE_OK) {
+    free(*page);
+    *page = NULL;
+  }
+  return status;
+}
+
 supine_status supine_stream_live_page(const char *basis, double breath, const char *title,
                                       char **page, size_t *size, supine_error *error) {
-  char folder[] = "/tmp/supine-live-XXXXXX";
-  char path[sizeof folder + 16];
   export_source source = {0};
   export_breath deep = {0};
   *page = NULL;
+  *size = 0;
   supine_status status = supine_export_source_open(basis, &source, error);
   if (status == SUPINE_OK) {
     status = supine_export_breath_set(&source, breath, 20.0, &deep, error);
   }
-  if (status == SUPINE_OK && mkdtemp(folder) == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_WRITE, "no temporary folder can be made in /tmp");
-  }
   if (status == SUPINE_OK) {
-    (void)snprintf(path, sizeof path, "%s/page.html", folder);
-    status = supine_export_html_write(path, &source, &deep, title, error);
-    if (status == SUPINE_OK) {
-      status = read_back(path, page, size, error);
-    }
-    (void)unlink(path);
-    (void)rmdir(folder);
+    status = print_page(&source, &deep, title, page, size, error);
   }
   supine_export_source_close(&source);
   if (status == SUPINE_OK) {
