@@ -86,7 +86,7 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
 }
 
 /* "left=10+11,right=12+13+14" */
-static bool read_own(const char *wanted, uint8_t *side) {
+static bool read_custom(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
   for (;;) {
@@ -187,7 +187,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
       return SUPINE_OK;
     }
   }
-  if (!read_own(wanted, side)) {
+  if (!read_custom(wanted, side)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--labels takes one, lungmask, lobes, totalsegmentator, "
                             "totalsegmentator-v1 or left=LABEL+...,right=LABEL+..., not '%s'",

@@ -31,18 +31,18 @@ typedef struct accuracy_work {
   const double *weights;    /* [D, K] */
   const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
   tally *tallies;           /* [PARTS] */
-  struct turned_block *blocks;
+  struct transposed *blocks;
 } accuracy_work;
 
-/* A block of vertices, turned so that vertices run along the rows: [rank or modes][BLOCK]. */
-typedef struct turned_block {
+/* A block of vertices, transposed so that vertices run along the rows: [rank or modes][BLOCK]. */
+typedef struct transposed {
   size_t count;
   double length[BLOCK]; /* |d| */
   double columns[SUPINE_FORCE_COLUMNS_MAX][BLOCK];
   float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
-} turned_block;
+} transposed;
 
-static void turn_block(const accuracy_work *work, size_t begin, size_t count, turned_block *block) {
+static void transpose(const accuracy_work *work, size_t begin, size_t count, transposed *block) {
   const supine_truth *truth = work->truth;
   const size_t modes = work->compression->mode_count;
   block->count = count;
@@ -60,7 +60,7 @@ static void turn_block(const accuracy_work *work, size_t begin, size_t count, tu
 }
 
 /* F of the compression at one direction for the whole block. */
-SUPINE_CLONES static void compressed_block(const turned_block *block, size_t modes,
+SUPINE_CLONES static void compressed_block(const transposed *block, size_t modes,
                                            const double *weights, double *out) {
   for (size_t i = 0; i < BLOCK; ++i) {
     out[i] = 0.0;
@@ -72,8 +72,8 @@ SUPINE_CLONES static void compressed_block(const turned_block *block, size_t mod
   }
 }
 
-SUPINE_CLONES static void true_block(const turned_block *block, size_t rank,
-                                     const double *functions, double *out) {
+SUPINE_CLONES static void true_block(const transposed *block, size_t rank, const double *functions,
+                                     double *out) {
   for (size_t i = 0; i < BLOCK; ++i) {
     out[i] = 0.0;
   }
@@ -93,7 +93,7 @@ SUPINE_CLONES static void miss_block(const double *is, const double *should, con
 }
 
 static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
-                          const turned_block *block) {
+                          const transposed *block) {
   const supine_truth *truth = work->truth;
   const size_t modes = work->compression->mode_count;
   double is[BLOCK];
@@ -124,11 +124,11 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   const accuracy_work *work = context;
   const size_t n = work->compression->vertex_count;
   const size_t blocks = (n + BLOCK - 1) / BLOCK;
-  turned_block *block = &work->blocks[thread];
+  transposed *block = &work->blocks[thread];
   for (size_t part = begin; part < end; ++part) {
     for (size_t b = blocks * part / PARTS; b < blocks * (part + 1) / PARTS; ++b) {
       const size_t left = n - b * BLOCK;
-      turn_block(work, b * BLOCK, left < BLOCK ? left : BLOCK, block);
+      transpose(work, b * BLOCK, left < BLOCK ? left : BLOCK, block);
       compare_block(work, &work->tallies[part], b * BLOCK, block);
     }
   }
@@ -192,7 +192,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   double *weights = malloc(count * compression->mode_count * sizeof *weights);
   double *scales = malloc(3 * count * sizeof *scales);
   tally *tallies = calloc(PARTS, sizeof *tallies);
-  turned_block *blocks = calloc(threads, sizeof *blocks);
+  transposed *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
   supine_status status = SUPINE_OK;
   if (compression->mode_count > SUPINE_MODES_MADE_MAX ||

@@ -55,7 +55,7 @@ static bool fit_map(supine_patient_map kind, size_t count, const double *from, c
                     map *found) {
   double mean[2][3] = {{0.0}};
   double cross[9] = {0.0};
-  double own[9] = {0.0};
+  double scatter[9] = {0.0};
   *found = (map){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
   if (kind == SUPINE_PATIENT_MAP_NONE) {
     return true;
@@ -69,16 +69,16 @@ static bool fit_map(supine_patient_map kind, size_t count, const double *from, c
       for (size_t b = 0; b < 3; ++b) {
         const double at = from[3 * i + b] - mean[0][b];
         cross[3 * a + b] += (to[3 * i + a] - mean[1][a]) * at;
-        own[3 * a + b] += (from[3 * i + a] - mean[0][a]) * at;
+        scatter[3 * a + b] += (from[3 * i + a] - mean[0][a]) * at;
       }
     }
   }
   bool right = true;
   if (kind == SUPINE_PATIENT_MAP_SIMILARITY) {
-    right = similarity(cross, own[0] + own[4] + own[8], found->m);
+    right = similarity(cross, scatter[0] + scatter[4] + scatter[8], found->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
     /* by columns, the rows of the map are the right-hand sides */
-    right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, own, 3, cross, 3) == 0;
+    right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter, 3, cross, 3) == 0;
     memcpy(found->m, cross, sizeof cross);
   }
   double moved[3];

@@ -260,11 +260,11 @@ static void prepare_range(void *context, size_t begin, size_t end, size_t thread
   const solve_pass *pass = context;
   const supine_equilibrium *eq = pass->eq;
   const supine_network *net = eq->network;
-  const size_t own = pass->give_lanes;
+  const size_t stride = pass->give_lanes;
   float *mass = eq->system.stage[0].mass;
   for (size_t i = begin; i < end; ++i) {
     double more = 0.0;
-    for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->own == NULL; ++s) {
+    for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->area == NULL; ++s) {
       double c;
       double caught;
       paper_link(pass->give[i], pass->give[net->links.column[s]], net->distance[s], &c, &caught);
@@ -272,9 +272,9 @@ static void prepare_range(void *context, size_t begin, size_t end, size_t thread
       more += caught;
     }
     for (size_t r = 0; r < eq->count; ++r) {
-      const double give = pass->give[own == 1 ? i : i * own + r];
+      const double give = pass->give[stride == 1 ? i : i * stride + r];
       mass[i * eq->count + r] =
-          (float)((net->own == NULL ? 1.0 : net->own[i]) * give * give + more);
+          (float)((net->area == NULL ? 1.0 : net->area[i]) * give * give + more);
     }
   }
 }
@@ -348,7 +348,7 @@ static void prepare(const solve_pass *pass) {
   eq->prepared = eq->count;
 }
 
-/* The norm of own f, and the t to begin with. */
+/* The norm of area f, and the t to begin with. */
 SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
                              size_t end) {
   const supine_equilibrium *eq = pass->eq;
@@ -356,14 +356,14 @@ SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, bool each, si
     double sums[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
       const size_t file = (size_t)eq->network->order[i] * lanes;
-      const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
+      const double area = eq->network->area == NULL ? 1.0 : eq->network->area[i];
       const double *give = pass->give + (each ? i * lanes : i);
       const double *force = pass->force + file;
       const double *guess = pass->catch_ + file;
       const float *inverse = eq->system.stage[0].inverse + i * lanes;
       double *restrict t = eq->solution + i * lanes;
       SUPINE_EACH_LANE(r, lanes) {
-        sums[r] += own * force[r] * (own * force[r]) * (double)inverse[r];
+        sums[r] += area * force[r] * (area * force[r]) * (double)inverse[r];
       }
       SUPINE_EACH_LANE(r, lanes) {
         const double s = give[each ? r : 0];
@@ -384,22 +384,22 @@ SUPINE_CLONES static void load_range(void *context, size_t begin, size_t end, si
   }
 }
 
-/* The residual of t = 0: own f. */
+/* The residual of t = 0: area f. */
 static void force_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
   const supine_equilibrium *eq = pass->eq;
   const size_t lanes = eq->count;
   for (size_t i = begin; i < end; ++i) {
-    const double own = eq->network->own == NULL ? 1.0 : eq->network->own[i];
+    const double area = eq->network->area == NULL ? 1.0 : eq->network->area[i];
     const double *force = pass->force + (size_t)eq->network->order[i] * lanes;
     for (size_t r = 0; r < lanes; ++r) {
-      eq->system.stage[0].right[i * lanes + r] = (float)(own * force[r] / pass->unit[r]);
+      eq->system.stage[0].right[i * lanes + r] = (float)(area * force[r] / pass->unit[r]);
     }
   }
 }
 
-/* own f - A t in double, for the next round in single precision. */
+/* area f - A t in double, for the next round in single precision. */
 SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
                                  size_t end) {
   const supine_equilibrium *eq = pass->eq;
@@ -409,7 +409,7 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     double sums[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
-      const double own = net->own == NULL ? 1.0 : net->own[i];
+      const double area = net->area == NULL ? 1.0 : net->area[i];
       const double *force = pass->force + (size_t)net->order[i] * lanes;
       const double *t = eq->solution + i * lanes;
       if (i + AHEAD < end) { /* in the file's order, which no prefetcher foresees */
@@ -419,7 +419,7 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each
       double out[SUPINE_RHS_MAX];
       SUPINE_EACH_LANE(r, lanes) {
         const double s = inner[each ? r : 0];
-        out[r] = own * (force[r] - s * s * t[r]);
+        out[r] = area * (force[r] - s * s * t[r]);
       }
       for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
         const size_t j = net->links.column[s];
@@ -428,14 +428,14 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each
         const double d = net->distance[s];
         double c = 0.0;
         double mass = 0.0;
-        if (net->own == NULL && each) {
+        if (net->area == NULL && each) {
           SUPINE_EACH_LANE(r, lanes) {
             paper_link(inner[r], outer[r], d, &c, &mass);
             out[r] -= c * (t[r] - other[r]) + mass * t[r];
           }
           continue;
         }
-        if (net->own == NULL) {
+        if (net->area == NULL) {
           paper_link(*inner, *outer, d, &c, &mass);
         } else {
           c = net->conductance[s];
@@ -589,7 +589,7 @@ void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibri
       const double z = spring + (give + other) / d;
       const double y = give * eq->solution[i * eq->count + r] +
                        other * eq->solution[j * eq->count + r]; /* y = S t */
-      catch_[e * eq->count + r] = net->own == NULL ? spring / z * spring / d * y : 0.0;
+      catch_[e * eq->count + r] = net->area == NULL ? spring / z * spring / d * y : 0.0;
     }
   }
 }

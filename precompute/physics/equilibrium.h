@@ -22,17 +22,17 @@
  * The transfer spreads over links, and the share that a mass catches falls with its number of
  * links, so results drift as links shrink. A reach R in mm takes the drift away. It is the same
  * transfer with other link weights: a mass's weight to itself, above 1 / D(j, j) = 1, is its area
- * over the mean area, own_j; a spring's is 0; and 1 / D(j, l) is
+ * over the mean area, area_j; a spring's is 0; and 1 / D(j, l) is
  *
  *     w = 4 (R^2 / mean area) a / h^2      a: a third of the link's triangles' area, h its length
  *
  * Columns still sum to 1, and the system is even simpler: the stiffness is in the masses alone,
  *
- *     own_i S_i^2 t_i + sum over edges ij of (w_ij / 2) (t_i - t_j) = own_i f_i
+ *     area_i S_i^2 t_i + sum over edges ij of (w_ij / 2) (t_i - t_j) = area_i f_i
  *
  * which for E = 1 is a discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance
- * decays as exp(-r / R) whatever the mesh. What balances is then own F: sum of own_i F_i = sum of
- * own_i f_i. The finer the mesh, the larger the condition number; a cycle over coarser and coarser
+ * decays as exp(-r / R) whatever the mesh. What balances is then area F: sum of area_i F_i = sum of
+ * area_i f_i. The finer the mesh, the larger the condition number; a cycle over coarser and coarser
  * graphs keeps the number of steps what it is (coarse.h).
  *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
@@ -95,7 +95,7 @@ supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium,
 /** How a solve went. */
 typedef struct supine_solve_report {
   size_t iterations;
-  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = own f, which were computed
+  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = area f, which were computed
                       in double, each square divided by A's diagonal */
 } supine_solve_report;
 

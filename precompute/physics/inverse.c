@@ -48,19 +48,19 @@ supine_status supine_physics_inverse_force(const supine_network *network, const 
   for (size_t i = 0; status == SUPINE_OK && i < net->vertex_count; ++i) {
     const uint32_t v = net->order[i];
     const double t = catch_[v] / (give[v] * give[v]);
-    const double own = net->own == NULL ? 1.0 : net->own[i];
-    double sum = own * catch_[v];
+    const double area = net->area == NULL ? 1.0 : net->area[i];
+    double sum = area * catch_[v];
     for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
       const uint32_t w = net->order[net->links.column[s]];
       const double other = catch_[w] / (give[w] * give[w]);
-      if (net->own != NULL) {
+      if (net->area != NULL) {
         sum += net->conductance[s] * (t - other);
       } else {
         const paper_link link = link_of(give[v], give[w], net->distance[s]);
         sum += link.c * (t - other) + link.mass * t;
       }
     }
-    force[v] = sum / own; /* A t = own f */
+    force[v] = sum / area; /* A t = area f */
   }
   free(give);
   return status;
@@ -102,8 +102,8 @@ supine_status supine_physics_inverse_gradient(const supine_network *network,
   if (status == SUPINE_OK) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t v = net->order[i];
-      const double own = net->own == NULL ? 1.0 : net->own[i];
-      t[v] = give[v] * give[v] * slope[v] / own; /* own f = S^2 dJ/dF */
+      const double area = net->area == NULL ? 1.0 : net->area[i];
+      t[v] = give[v] * give[v] * slope[v] / area; /* area f = S^2 dJ/dF */
     }
     status =
         supine_physics_equilibrium_solve(equilibrium, 1, t, tolerance, false, adjoint, NULL, error);
@@ -112,12 +112,12 @@ supine_status supine_physics_inverse_gradient(const supine_network *network,
     double mean = 0.0;
     for (size_t i = 0; i < n; ++i) {
       const uint32_t v = net->order[i];
-      const double own = net->own == NULL ? 1.0 : net->own[i];
+      const double area = net->area == NULL ? 1.0 : net->area[i];
       adjoint[v] /= give[v] * give[v]; /* lambda */
       t[v] = catch_[v] / (give[v] * give[v]);
-      gradient[v] = 2.0 * catch_[v] * (own * adjoint[v] - slope[v]);
+      gradient[v] = 2.0 * catch_[v] * (area * adjoint[v] - slope[v]);
     }
-    for (size_t i = 0; i < n && net->own == NULL; ++i) {
+    for (size_t i = 0; i < n && net->area == NULL; ++i) {
       add_links(net, i, give, t, adjoint, gradient);
     }
     for (size_t i = 0; i < n; ++i) {

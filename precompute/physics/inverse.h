@@ -5,7 +5,7 @@
  *
  * In equilibrium.h's words, with t = F / S^2 and E = exp(theta), theta of mean 0:
  *
- *     A t = own f                               so that f = A t / own, one pass over the links
+ *     A t = area f                               so that f = A t / area, one pass over the links
  *     dJ/dtheta_k = -2 F_k dJ/dF_k - lambda . (dA/dtheta_k) t,    A lambda = S^2 dJ/dF
  *
  * A is symmetric, so that the adjoint lambda is one more solve of the same equilibrium, whatever

@@ -130,7 +130,7 @@ void supine_physics_network_destroy(supine_network *network) {
     free(network->distance);
     free(network->order);
     free(network->rank);
-    free(network->own);
+    free(network->area);
     free(network->conductance);
     free(network->lesions);
     free(network);

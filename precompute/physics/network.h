@@ -18,7 +18,7 @@ struct supine_network {
   uint32_t *rank;   /* [N] internal number of the file's vertex i */
   double *lesions;  /* [N] factors on the normalised stiffness, file's order; NULL: 1 */
   /* With a reach; NULL without. */
-  double *own;         /* [N] weight of a mass to itself; internal order */
+  double *area;        /* [N] area of a vertex over the mean; NULL: springs, 1; internal order */
   double *conductance; /* [2 E] half of w, what passes per difference of t */
   supine_hierarchy *coarse;
 };

@@ -13,7 +13,7 @@ typedef struct iteration {
   size_t *clique_begin; /* neighbours of node j without j itself */
   size_t *clique;
   double *te;     /* Te[j->i] to each neighbour */
-  double *own;    /* Te[j->j] */
+  double *kept;   /* Te[j->j] */
   double *held;   /* the Pitcher, may be negative */
   double *caught; /* the Catcher */
   size_t *heap;   /* nodes, by falling |held| */
@@ -24,7 +24,7 @@ static void iteration_free(iteration *it) {
   free(it->clique_begin);
   free(it->clique);
   free(it->te);
-  free(it->own);
+  free(it->kept);
   free(it->held);
   free(it->caught);
   free(it->heap);
@@ -75,12 +75,12 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   it->clique_begin = calloc(nodes + 2, sizeof *it->clique_begin);
   it->clique = malloc((4 * topology->edge_count + 1) * sizeof *it->clique);
   it->te = malloc((4 * topology->edge_count + 1) * sizeof *it->te);
-  it->own = malloc(nodes * sizeof *it->own);
+  it->kept = malloc(nodes * sizeof *it->kept);
   it->held = calloc(nodes, sizeof *it->held);
   it->caught = calloc(nodes, sizeof *it->caught);
   it->heap = calloc(nodes, sizeof *it->heap);
   it->place = calloc(nodes, sizeof *it->place);
-  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->own == NULL ||
+  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->kept == NULL ||
       it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
     return false;
   }
@@ -115,7 +115,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
     for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
       it->te[c] /= z;
     }
-    it->own[j] = s / z;
+    it->kept[j] = s / z;
   }
   return true;
 }
@@ -123,7 +123,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
 /* Node j gives away all that it holds, (5)-(7). */
 static void distribute(iteration *it, size_t j) {
   const double held = it->held[j];
-  it->caught[j] += it->own[j] * held;
+  it->caught[j] += it->kept[j] * held;
   it->held[j] = 0.0;
   heap_down(it, it->place[j]);
   for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {

@@ -43,24 +43,24 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
 
 /* With springs that catch nothing the system is (equilibrium.h)
  *
- *     own_i F_i + sum over links of (w / 2) (E_i^2 F_i - E_j^2 F_j) = own_i f_i
+ *     area_i F_i + sum over links of (w / 2) (E_i^2 F_i - E_j^2 F_j) = area_i f_i
  *
- * which for E = 1 is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where own_i is the
- * vertex's area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that make
- * sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third of
- * its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions alike;
- * unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within a
- * tenth or so. */
+ * which for E = 1 is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where area_i is
+ * the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that
+ * make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third
+ * of its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions
+ * alike; unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within
+ * a tenth or so. */
 supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
                                                const supine_topology *topology, double reach) {
   const size_t n = network->vertex_count;
   double *area = malloc(n * sizeof *area);
   const size_t links = network->links.begin[n];
   double *link = calloc(links + 1, sizeof *link); /* its area, then its conductance */
-  network->own = malloc(n * sizeof *network->own);
+  network->area = malloc(n * sizeof *network->area);
   network->conductance = link;
   network->links.value = malloc((links + 1) * sizeof *network->links.value);
-  if (area == NULL || link == NULL || network->own == NULL || network->links.value == NULL) {
+  if (area == NULL || link == NULL || network->area == NULL || network->links.value == NULL) {
     free(area);
     return SUPINE_ERROR_MEMORY; /* the rest goes with the network */
   }
@@ -72,8 +72,7 @@ supine_status supine_physics_network_set_reach(supine_network *network, const su
   /* A vertex or link of no area must still hold on to something. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
-    const double own = area[network->order[i]];
-    network->own[i] = (own > least ? own : least) / mean;
+    network->area[i] = fmax(area[network->order[i]], least) / mean;
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;

@@ -3,7 +3,7 @@
  * it works with. Rows are in the network's internal order; every vector is [rows, lanes], a lane
  * being one right-hand side, with a stiffness of its own or one for all.
  *
- *     A t = own f,  (A t)_i = mass_i t_i + sum over links of c_ij (t_i - t_j),  F_i = S_i^2 t_i */
+ *     A t = area f,  (A t)_i = mass_i t_i + sum over links of c_ij (t_i - t_j),  F_i = S_i^2 t_i */
 #ifndef SUPINE_SYSTEM_H
 #define SUPINE_SYSTEM_H
 
@@ -85,17 +85,17 @@ void supine_physics_system_cycle(supine_system *system);
 SUPINE_INLINE void supine_physics_stage_image(size_t lanes, const supine_stage *stage,
                                               const float *from, size_t i, float *out) {
   const supine_rows *links = stage->links;
-  const float *own = from + i * lanes;
+  const float *here = from + i * lanes;
   const float *mass = stage->mass + i * lanes;
   SUPINE_EACH_LANE(r, lanes) {
-    out[r] = mass[r] * own[r];
+    out[r] = mass[r] * here[r];
   }
   for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
     const float *other = from + (size_t)links->column[s] * lanes;
     if (stage->give == NULL) {
       const float c = links->value[s];
       SUPINE_EACH_LANE(r, lanes) {
-        out[r] += c * (own[r] - other[r]);
+        out[r] += c * (here[r] - other[r]);
       }
     } else {
       const float *outer = stage->give + (size_t)links->column[s] * lanes;
@@ -103,7 +103,7 @@ SUPINE_INLINE void supine_physics_stage_image(size_t lanes, const supine_stage *
       SUPINE_EACH_LANE(r, lanes) { /* as paper_link: cheaper than to fetch */
         const float product = inner[r] * outer[r];
         out[r] +=
-            product / (links->value[s] * (links->value[s] + 2.0F * product)) * (own[r] - other[r]);
+            product / (links->value[s] * (links->value[s] + 2.0F * product)) * (here[r] - other[r]);
       }
     }
   }

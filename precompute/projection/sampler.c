@@ -171,34 +171,34 @@ static void find_forces(const sample_work *work, size_t first, size_t lanes, dou
   }
 }
 
-static void solve_lanes(const sample_work *work, group *own, size_t first, size_t lanes) {
+static void solve_lanes(const sample_work *work, group *mine, size_t first, size_t lanes) {
   const supine_sampler *sampler = work->sampler;
   const size_t n = sampler->lungs->mesh.vertex_count;
   double *fields = work->fields + first * n;
   supine_solve_report report = {0};
   if (sampler->model->force.soften != 0.0) {
-    find_exponents(work, first, lanes, own->fields);
-    own->status = supine_physics_equilibrium_soften(own->equilibrium, lanes, own->fields);
-    if (own->status != SUPINE_OK) {
-      (void)supine_error_set(&own->error, own->status, "no memory to sample %zu vertices", n);
+    find_exponents(work, first, lanes, mine->fields);
+    mine->status = supine_physics_equilibrium_soften(mine->equilibrium, lanes, mine->fields);
+    if (mine->status != SUPINE_OK) {
+      (void)supine_error_set(&mine->error, mine->status, "no memory to sample %zu vertices", n);
       return;
     }
   }
-  find_forces(work, first, lanes, own->force);
+  find_forces(work, first, lanes, mine->force);
   for (size_t i = 0; i < n && work->warm; ++i) {
     for (size_t r = 0; r < lanes; ++r) {
-      own->fields[i * lanes + r] = fields[r * n + i];
+      mine->fields[i * lanes + r] = fields[r * n + i];
     }
   }
-  own->status =
-      supine_physics_equilibrium_solve(own->equilibrium, lanes, own->force, sampler->tolerance,
-                                       work->warm, own->fields, &report, &own->error);
+  mine->status =
+      supine_physics_equilibrium_solve(mine->equilibrium, lanes, mine->force, sampler->tolerance,
+                                       work->warm, mine->fields, &report, &mine->error);
   for (size_t i = 0; i < n; ++i) {
     for (size_t r = 0; r < lanes; ++r) {
-      fields[r * n + i] = own->fields[i * lanes + r];
+      fields[r * n + i] = mine->fields[i * lanes + r];
     }
   }
-  supine_solve_report *worst = &own->worst;
+  supine_solve_report *worst = &mine->worst;
   worst->iterations = report.iterations > worst->iterations ? report.iterations : worst->iterations;
   worst->residual = fmax(worst->residual, report.residual);
 }
@@ -206,10 +206,10 @@ static void solve_lanes(const sample_work *work, group *own, size_t first, size_
 /* Lanes begin at the same directions whoever takes them. */
 static void sample_range(void *context, size_t begin, size_t end, size_t thread) {
   const sample_work *work = context;
-  group *own = &work->sampler->groups[thread];
-  for (size_t k = begin; k < end && own->status == SUPINE_OK; ++k) {
+  group *mine = &work->sampler->groups[thread];
+  for (size_t k = begin; k < end && mine->status == SUPINE_OK; ++k) {
     const size_t left = work->count - k * LANES;
-    solve_lanes(work, own, k * LANES, left < LANES ? left : LANES);
+    solve_lanes(work, mine, k * LANES, left < LANES ? left : LANES);
   }
 }
 
@@ -235,14 +235,14 @@ supine_status supine_projection_sampler_solve(supine_sampler *sampler, size_t co
   supine_parallel_for((count + LANES - 1) / LANES, 1, groups, sample_range, &work);
   supine_status status = SUPINE_OK;
   for (size_t k = 0; k < groups; ++k) {
-    const group *own = &sampler->groups[k];
-    if (own->status != SUPINE_OK && status == SUPINE_OK) {
-      status = supine_error_set(error, own->status, "%s", own->error.message);
+    const group *mine = &sampler->groups[k];
+    if (mine->status != SUPINE_OK && status == SUPINE_OK) {
+      status = supine_error_set(error, mine->status, "%s", mine->error.message);
     }
     if (worst != NULL) {
       worst->iterations =
-          own->worst.iterations > worst->iterations ? own->worst.iterations : worst->iterations;
-      worst->residual = fmax(worst->residual, own->worst.residual);
+          mine->worst.iterations > worst->iterations ? mine->worst.iterations : worst->iterations;
+      worst->residual = fmax(worst->residual, mine->worst.residual);
     }
   }
   free(range);

@@ -94,14 +94,14 @@ static void group_parts(glb_inside *inside, const export_source *content, const 
 static bool find_normals(glb_inside *inside, const export_source *content,
                          const unsigned char *point, const uint32_t *first) {
   const size_t n = content->info->vertex_count;
-  float *own = malloc(3 * n * sizeof *own);
-  if (own == NULL) {
+  float *normals = malloc(3 * n * sizeof *normals);
+  if (normals == NULL) {
     return false;
   }
-  supine_normals(content->basis, content->vertices, own);
+  supine_normals(content->basis, content->vertices, normals);
   for (size_t i = 0; i < n; ++i) {
     float *to = inside->normals + 3 * (size_t)first[i];
-    const float *from = own + 3 * i;
+    const float *from = normals + 3 * i;
     if (!point[i]) {
       memcpy(to, from, 3 * sizeof *to);
       if (from[0] == 0.0F && from[1] == 0.0F && from[2] == 0.0F) {
@@ -109,7 +109,7 @@ static bool find_normals(glb_inside *inside, const export_source *content,
       }
     }
   }
-  free(own);
+  free(normals);
   return true;
 }
 

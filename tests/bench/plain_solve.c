@@ -75,16 +75,16 @@ static void set_up(plain_solve *s, const double g[3]) {
     s->give[i] = 1.0 / s->stiffness[net->order[i]];
   }
   for (size_t i = 0; i < n; ++i) {
-    const double own = net->own == NULL ? 1.0 : net->own[i];
+    const double area = net->area == NULL ? 1.0 : net->area[i];
     double links = 0.0;
-    s->mass[i] = own * s->give[i] * s->give[i];
+    s->mass[i] = area * s->give[i] * s->give[i];
     for (size_t k = net->links.begin[i]; k < net->links.begin[i + 1]; ++k) {
       const double other = s->give[net->links.column[k]];
       const double d = net->distance[k];
       const double product = s->give[i] * other;
-      s->c[k] = net->own != NULL ? net->conductance[k] : product / (d * (d + 2.0 * product));
+      s->c[k] = net->area != NULL ? net->conductance[k] : product / (d * (d + 2.0 * product));
       s->mass[i] +=
-          net->own != NULL ? 0.0 : (s->give[i] + other) / (2.0 * other * (d + 2.0 * product));
+          net->area != NULL ? 0.0 : (s->give[i] + other) / (2.0 * other * (d + 2.0 * product));
       links += s->c[k];
     }
     s->diagonal[i] = s->mass[i] + links;
@@ -118,7 +118,7 @@ size_t plain_solve_run(plain_solve *solve, const double g[3], double tolerance, 
   }
   (void)image(s, s->t, s->product);
   for (size_t i = 0; i < n; ++i) {
-    const double b = (net->own == NULL ? 1.0 : net->own[i]) * s->force[net->order[i]];
+    const double b = (net->area == NULL ? 1.0 : net->area[i]) * s->force[net->order[i]];
     s->right[i] = b - s->product[i];
     s->direction[i] = s->right[i] / s->diagonal[i];
     whole += b * b / s->diagonal[i];
