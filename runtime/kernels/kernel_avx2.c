@@ -215,8 +215,8 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
   }
 }
 
-INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                       const supine_target *target, supine_storage storage, bool vector) {
+INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
+                        const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
@@ -228,36 +228,6 @@ INLINE void deform_all(const supine_tiles *tiles, const float *weights, size_t f
     for (size_t j = 0; j < 6; ++j) {
       put(target->x + t * TILE_NUMBERS + 8 * j, xyz.v[j], target->stream);
     }
-  }
-}
-
-INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
-                           size_t count, const supine_target *target, supine_storage storage) {
-  if (tiles->axes == 3) {
-    deform_all(tiles, weights, first, count, target, storage, true);
-  } else {
-    deform_all(tiles, weights, first, count, target, storage, false);
-  }
-}
-
-static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                   const supine_target *target) {
-  switch (tiles->storage) {
-  case SUPINE_STORAGE_EXACT:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
-    break;
-  case SUPINE_STORAGE_FLOAT32:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
-    break;
-  case SUPINE_STORAGE_FLOAT16:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
-    break;
-  case SUPINE_STORAGE_MIXED:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
-    break;
-  default:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
-    break;
   }
 }
 
@@ -302,26 +272,6 @@ INLINE void light_words(const supine_tiles *tiles, const float *weights, size_t 
   }
 }
 
-/* The usual numbers are known to the compiler. */
-static void light(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                  const supine_target *target) {
-  const size_t words = supine_tiles_normal_words(tiles->modes);
-  switch (words) {
-  case 2:
-    light_words(tiles, weights, first, count, target, 2);
-    break;
-  case 3:
-    light_words(tiles, weights, first, count, target, 3);
-    break;
-  case 4:
-    light_words(tiles, weights, first, count, target, 4);
-    break;
-  default:
-    light_words(tiles, weights, first, count, target, words);
-    break;
-  }
-}
-
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
   const size_t paired = supine_tiles_paired(storage, modes);
@@ -336,43 +286,13 @@ INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_sto
   }
 }
 
-static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  const bool compact = supine_tiles_compact(tiles->storage);
-  for (size_t t = 0; t < count; ++t) {
-    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
-    unsigned char *wide = to->bytes + t * to->stride;
-    float *d = (float *)(void *)(wide + to->direction_begin);
-    float *p = (float *)(void *)(wide + to->rest_begin);
-    for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      const unsigned char *from = tile + axis * tiles->axis_bytes;
-      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
-      switch (tiles->storage) {
-      case SUPINE_STORAGE_INT16:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
-        break;
-      case SUPINE_STORAGE_MIXED:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
-        break;
-      case SUPINE_STORAGE_FLOAT16:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
-        break;
-      default:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
-        break;
-      }
-    }
-    if (tiles->axes == 1) {
-      const triples direction = numbers(tile + tiles->direction_begin, compact);
-      for (size_t j = 0; j < 6; ++j) {
-        _mm256_store_ps(d + 8 * j, direction.v[j]);
-      }
-    }
-    const triples rest = rest_positions(tiles, tile, compact);
-    for (size_t j = 0; j < 6; ++j) {
-      _mm256_store_ps(p + 8 * j, rest.v[j]);
-    }
+INLINE void store(triples t, float *to) {
+  for (size_t j = 0; j < 6; ++j) {
+    _mm256_store_ps(to + 8 * j, t.v[j]);
   }
 }
+
+#include "runtime/kernels/instances.h"
 
 const supine_kernels supine_kernels_avx2 = {deform, light, widen};
 #else

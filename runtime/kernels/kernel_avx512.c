@@ -293,36 +293,6 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t 
   }
 }
 
-INLINE void deform_storage(const supine_tiles *tiles, const float *weights, size_t first,
-                           size_t count, const supine_target *target, supine_storage storage) {
-  if (tiles->axes == 3) {
-    deform_kind(tiles, weights, first, count, target, storage, true);
-  } else {
-    deform_kind(tiles, weights, first, count, target, storage, false);
-  }
-}
-
-static void deform(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                   const supine_target *target) {
-  switch (tiles->storage) {
-  case SUPINE_STORAGE_EXACT:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
-    break;
-  case SUPINE_STORAGE_FLOAT32:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
-    break;
-  case SUPINE_STORAGE_FLOAT16:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
-    break;
-  case SUPINE_STORAGE_MIXED:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
-    break;
-  default:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_INT16);
-    break;
-  }
-}
-
 /* Modes that words begin, that they hold second and third: compact.h. */
 INLINE __m512 normal_mode(__m512i words, size_t which) {
   return _mm512_cvtepi32_ps(which == 0   ? words /* shifts take constants */
@@ -364,26 +334,6 @@ INLINE void light_words(const supine_tiles *tiles, const float *weights, size_t 
   }
 }
 
-/* The usual numbers are known to the compiler. */
-static void light(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
-                  const supine_target *target) {
-  const size_t words = supine_tiles_normal_words(tiles->modes);
-  switch (words) {
-  case 2:
-    light_words(tiles, weights, first, count, target, 2);
-    break;
-  case 3:
-    light_words(tiles, weights, first, count, target, 3);
-    break;
-  case 4:
-    light_words(tiles, weights, first, count, target, 4);
-    break;
-  default:
-    light_words(tiles, weights, first, count, target, words);
-    break;
-  }
-}
-
 INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_storage storage,
                                float *c) {
   const size_t paired = supine_tiles_paired(storage, modes);
@@ -396,41 +346,13 @@ INLINE void widen_coefficients(const unsigned char *at, size_t modes, supine_sto
   }
 }
 
-static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  const bool compact = supine_tiles_compact(tiles->storage);
-  for (size_t t = 0; t < count; ++t) {
-    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
-    unsigned char *wide = to->bytes + t * to->stride;
-    for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      const unsigned char *from = tile + axis * tiles->axis_bytes;
-      float *c = (float *)(void *)(wide + axis * to->axis_bytes);
-      switch (tiles->storage) {
-      case SUPINE_STORAGE_INT16:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_INT16, c);
-        break;
-      case SUPINE_STORAGE_MIXED:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, c);
-        break;
-      case SUPINE_STORAGE_FLOAT16:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, c);
-        break;
-      default:
-        widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, c);
-        break;
-      }
-    }
-    if (tiles->axes == 1) {
-      const triples direction = numbers(tile + tiles->direction_begin, compact);
-      for (size_t j = 0; j < 3; ++j) {
-        _mm512_store_ps(wide + to->direction_begin + 64 * j, direction.v[j]);
-      }
-    }
-    const triples rest = rest_positions(tiles, tile, compact);
-    for (size_t j = 0; j < 3; ++j) {
-      _mm512_store_ps(wide + to->rest_begin + 64 * j, rest.v[j]);
-    }
+INLINE void store(triples t, float *to) {
+  for (size_t j = 0; j < 3; ++j) {
+    _mm512_store_ps(to + 16 * j, t.v[j]);
   }
 }
+
+#include "runtime/kernels/instances.h"
 
 const supine_kernels supine_kernels_avx512 = {deform, light, widen};
 #else
