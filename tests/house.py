@@ -22,7 +22,14 @@ PUBLIC = ("sh/include/supine", "runtime/include/supine")
 def read_table():
     rooms = {}
     with open(os.path.join(source, "README.md"), encoding="utf-8") as readme:
-        rows = re.findall(r"^\| `([a-z/]+)` \|(.*)\|([^|]*)\|$", readme.read(), re.M)
+        table = re.findall(r"^\| `(?:sh|mesh|precompute|runtime)[a-z/]*`.*$", readme.read(), re.M)
+    rows = []
+    for line in table:
+        row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
+        if row is None:
+            faults.append(f"README: no row of three cells: {line}")
+        else:
+            rows.append(row.groups())
     for room, what, uses in rows:
         if not what.strip():
             faults.append(f"README does not say what {room} is")
