@@ -1,157 +1,125 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Whether constants of a few people say more of another than '--law deep' does: each of the five
  * public pairs of breath-holds is left out in turn, one law (c1 to c9) is fitted to the other four,
- * a scale and a translation to each of them, and it is judged on the one left out, from inhaled to
- * exhaled, where a scale and a translation are all that is fitted.
+ * and judged on the one left out. Then what such laws do to a real pair at rest, which is why
+ * '--law cohort' has bounds.
  *
  *     bench_cohort */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
-#include "precompute/patient/fit.h"
-#include "precompute/physics/model.h"
+#include <gsl/gsl_errno.h>
 
-enum { PAIRS = 5, ROUNDS = 60, STEPS = 40 };
+#include "precompute/precompute.h"
 
-typedef struct person {
-  const char *name;
-  supine_patient_pairs pairs;
-  supine_patient_row *rows; /* [3 count] */
-  double scale, shift[3];   /* of a law, as fitted last */
-} person;
+#include "tests/cohort.h"
+#include "tests/postures.h"
 
-static void need(supine_status status, const supine_error *error) {
-  if (status != SUPINE_OK) {
-    (void)fprintf(stderr, "%s\n", error->message);
+static void need(bool good, const char *what) {
+  if (!good) {
+    (void)fprintf(stderr, "bench_cohort: %s\n", what);
     exit(EXIT_FAILURE);
   }
 }
 
-/* What the law moves a row's point by along the row's axis, mm. */
-static double moved(const supine_patient_power *law, const supine_patient_row *row) {
-  supine_patient_row still = *row;
-  still.value = 0.0;
-  return supine_patient_power_residual(law, &still);
+static void print_law(const supine_patient_power *law) {
+  (void)printf("c %.2f %.2f %.2f %.2f %.2f %.2f, force %+.2f %+.2f %+.2f", law->linear[0],
+               law->powers[0], law->linear[1], law->powers[1], law->linear[2], law->powers[2],
+               law->powers[3], law->powers[4], law->powers[5]);
 }
 
-/* Scale and translation by least squares; mm RMS left. */
-static double adapt(person *p, const supine_patient_power *law) {
-  const double n = (double)p->pairs.count;
-  double v[3] = {0.0};
-  double y[3] = {0.0};
-  double vv = 0.0;
-  double vy = 0.0;
-  double left = 0.0;
-  for (size_t i = 0; i < 3 * p->pairs.count; ++i) {
-    const double u = moved(law, &p->rows[i]);
-    v[i % 3] += u / n;
-    y[i % 3] += p->rows[i].value / n;
-    vv += u * u;
-    vy += u * p->rows[i].value;
-  }
-  for (int k = 0; k < 3; ++k) {
-    vv -= n * v[k] * v[k];
-    vy -= n * v[k] * y[k];
-  }
-  p->scale = vv > 0.0 ? vy / vv : 0.0;
-  for (int k = 0; k < 3; ++k) {
-    p->shift[k] = y[k] - p->scale * v[k];
-  }
-  for (size_t i = 0; i < 3 * p->pairs.count; ++i) {
-    left += pow(p->scale * moved(law, &p->rows[i]) + p->shift[i % 3] - p->rows[i].value, 2.0);
-  }
-  return sqrt(left / n);
-}
-
-/* One law for all people but one: law and adaptations by turns. */
-static supine_patient_power fit_all_but(person *people, size_t without) {
-  supine_patient_power law = {.powers = {2.6, 1.0, 1.3, 0.0, -0.6, 0.0}, .linear = {6, 15, 16}};
-  size_t count = 0;
-  for (size_t p = 0; p < PAIRS; ++p) {
-    count += 3 * people[p].pairs.count;
-  }
-  supine_patient_row *rows = malloc(count * sizeof *rows);
-  if (rows == NULL) {
-    exit(EXIT_FAILURE);
-  }
-  for (int round = 0; round < ROUNDS; ++round) {
-    supine_error error;
-    count = 0;
-    for (size_t p = 0; p < PAIRS; ++p) {
-      if (p == without) {
-        continue;
-      }
-      (void)adapt(&people[p], &law);
-      for (size_t i = 0; i < 3 * people[p].pairs.count; ++i) {
-        supine_patient_row row = people[p].rows[i];
-        row.value = (row.value - people[p].shift[i % 3]) / people[p].scale;
-        row.weight = people[p].scale * people[p].scale / (double)people[p].pairs.count;
-        rows[count++] = row;
-      }
-    }
-    need(supine_patient_power_fit(rows, count, SUPINE_PATIENT_STILL, law.powers, STEPS, 1e-8, &law,
-                                  &error),
-         &error);
-  }
-  free(rows);
-  return law;
-}
-
-static supine_patient_power of_model(supine_law name) {
-  const supine_model model = supine_physics_model(name);
-  const double *c = model.direction.c;
-  const double *f = model.force.box;
-  /* Supine, the height is 1 - Y; 1 at the centre. */
-  const double centre = model.force.base + 0.5 * model.force.gain + 0.5 * (f[0] + f[1] + f[2]);
-  return (supine_patient_power){.powers = {c[1], c[3], c[5], f[0] / centre,
-                                           (f[1] - model.force.gain) / centre, f[2] / centre},
-                                .linear = {c[0], c[2], c[4]}};
-}
-
-int main(void) {
-  static const char *const cases[PAIRS] = {"054", "055", "056", "094", "097"};
+static void leave_one_out(const cohort_person *people, const char *what,
+                          const cohort_ranges *ranges) {
   static const supine_patient_power still = {.powers = {1.0, 1.0, 1.0}};
-  person people[PAIRS] = {{0}};
-  supine_error error;
-  const supine_patient_power deep = of_model(SUPINE_LAW_DEEP);
-  const supine_patient_power tidal = of_model(SUPINE_LAW_TIDAL);
-  double mean[5] = {0.0};
+  const supine_patient_power deep = cohort_of_law(SUPINE_LAW_DEEP);
+  const supine_patient_power tidal = cohort_of_law(SUPINE_LAW_TIDAL);
+  double mean[4] = {0.0};
   size_t better = 0;
-  for (size_t p = 0; p < PAIRS; ++p) {
-    char path[512];
-    (void)snprintf(path, sizeof path, "%s/landmarks/case%s_landmarks_mm.csv", SUPINE_TEST_DATA,
-                   cases[p]);
-    people[p].name = cases[p];
-    need(supine_patient_pairs_load(path, true, &people[p].pairs, &error), &error);
-    people[p].rows = malloc(3 * people[p].pairs.count * sizeof *people[p].rows);
-    const supine_patient_frame frame =
-        supine_patient_frame_of_points(people[p].pairs.count, people[p].pairs.from, NULL);
-    supine_patient_rows_of_pairs(&frame, &people[p].pairs, people[p].rows);
-  }
-  (void)printf("mm RMS left, from inhaled to exhaled, a scale and a translation fitted\n"
-               "case  translation   tidal    deep   left out    the law of the other four\n");
-  for (size_t p = 0; p < PAIRS; ++p) {
-    const supine_patient_power law = fit_all_but(people, p);
-    const double left[4] = {adapt(&people[p], &still), adapt(&people[p], &tidal),
-                            adapt(&people[p], &deep), adapt(&people[p], &law)};
-    const double *c = law.linear;
-    const double *q = law.powers;
-    (void)printf("%s   %11.2f %7.2f %7.2f %10.2f    c %.1f %.2f %.1f %.2f %.1f %.2f, force %.2f "
-                 "%.2f %.2f\n",
-                 people[p].name, left[0], left[1], left[2], left[3], 16.0 * c[0] / c[2], q[0],
-                 16.0 * c[1] / c[2], q[1], 16.0, q[2], q[3], q[4], q[5]);
+  (void)printf("%s\ncase  translation   tidal    deep   left out    the law of the other four\n",
+               what);
+  for (size_t p = 0; p < COHORT; ++p) {
+    const supine_patient_power law = cohort_fit(people, p, ranges);
+    const double left[4] = {cohort_left(&people[p], &still), cohort_left(&people[p], &tidal),
+                            cohort_left(&people[p], &deep), cohort_left(&people[p], &law)};
+    (void)printf("%s   %11.2f %7.2f %7.2f %10.2f    ", people[p].name, left[0], left[1], left[2],
+                 left[3]);
+    print_law(&law);
+    (void)putchar('\n');
     for (int k = 0; k < 4; ++k) {
-      mean[k] += left[k] / PAIRS;
+      mean[k] += left[k] / COHORT;
     }
     better += left[3] < left[2];
   }
-  (void)printf("mean  %11.2f %7.2f %7.2f %10.2f\n"
-               "left out better than deep in %zu of %d\n",
-               mean[0], mean[1], mean[2], mean[3], better, PAIRS);
-  for (size_t p = 0; p < PAIRS; ++p) {
-    supine_patient_pairs_free(&people[p].pairs);
-    free(people[p].rows);
+  (void)printf("mean  %11.2f %7.2f %7.2f %10.2f    better than deep in %zu of %d\n", mean[0],
+               mean[1], mean[2], mean[3], better, COHORT);
+}
+
+static void at_rest(const char *name, const supine_model *model) {
+  static const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  static const char *const sides[2] = {"left", "right"};
+  const supine_resting resting = supine_reference_resting_default();
+  char path[512] = "/tmp/supine-cohort-XXXXXX";
+  char file[512];
+  supine_mesh meshes[2] = {{0}};
+  supine_lungs lungs = {0};
+  supine_reference reference;
+  supine_precompute_options options = {
+      .model = *model, .reference = &reference, .band = 23, .modes = 16, .held_out = 20};
+  supine_precompute_report report;
+  supine_basis *basis = NULL;
+  posture_figures f[POSTURE_COUNT];
+  supine_error error = {0};
+  for (int side = 0; side < 2; ++side) {
+    (void)snprintf(file, sizeof file, "%s/lungs/chaste_%s.ply", SUPINE_TEST_DATA, sides[side]);
+    need(supine_mesh_load(file, NULL, &meshes[side], NULL, &error) == SUPINE_OK, error.message);
   }
+  const int made = mkstemp(path);
+  need(made >= 0 && close(made) == 0, "no file in /tmp");
+  need(supine_lungs_create(meshes, 2, NULL, &lungs, &error) == SUPINE_OK &&
+           supine_reference_find(&lungs, model, &full, &resting, &reference, &error) == SUPINE_OK &&
+           supine_precompute(&lungs, &options, path, &report, &error) == SUPINE_OK &&
+           supine_basis_open(path, &basis, &error) == SUPINE_OK &&
+           postures_measure(basis, f, &error) == SUPINE_OK,
+       error.message);
+  (void)printf("%-16s", name);
+  for (int p = 0; p < POSTURE_COUNT; ++p) {
+    (void)printf("  %.4f %% %.2f", 100.0 * f[p].turned_over, f[p].dependent);
+  }
+  (void)printf("  %.1f, %.1f mm\n", f[1].move_mean, f[1].move_max);
+  supine_basis_close(basis);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&meshes[0]);
+  supine_mesh_free(&meshes[1]);
+  (void)unlink(path);
+}
+
+int main(void) {
+  cohort_person people[COHORT];
+  (void)gsl_set_error_handler_off();
+  need(cohort_load(people), "no landmarks");
+  (void)puts("mm RMS left, from inhaled to exhaled, a scale and a translation fitted");
+  leave_one_out(people, "\nwithin wide ranges:", &cohort_wide);
+  leave_one_out(people,
+                "\nwithin those in which lungs stay whole and fill evenly:", &cohort_physical);
+  const supine_patient_power wide = cohort_fit(people, COHORT, &cohort_wide);
+  const supine_patient_power physical = cohort_fit(people, COHORT, &cohort_physical);
+  (void)printf("\nof all five, wide:   ");
+  print_law(&wide);
+  (void)printf("\nof all five, within: ");
+  print_law(&physical);
+  const supine_model models[] = {cohort_model(&wide), cohort_model(&physical),
+                                 supine_physics_model(SUPINE_LAW_COHORT),
+                                 supine_physics_model(SUPINE_LAW_DEEP)};
+  (void)puts(
+      "\n\na real pair at rest: triangles turned over; what a breath adds per volume, lowest "
+      "quarter of height\nover uppermost; mean and largest move from supine to prone\n"
+      "                  supine         prone          on the left    on the right   upright  "
+      "      inverted");
+  at_rest("wide", &models[0]);
+  at_rest("within", &models[1]);
+  at_rest("'--law cohort'", &models[2]);
+  at_rest("'--law deep'", &models[3]);
+  cohort_free(people);
   return EXIT_SUCCESS;
 }
