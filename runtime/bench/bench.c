@@ -302,16 +302,20 @@ static void bench_close(bench *work) {
   free(work->batch);
 }
 
-static supine_status bench_open(bench *work, size_t vertices, const supine_basis *like,
+static supine_status bench_open(bench *work, size_t vertices, const supine_bench_options *options,
                                 supine_error *error) {
-  supine_status status = supine_bench_image_create(vertices, 16, like, &work->image, error);
+  supine_status status =
+      supine_bench_image_create(vertices, 16, options->like, &work->image, error);
   if (status != SUPINE_OK) {
     return status;
   }
   for (int storage = SUPINE_STORAGE_EXACT; storage < SUPINE_STORAGE_COUNT; ++storage) {
-    const supine_basis_options options = {sizeof options, .storage = (supine_storage)storage,
-                                          .without_normals = storage != SUPINE_STORAGE_INT16};
-    status = supine_basis_open_memory_with(work->image.bytes, work->image.size, &options,
+    if (options->lit && storage != SUPINE_STORAGE_INT16) {
+      continue; /* gigabytes, where there are millions of vertices */
+    }
+    const supine_basis_options stored = {sizeof stored, .storage = (supine_storage)storage,
+                                         .without_normals = storage != SUPINE_STORAGE_INT16};
+    status = supine_basis_open_memory_with(work->image.bytes, work->image.size, &stored,
                                            &work->bases[storage], error);
     if (status != SUPINE_OK) {
       return status;
@@ -328,7 +332,7 @@ static supine_status bench_open(bench *work, size_t vertices, const supine_basis
       work->batch == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", vertices);
   }
-  const supine_basis *basis = work->bases[SUPINE_STORAGE_EXACT];
+  const supine_basis *basis = work->bases[SUPINE_STORAGE_INT16];
   for (size_t j = 0; j < BATCH; ++j) {
     const double gravity[3] = {cos((double)j), 0.9 * sin((double)j), 0.3 - 0.01 * (double)j};
     (void)supine_basis_weights(basis, gravity, work->weights + j * work->image.modes);
@@ -403,28 +407,34 @@ static void add_lit(list *l, bench *work, size_t threads) {
   }
 }
 
-static void add_all(list *l, bench *work, size_t threads) {
+static void add_all(list *l, bench *work, size_t threads, bool lit) {
   const size_t n = work->image.vertices;
   const double modes = (double)work->image.modes;
   const double output = 12;
   supine_bench_row *row = NULL;
   for (int storage = SUPINE_STORAGE_COUNT - 1; storage >= SUPINE_STORAGE_EXACT; --storage) {
     const supine_basis *basis = work->bases[storage];
+    if (basis == NULL) {
+      continue;
+    }
     row = add(l, work, "supine", basis, threads, range_deform, n,
               supine_basis_get_info(basis)->bytes_per_vertex + output);
     say_basis(row, basis);
-  }
-  for (int storage = SUPINE_STORAGE_COUNT - 1; storage >= SUPINE_STORAGE_EXACT; --storage) {
-    const supine_basis *basis = work->bases[storage];
     row = add(l, work, "traffic", basis, threads, range_traffic, n,
               supine_basis_get_info(basis)->bytes_per_vertex + output);
     row->storage = supine_bench_storage_name(supine_basis_get_info(basis)->storage);
   }
   const supine_basis *basis = work->bases[SUPINE_STORAGE_INT16];
+  add_lit(l, work, threads);
+  (void)add(l, work, "copy", basis, threads, range_copy, 8 * n, 64);
+  row = add(l, work, "arithmetic", basis, threads, range_arithmetic, ARITHMETIC, 0);
+  row->vertices = ARITHMETIC;
+  if (lit) {
+    return;
+  }
   row = add(l, work, "supine_separate", basis, threads, range_separate, n,
             supine_basis_get_info(basis)->bytes_per_vertex + output);
   say_basis(row, basis);
-  add_lit(l, work, threads);
   row = add(l, work, "supine_step", basis, threads, range_step, n, 3 * output);
   row->additions = 3;
   row = add(l, work, "supine_batch64", basis, threads, range_batch, work->batch_vertices,
@@ -434,12 +444,9 @@ static void add_all(list *l, bench *work, size_t threads) {
   row = add(l, work, "plain_loop", basis, threads, range_plain, n, 4 * modes + 3 * output);
   row->multiplications = modes + 3;
   row->additions = modes + 3;
-  (void)add(l, work, "copy", basis, threads, range_copy, 8 * n, 64);
   row = add(l, work, "triad", basis, threads, range_triad, 8 * n, 96);
   row->multiplications = 8;
   row->additions = 8;
-  row = add(l, work, "arithmetic", basis, threads, range_arithmetic, ARITHMETIC, 0);
-  row->vertices = ARITHMETIC;
 }
 
 static supine_status run_size(const supine_bench_options *options, size_t vertices,
@@ -452,14 +459,14 @@ static supine_status run_size(const supine_bench_options *options, size_t vertic
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
-  status = bench_open(work, vertices, options->like, error);
+  status = bench_open(work, vertices, options, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   const size_t more = options->threads == 0 ? 2 : options->threads;
-  add_all(l, work, 1);
+  add_all(l, work, 1, options->lit);
   if (more > 1) {
-    add_all(l, work, more);
+    add_all(l, work, more, options->lit);
   }
   if (peers != NULL) {
     l->count +=

@@ -5,6 +5,7 @@
 #ifndef SUPINE_BENCH_H
 #define SUPINE_BENCH_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include <supine/runtime.h>
@@ -68,6 +69,7 @@ typedef struct supine_bench_options {
   size_t threads;           /**< measure 1 and this many; 0: 1 and 2 */
   size_t repeats;           /**< 0: 9 */
   const supine_basis *like; /**< fields to repeat, or NULL */
+  bool lit;                 /**< normals and what they are held against alone, of 16-bit storage */
 } supine_bench_options;
 
 /** Takes each row as it is measured. */

@@ -63,7 +63,8 @@ static const supine_option table[] = {
     {.help = "What is sent:"},
     {"send", 0, "WHAT",
      "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's scale; "
-     "surface, a POLYDATA; points, one whose triangles come once. A peer chooses by a STRING of "
+     "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come once. A "
+     "peer chooses by a STRING of "
      "device SEND that says one of these words",
      SUPINE_FILLS(request, send), .choices = sends, .standard = "weights"},
     {"space", 0, "NAME", "of the points: lps (left, back, head), or ras as 3D Slicer has them",

@@ -5,6 +5,7 @@
 
 #include "runtime/stream/crc64.h"
 #include "runtime/stream/frame.h"
+#include "runtime/stream/strips.h"
 
 /* Positions, their bytes and their checksum are done while a piece is in the first cache. */
 enum { PIECE = 1024 };
@@ -15,7 +16,7 @@ struct supine_stream_frames {
   char device[21];
   bool ras;
   uint64_t number;
-  unsigned char *triangles; /* [M] 16 bytes: 3 and the corners; NULL until wanted */
+  supine_stream_strips triangles;
   uint64_t triangles_crc, triangles_power;
   uint64_t points_power;
   supine_stream_frame *unused;
@@ -37,7 +38,15 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
   f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
-  f->triangles_power = supine_stream_crc64_power(16 * f->info->triangle_count);
+  /* Now: 0.1 s for a million triangles would hold up every peer when the first asks for a surface.
+   */
+  if (supine_stream_strips_make(supine_basis_triangles(basis), f->info->triangle_count,
+                                f->info->vertex_count, &f->triangles) != SUPINE_OK) {
+    free(f);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  f->triangles_crc = supine_stream_crc64(0, f->triangles.bytes, f->triangles.size);
+  f->triangles_power = supine_stream_crc64_power(f->triangles.size);
   *frames = f;
   return SUPINE_OK;
 }
@@ -52,7 +61,7 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
     free(frame->points);
     free(frame);
   }
-  free(frames->triangles);
+  free(frames->triangles.bytes);
   free(frames);
 }
 
@@ -81,27 +90,6 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
     frame->next = frames->unused;
     frames->unused = frame;
   }
-}
-
-/* The triangles, once for all frames. */
-static bool encode_triangles(supine_stream_frames *f) {
-  const size_t count = f->info->triangle_count;
-  const uint32_t *corner = supine_basis_triangles(f->basis);
-  if (f->triangles != NULL) {
-    return true;
-  }
-  f->triangles = malloc(16 * count + 1);
-  if (f->triangles == NULL) {
-    return false;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    supine_stream_put32(f->triangles + 16 * i, 3);
-    for (size_t j = 0; j < 3; ++j) {
-      supine_stream_put32(f->triangles + 16 * i + 4 + 4 * j, corner[3 * i + j]);
-    }
-  }
-  f->triangles_crc = supine_stream_crc64(0, f->triangles, 16 * count);
-  return true;
 }
 
 /* The points of a frame, once for all peers. */
@@ -154,7 +142,7 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
                               supine_stream_parcel *parcel) {
   static unsigned char metadata[SUPINE_STREAM_METADATA];
   const bool weights = what == SUPINE_STREAM_WEIGHTS;
-  if (!weights && (!place_points(frames, frame) || (triangles && !encode_triangles(frames)))) {
+  if (!weights && !place_points(frames, frame)) {
     return false;
   }
   unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
@@ -163,10 +151,11 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
     supine_stream_extension((uint32_t)frame->number, body);
     size += SUPINE_STREAM_EXTENSION;
   }
-  size += weights ? put_weights(frames, &frame->moment, body + size)
-                  : supine_stream_polydata_head(frames->info->vertex_count,
-                                                triangles ? frames->info->triangle_count : 0,
-                                                body + size);
+  size += weights
+              ? put_weights(frames, &frame->moment, body + size)
+              : supine_stream_polydata_head(frames->info->vertex_count,
+                                            triangles ? frames->triangles.count : 0,
+                                            triangles ? frames->triangles.size : 0, body + size);
   parcel->count = 0;
   parcel->size = 0;
   add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
@@ -176,7 +165,7 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
     crc = supine_stream_crc64_join(crc, frame->points_crc, frames->points_power);
   }
   if (!weights && triangles) {
-    add_piece(parcel, frames->triangles, 16 * frames->info->triangle_count);
+    add_piece(parcel, frames->triangles.bytes, frames->triangles.size);
     crc = supine_stream_crc64_join(crc, frames->triangles_crc, frames->triangles_power);
   }
   if (version == 2) {

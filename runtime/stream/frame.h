@@ -3,8 +3,8 @@
  * Frames: a moment of the lungs as messages, made once and sent to any number of peers.
  *
  * A weights frame is an NDARRAY of K + G floats: the K weights and the breath scale of each lung. A
- * surface frame is a POLYDATA. Its triangles never change: they are encoded once, their checksum is
- * known, and every frame's checksum is joined from the points' and theirs. */
+ * surface frame is a POLYDATA. Its triangles never change: they are made into strips once, their
+ * checksum is known, and every frame's checksum is joined from the points' and theirs. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 

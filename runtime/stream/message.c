@@ -62,11 +62,12 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
   return 4;
 }
 
-size_t supine_stream_polydata_head(size_t points, size_t triangles, unsigned char *bytes) {
-  memset(bytes, 0, 40); /* no vertices, lines, strips, attributes */
+size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size,
+                                   unsigned char *bytes) {
+  memset(bytes, 0, 40); /* no vertices, lines, polygons, attributes */
   put(bytes, 4, points);
-  put(bytes + 20, 4, triangles);
-  put(bytes + 24, 4, 16 * triangles);
+  put(bytes + 28, 4, strips);
+  put(bytes + 32, 4, size);
   return 40;
 }
 

@@ -80,8 +80,9 @@ void supine_stream_put32(unsigned char *bytes, uint32_t value);
 /** Head of an NDARRAY of `count` 32-bit floats; returns its size, 4. */
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
-/** Head of a POLYDATA of points and triangles; returns its size, 40. */
-size_t supine_stream_polydata_head(size_t points, size_t triangles, unsigned char *bytes);
+/** Head of a POLYDATA of points and strips of triangles, of `size` bytes; returns its own size, 40.
+ */
+size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, unsigned char *bytes);
 
 /** The extension of a message of version 2 without metadata. */
 void supine_stream_extension(uint32_t number, unsigned char bytes[SUPINE_STREAM_EXTENSION]);

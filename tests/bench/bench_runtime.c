@@ -355,7 +355,8 @@ static int run_lit(const char *what, const supine_basis *made) {
   }
   vertices = own != NULL ? supine_basis_get_info(own)->vertex_count : vertices;
   const supine_basis *like = own != NULL ? own : made;
-  const supine_bench_options options = {.vertices = &vertices, .vertices_count = 1, .like = like};
+  const supine_bench_options options = {
+      .vertices = &vertices, .vertices_count = 1, .like = like, .lit = true};
   const supine_status status = supine_bench_run(&options, add_scatter, report, p, &error);
   if (status == SUPINE_OK) {
     const supine_basis_info *info = supine_basis_get_info(like);

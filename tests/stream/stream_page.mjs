@@ -99,6 +99,12 @@ for (const [name, beta, gamma, gravity] of [
   await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
   await expectGravity(gravity, name);
 }
+// The page, too, is this machine's own: another address of the loopback is refused.
+const elsewhere = await new Promise((done) => {
+  const socket = createConnection(Number(new URL(site).port), '127.0.0.2');
+  socket.on('connect', () => done('let in')).on('error', (error) => done(error.code));
+});
+assert.equal(elsewhere, 'ECONNREFUSED');
 // Another page may not open the socket.
 const stranger = await context.newPage();
 await stranger.goto('data:text/html,<title>elsewhere</title>');

@@ -2,6 +2,8 @@
 // A peer by the protocol's public library, its own classes: stream_peer PORT BASIS
 // Sends each posture as the library packs it, and holds the frames that come back, as the library
 // unpacks and checks them, against the run-time library.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -102,13 +104,21 @@ static void expect_weights(const State &state) {
   }
 }
 
+typedef std::array<uint32_t, 3> Triangle;
+
+// A triangle as it faces, from its lowest corner.
+static Triangle face(uint32_t a, uint32_t b, uint32_t c) {
+  Triangle t = {a, b, c};
+  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  return t;
+}
+
 static void expect_surface(const supine_basis *basis, const State &state) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   igtl::PolyDataMessage::Pointer message = igtl::PolyDataMessage::New();
   receive(message, "POLYDATA");
   expect(message->GetPoints()->GetNumberOfPoints() == static_cast<int>(info->vertex_count),
          "every vertex");
-  expect(message->GetPolygons()->GetNumberOfCells() == info->triangle_count, "every triangle");
   std::vector<float> xyz(3 * info->vertex_count);
   supine_deform(basis, state.weights.data(), state.scales.data(), xyz.data());
   float moved = 0.0f;
@@ -121,13 +131,22 @@ static void expect_surface(const supine_basis *basis, const State &state) {
     }
   }
   expect(moved > 1.0f, "something moves");
-  for (unsigned i = 0; i < info->triangle_count; ++i) {
-    igtlUint32 corner[3];
-    expect(message->GetPolygons()->GetCellSize(i) == 3, "three corners");
-    message->GetPolygons()->GetCell(i, corner);
-    expect(std::memcmp(corner, supine_basis_triangles(basis) + 3 * i, sizeof corner) == 0,
-           "the triangles");
+  std::vector<Triangle> received;
+  std::vector<Triangle> wanted;
+  for (unsigned i = 0; i < message->GetTriangleStrips()->GetNumberOfCells(); ++i) {
+    std::vector<igtlUint32> strip(message->GetTriangleStrips()->GetCellSize(i));
+    message->GetTriangleStrips()->GetCell(i, strip.data());
+    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other one faces the other way round
+      received.push_back(face(strip[j], strip[j + 1 + j % 2], strip[j + 2 - j % 2]));
+    }
   }
+  const uint32_t *corner = supine_basis_triangles(basis);
+  for (size_t i = 0; i < info->triangle_count; ++i, corner += 3) {
+    wanted.push_back(face(corner[0], corner[1], corner[2]));
+  }
+  std::sort(received.begin(), received.end());
+  std::sort(wanted.begin(), wanted.end());
+  expect(received == wanted, "every triangle once, as it faces");
 }
 
 // Where left, back and head point in a room whose z is up.

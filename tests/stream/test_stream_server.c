@@ -22,6 +22,7 @@
 #include "runtime/stream/address.h"
 #include "runtime/stream/crc64.h"
 #include "runtime/stream/server.h"
+#include "runtime/stream/strips.h"
 #include "sh/base/clock.h"
 #include "tests/runtime_fixture.h"
 
@@ -307,7 +308,12 @@ static void test_surfaces_and_wishes(void **state) {
   supine_stream_header header;
   unsigned char body[4096];
   const size_t points = 40 + 12 * info->vertex_count;
-  const size_t whole = points + 16 * info->triangle_count;
+  supine_stream_strips strips;
+  assert_int_equal(supine_stream_strips_make(supine_basis_triangles(s->basis), info->triangle_count,
+                                             info->vertex_count, &strips),
+                   SUPINE_OK);
+  const size_t whole = points + strips.size;
+  free(strips.bytes);
   assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose before the wish */
   (void)hear_stamp(peer, 1, &header, body);
   const char *const wishes[] = {"points", "surface"};
@@ -691,6 +697,33 @@ static void test_frames_come_while_the_lungs_move(void **state) {
   stage_destroy(s);
 }
 
+/* A port alone is this machine's own: 127.0.0.1 and no other address, not even of the loopback;
+ * with an address, that one. */
+static void test_listens_on_loopback_unless_told_otherwise(void **state) {
+  (void)state;
+  static const struct {
+    const char *listen;
+    uint32_t from;
+    bool there;
+  } tries[] = {{"0", INADDR_LOOPBACK, true},
+               {"0", INADDR_LOOPBACK + 1, false},
+               {"127.0.0.2:0", INADDR_LOOPBACK + 1, true},
+               {"127.0.0.2:0", INADDR_LOOPBACK, false}};
+  for (size_t i = 0; i < sizeof tries / sizeof *tries; ++i) {
+    stage *s = stage_create();
+    s->options.listen = tries[i].listen;
+    const struct sockaddr_in place = {.sin_family = AF_INET,
+                                      .sin_port = htons((uint16_t)stage_run(s)),
+                                      .sin_addr = {htonl(tries[i].from)}};
+    const int peer = socket(AF_INET, SOCK_STREAM, 0);
+    const bool there = connect(peer, (const struct sockaddr *)&place, sizeof place) == 0;
+    assert_true(there || errno == ECONNREFUSED);
+    assert_int_equal(there, tries[i].there);
+    (void)close(peer);
+    stage_destroy(s);
+  }
+}
+
 static void test_places_that_cannot_be_listened_on(void **state) {
   (void)state;
   stage *s = stage_create();
@@ -726,6 +759,7 @@ int main(void) {
       cmocka_unit_test(test_connects_and_connects_again),
       cmocka_unit_test(test_replay_and_record),
       cmocka_unit_test(test_frames_come_while_the_lungs_move),
+      cmocka_unit_test(test_listens_on_loopback_unless_told_otherwise),
       cmocka_unit_test(test_places_that_cannot_be_listened_on),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,6 +21,7 @@
 
 #include "runtime/stream/crc64.h"
 #include "runtime/stream/frame.h"
+#include "runtime/stream/strips.h"
 #include "tests/runtime_fixture.h"
 
 static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
@@ -426,22 +427,27 @@ static void test_weights_are_the_librarys_ndarray(void **state) {
 /* The surface as the library packs it; `size` is written. */
 static unsigned char *make_polydata(const sample *s, bool triangles, double sign, size_t *size) {
   const supine_basis_info *info = supine_basis_get_info(s->basis);
-  const uint32_t *corner = supine_basis_triangles(s->basis);
   igtl_polydata_info surface;
   igtl_polydata_init_info(&surface);
   surface.header.npoints = (igtl_uint32)info->vertex_count;
-  surface.header.npolygons = triangles ? (igtl_uint32)info->triangle_count : 0;
-  surface.header.size_polygons = 16 * surface.header.npolygons;
+  supine_stream_strips strips;
+  assert_int_equal(supine_stream_strips_make(supine_basis_triangles(s->basis), info->triangle_count,
+                                             info->vertex_count, &strips),
+                   SUPINE_OK);
+  surface.header.ntriangle_strips = triangles ? (igtl_uint32)strips.count : 0;
+  surface.header.size_triangle_strips = triangles ? (igtl_uint32)strips.size : 0;
   assert_int_equal(igtl_polydata_alloc_info(&surface), 1);
   supine_deform(s->basis, s->moment.weights, s->moment.scales, surface.points);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     surface.points[3 * i] *= (float)sign;
     surface.points[3 * i + 1] *= (float)sign;
   }
-  for (size_t i = 0; i < surface.header.npolygons; ++i) {
-    surface.polygons[4 * i] = 3;
-    memcpy(surface.polygons + 4 * i + 1, corner + 3 * i, 3 * sizeof *corner);
+  for (size_t i = 0; triangles && i < strips.size / 4; ++i) { /* numbers of this machine */
+    const unsigned char *b = strips.bytes + 4 * i;
+    surface.triangle_strips[i] =
+        (igtl_uint32)b[0] << 24 | (igtl_uint32)b[1] << 16 | (igtl_uint32)b[2] << 8 | b[3];
   }
+  free(strips.bytes);
   *size = (size_t)igtl_polydata_get_size(&surface, IGTL_TYPE_PREFIX_NONE);
   unsigned char *body = fixture_allocate(*size, 1);
   assert_int_equal(igtl_polydata_pack(&surface, body, IGTL_TYPE_PREFIX_NONE), 1);
@@ -494,6 +500,94 @@ static void test_surface_is_the_librarys_polydata(void **state) {
   sample_destroy(&s);
 }
 
+typedef struct triangle {
+  uint32_t corner[3];
+} triangle;
+
+static int by_corners(const void *a, const void *b) {
+  const uint32_t *x = ((const triangle *)a)->corner;
+  const uint32_t *y = ((const triangle *)b)->corner;
+  for (int i = 0; i < 2; ++i) {
+    if (x[i] != y[i]) {
+      return x[i] < y[i] ? -1 : 1;
+    }
+  }
+  return (x[2] > y[2]) - (x[2] < y[2]);
+}
+
+/* As it faces: of the three ways to say that, the first. */
+static triangle face(uint32_t a, uint32_t b, uint32_t c) {
+  const triangle way[3] = {{{a, b, c}}, {{b, c, a}}, {{c, a, b}}};
+  const triangle *first = by_corners(&way[1], &way[0]) < 0 ? &way[1] : &way[0];
+  return by_corners(&way[2], first) < 0 ? way[2] : *first;
+}
+
+static uint32_t word_at(const unsigned char *bytes) {
+  return (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
+}
+
+/* The strips of `count` triangles hold each of them once, as it faces, and nothing else. */
+static void expect_strips(const uint32_t *corner, size_t count, size_t vertices) {
+  supine_stream_strips strips;
+  triangle *wanted = fixture_allocate(count + 1, sizeof *wanted);
+  triangle *made = fixture_allocate(count + 1, sizeof *made);
+  assert_int_equal(supine_stream_strips_make(corner, count, vertices, &strips), SUPINE_OK);
+  size_t found = 0;
+  size_t at = 0;
+  for (size_t i = 0; i < strips.count; ++i) {
+    const size_t length = word_at(strips.bytes + at);
+    assert_true(length >= 3 && at + 4 + 4 * length <= strips.size);
+    for (size_t j = 0; j + 2 < length; ++j, ++found) {
+      const unsigned char *c = strips.bytes + at + 4 + 4 * j;
+      assert_true(found < count);
+      made[found] = face(word_at(c), word_at(c + 4 + 4 * (j % 2)), word_at(c + 8 - 4 * (j % 2)));
+    }
+    at += 4 + 4 * length;
+  }
+  assert_int_equal(at, strips.size);
+  assert_int_equal(found, count);
+  for (size_t i = 0; i < count; ++i) {
+    wanted[i] = face(corner[3 * i], corner[3 * i + 1], corner[3 * i + 2]);
+  }
+  qsort(wanted, count, sizeof *wanted, by_corners);
+  qsort(made, count, sizeof *made, by_corners);
+  assert_memory_equal(made, wanted, count * sizeof *made);
+  free(strips.bytes);
+  free(wanted);
+  free(made);
+}
+
+/* Of a grid rolled into a tube, of triangles at random (edges that three share, corners that
+ * coincide, triangles twice), of a fan, and of none. */
+static void test_strips_hold_each_triangle_once(void **state) {
+  (void)state;
+  enum { AROUND = 37, ALONG = 53, COUNT = 2 * AROUND * ALONG };
+  uint32_t *corner = fixture_allocate(3 * (size_t)COUNT, sizeof *corner);
+  for (uint32_t i = 0; i < AROUND * ALONG; ++i) {
+    const uint32_t next = i - i % AROUND + (i + 1) % AROUND;
+    const uint32_t quad[6] = {i, next, i + AROUND, next, next + AROUND, i + AROUND};
+    memcpy(corner + 6 * i, quad, sizeof quad);
+  }
+  expect_strips(corner, COUNT, AROUND * (ALONG + 1));
+  supine_stream_strips strips;
+  assert_int_equal(supine_stream_strips_make(corner, COUNT, AROUND * (ALONG + 1), &strips),
+                   SUPINE_OK);
+  assert_true(strips.size < 16 * (size_t)COUNT / 3); /* a quarter is the least */
+  free(strips.bytes);
+  uint64_t dice = 31;
+  for (size_t i = 0; i < 3 * (size_t)COUNT; ++i) {
+    corner[i] = (uint32_t)(250.0 * (1.0 + fixture_random(&dice)));
+  }
+  expect_strips(corner, COUNT, 501);
+  expect_strips(corner, 0, 501);
+  for (uint32_t i = 0; i < COUNT; ++i) { /* round one vertex, more than are looked at */
+    const uint32_t fan[3] = {0, i + 1, i + 2};
+    memcpy(corner + 3 * i, fan, sizeof fan);
+  }
+  expect_strips(corner, COUNT, COUNT + 2);
+  free(corner);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_crc_of_every_length_is_the_librarys),
@@ -508,6 +602,7 @@ int main(void) {
       cmocka_unit_test(test_every_truncation_is_refused),
       cmocka_unit_test(test_headers_that_are_none_are_refused),
       cmocka_unit_test(test_weights_are_the_librarys_ndarray),
+      cmocka_unit_test(test_strips_hold_each_triangle_once),
       cmocka_unit_test(test_surface_is_the_librarys_polydata),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -42,6 +42,10 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             server.kill()
             raise
     print(rest, end="")
+    # What every one of these programs is there for: poses came, and how long each took is said.
+    if not re.search(r"pose received to \w+ sent: median [\d.]+ ms, 99 % within [\d.]+ ms, "
+                     r"worst [\d.]+ ms, of 15 ms\n", rest):
+        sys.exit("the server does not say how long it took")
     if not alive or server.returncode != 0:
         sys.exit(f"the server ended with {server.returncode}")
     sys.exit(result)

@@ -72,9 +72,19 @@ def string(text):
     return struct.pack(">HH", 3, len(text)) + text.encode("ascii")
 
 
+def _corners(words):
+    """Corners of the triangles of strips: of each its length, then its corners."""
+    begin = 0
+    while begin < len(words):
+        strip = words[begin + 1:begin + 1 + words[begin]]
+        begin += 1 + len(strip)
+        for i in range(len(strip) - 2):  # every other one faces the other way round
+            yield from (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
+
+
 def unpack(kind, content):
-    """NDARRAY: a tuple of floats. POLYDATA: (points as a flat tuple of x, y, z, triangles as a flat
-    tuple of corners). STRING: text. Others: the bytes."""
+    """NDARRAY: a tuple of floats. POLYDATA: (points as a flat tuple of x, y, z, triangles of its
+    strips as a flat tuple of corners). STRING: text. Others: the bytes."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -82,11 +92,10 @@ def unpack(kind, content):
             count *= size
         return struct.unpack_from(f">{count}{'f' if scalar == 10 else 'd'}", content, 2 + 2 * dimension)
     if kind == "POLYDATA":
-        points, _, vertices, _, lines, polygons, size, _, _, _ = struct.unpack_from(">10I", content)
-        corners = struct.unpack_from(f">{size // 4}I", content, 40 + 12 * points + vertices + lines)
-        assert all(corners[4 * i] == 3 for i in range(polygons))
-        return (struct.unpack_from(f">{3 * points}f", content, 40),
-                tuple(c for i, c in enumerate(corners) if i % 4))
+        points, _, vertices, _, lines, _, polygons, _, size, _ = struct.unpack_from(">10I", content)
+        words = struct.unpack_from(f">{size // 4}I", content,
+                                   40 + 12 * points + vertices + lines + polygons)
+        return struct.unpack_from(f">{3 * points}f", content, 40), tuple(_corners(words))
     if kind == "STRING":
         return content[4:].decode()
     return content
