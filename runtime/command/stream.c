@@ -63,7 +63,8 @@ static const supine_option table[] = {
     {.help = "What is sent:"},
     {"send", 0, "WHAT",
      "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's scale; "
-     "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come once. A "
+     "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come "
+     "once. A "
      "peer chooses by a STRING of "
      "device SEND that says one of these words",
      SUPINE_FILLS(request, send), .choices = sends, .standard = "weights"},
@@ -176,7 +177,9 @@ static supine_status open_page(const request *wanted, const char *basis, char **
   }
   if (status == SUPINE_OK) {
     if (colon != NULL) {
-      (void)snprintf(address, sizeof address, "%.*s", (int)(colon - wanted->web), wanted->web);
+      const int bracket = wanted->web[0] == '[' ? 1 : 0; /* of version 6 */
+      (void)snprintf(address, sizeof address, "%.*s", (int)(colon - wanted->web) - 2 * bracket,
+                     wanted->web + bracket);
       site.address = address;
     }
     site.port = (int)strtol(colon == NULL ? wanted->web : colon + 1, NULL, 10);
@@ -184,8 +187,10 @@ static supine_status open_page(const request *wanted, const char *basis, char **
     status = supine_stream_web_create(&site, web, error);
   }
   if (status == SUPINE_OK) {
-    (void)printf("page at http%s://%s:%d/\n", site.certificate != NULL ? "s" : "",
-                 site.address != NULL ? site.address : "127.0.0.1", supine_stream_web_port(*web));
+    const bool six = strchr(address, ':') != NULL;
+    (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
+                 six ? "[" : "", site.address != NULL ? address : "127.0.0.1", six ? "]" : "",
+                 supine_stream_web_port(*web));
   }
   return status;
 }

@@ -210,6 +210,9 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   info.gid = -1;
   info.uid = -1;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+  if (strchr(info.iface, ':') == NULL) { /* it would listen on every address, of either kind */
+    info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
+  }
   info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* pages on their way, too */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
