@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The page: its tensors are the basis', its texts stay texts. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -69,14 +70,14 @@ static int digit(char c) {
   return (int)(at - digits);
 }
 
-/* Compares a tensor of the page with bytes. */
-static void check_tensor(const char *page, const char *name, const void *bytes, size_t size) {
+/* The `size` bytes of a tensor of the page (malloc). */
+static void *take_tensor(const char *page, const char *name, size_t size) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "id=\"tensor-%s\">", name);
   const char *at = strstr(page, tag);
-  assert_non_null(at);
+  unsigned char *bytes = malloc(size);
+  assert_true(at != NULL && bytes != NULL);
   at += strlen(tag);
-  const unsigned char *expected = bytes;
   unsigned bits = 0;
   unsigned held = 0;
   size_t count = 0;
@@ -86,11 +87,61 @@ static void check_tensor(const char *page, const char *name, const void *bytes, 
     if (held >= 8) {
       held -= 8;
       assert_true(count < size);
-      assert_int_equal(bits >> held & 255, expected[count]);
-      ++count;
+      bytes[count++] = bits >> held & 255;
     }
   }
   assert_int_equal(count, size);
+  return bytes;
+}
+
+/* Compares a tensor of the page with bytes. */
+static void check_tensor(const char *page, const char *name, const void *bytes, size_t size) {
+  void *found = take_tensor(page, name, size);
+  assert_memory_equal(found, bytes, size);
+  free(found);
+}
+
+/* What moves the lungs is rounded to half a count of 16 bits: directions to unit length, each
+ * mode's coefficients, with the directions' lengths in them, to the mode's largest. */
+static void check_motion(const char *page, const export_source *s) {
+  enum { COUNT_MAX = 32767 };
+  const double half = 0.5 * (1 + 1e-6) / COUNT_MAX; /* and the doubles' own rounding */
+  const size_t n = s->info->vertex_count;
+  const size_t modes = s->info->mode_count;
+  int16_t *direction = take_tensor(page, "direction", 3 * n * sizeof *direction);
+  int16_t *counts = take_tensor(page, "coefficients", modes * n * sizeof *counts);
+  for (size_t k = 0; k < modes; ++k) {
+    double largest = 0;
+    for (int pass = 0; pass < 2; ++pass) {
+      for (size_t i = 0; i < n; ++i) {
+        const float *d = s->direction + 3 * i;
+        const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
+        const double c = (double)s->coefficients[i * modes + k] * length;
+        if (pass == 0) {
+          largest = fmax(largest, fabs(c));
+          continue;
+        }
+        assert_true(fabs(counts[i * modes + k] * largest / COUNT_MAX - c) <= half * largest);
+        for (size_t axis = 0; axis < 3 && k == 0; ++axis) {
+          assert_true(
+              fabs((double)direction[3 * i + axis] / COUNT_MAX - (double)d[axis] / length) <= half);
+        }
+      }
+    }
+    assert_true(largest > 0);
+  }
+  free(direction);
+  free(counts);
+}
+
+/* Corners of 16 bits. */
+static void check_corners(const char *page, const char *name, const uint32_t *corners,
+                          size_t count) {
+  uint16_t *found = take_tensor(page, name, count * sizeof *found);
+  for (size_t i = 0; i < count; ++i) {
+    assert_int_equal(found[i], corners[i]);
+  }
+  free(found);
 }
 
 static void test_page_carries_the_basis(void **state) {
@@ -100,9 +151,8 @@ static void test_page_carries_the_basis(void **state) {
   export_source s = {0};
   assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
   check_tensor(page, "vertices", s.vertices, 40 * 3 * sizeof(float));
-  check_tensor(page, "direction", s.direction, 40 * 3 * sizeof(float));
-  check_tensor(page, "coefficients", s.coefficients, 40 * 6 * sizeof(float));
-  check_tensor(page, "triangles", s.triangles, s.info->triangle_count * 3 * sizeof(uint32_t));
+  check_motion(page, &s);
+  check_corners(page, "triangles", s.triangles, 3 * s.info->triangle_count);
   check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
   check_tensor(page, "linear", s.linear, 2 * 6 * sizeof(double));
   check_tensor(page, "quadratic", s.quadratic, 2 * 36 * sizeof(double));

@@ -52,6 +52,11 @@ static const supine_option table[] = {
      "the same for an open surface, which has no volume: largest displacement when supine",
      SUPINE_FILLS(request, largest), .standard = "10", SUPINE_ABOVE_ZERO,
      .wants = "millimetres above 0"},
+    {"inside", 0, "FILE",
+     "what is inside, of 'supine embed' from the same basis: moves along, seen through the lungs, "
+     "points as balls of 4 mm. On a page each part has its name and how far it has moved, at the "
+     "pointer and in a table; in glTF each is a material of its name",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {.help = "Of a page:"},
     {"title", 0, "TEXT", "its title; default the name of the basis file",
      SUPINE_FILLS(request, title)},
@@ -74,10 +79,6 @@ static const supine_option table[] = {
      "adds an animation: the patient breathes, and turns from the back over the left side onto "
      "the belly and on",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
-    {"inside", 0, "FILE",
-     "what is inside, of 'supine embed' from the same basis: moves along, seen through the lungs; "
-     "each part a material of its name, points as balls of 4 mm",
-     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {.name = NULL}};
 
 static int write_glb(const export_source *source, const request *wanted) {
@@ -95,8 +96,33 @@ static int write_glb(const export_source *source, const request *wanted) {
   return supine_options_finish(name);
 }
 
+static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
+  supine_error error;
+  const char *slash = strrchr(basis_path, '/');
+  const export_page page = {.breath = wanted->glb.breath,
+                            .title = wanted->title != NULL ? wanted->title
+                                     : slash != NULL       ? slash + 1
+                                                           : basis_path,
+                            .inside = wanted->glb.inside,
+                            .parts = wanted->glb.parts};
+  if (supine_export_html_write(wanted->path, source, &page, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
+  if (page.inside != NULL) {
+    (void)printf(" and what is inside, %zu name%s", page.parts->count,
+                 page.parts->count == 1 ? "" : "s");
+  }
+  (void)puts("; open it in any browser");
+  return supine_options_finish(name);
+}
+
+static int write_either(const export_source *source, const request *wanted, const char *path) {
+  return wanted->page ? write_page(source, wanted, path) : write_glb(source, wanted);
+}
+
 /* The same with what is inside, which must be of these lungs. */
-static int write_glb_with_inside(const export_source *source, request *wanted) {
+static int write_with_inside(const export_source *source, request *wanted, const char *path) {
   export_source inside = {0};
   supine_command_names names = {0};
   supine_error error;
@@ -114,26 +140,11 @@ static int write_glb_with_inside(const export_source *source, request *wanted) {
     const export_parts parts = {names.count, names.text, names.part};
     wanted->glb.inside = &inside;
     wanted->glb.parts = &parts;
-    result = write_glb(source, wanted);
+    result = write_either(source, wanted, path);
   }
   supine_command_names_close(&names);
   supine_export_source_close(&inside);
   return result;
-}
-
-static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
-  supine_error error;
-  const char *slash = strrchr(basis_path, '/');
-  const char *title = wanted->title != NULL ? wanted->title
-                      : slash != NULL       ? slash + 1
-                                            : basis_path;
-  if (supine_export_html_write(wanted->path, source, &wanted->glb.breath, title, &error) !=
-      SUPINE_OK) {
-    return supine_options_fail(name, &error);
-  }
-  (void)printf("%s: a page of %zu vertices; open it in any browser\n", wanted->path,
-               source->info->vertex_count);
-  return supine_options_finish(name);
 }
 
 static int export_basis(const char *path, request *wanted) {
@@ -145,9 +156,8 @@ static int export_basis(const char *path, request *wanted) {
                                &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
   } else {
-    result = wanted->page             ? write_page(&source, wanted, path)
-             : wanted->inside != NULL ? write_glb_with_inside(&source, wanted)
-                                      : write_glb(&source, wanted);
+    result = wanted->inside != NULL ? write_with_inside(&source, wanted, path)
+                                    : write_either(&source, wanted, path);
   }
   supine_export_source_close(&source);
   return result;
@@ -156,8 +166,8 @@ static int export_basis(const char *path, request *wanted) {
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other: .glb */
-  if (wanted->page && (wanted->glb_only || wanted->inside != NULL)) {
-    return supine_options_usage(name, "--profile, --quantise, --animate and --inside are for .glb");
+  if (wanted->page && wanted->glb_only) {
+    return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
   }
   if (!wanted->page && wanted->title != NULL) {
     return supine_options_usage(name, "--title is for .html");
@@ -168,7 +178,7 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_export = {
     name,
     "write a basis as a page or as glTF morph targets",
-    .usage = "BASIS -o lungs.html\nBASIS -o lungs.glb [--profile NAME] [--quantise] [--animate]",
+    .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
     .about = "Writes a basis file in a form that other programs play; the ending of the name "
              "chooses it.",
     .options = table,
@@ -180,7 +190,7 @@ const supine_command supine_command_export = {
         "Examples:\n"
         "  supine export lungs.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.glb --animate\n"
-        "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.glb\n"
+        "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --volume 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

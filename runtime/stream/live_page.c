@@ -32,13 +32,13 @@ static char *replace(char *page, size_t *size, const char *from, const void *to,
   return changed;
 }
 
-static supine_status print_page(const export_source *source, const export_breath *breath,
-                                const char *title, char **page, size_t *size, supine_error *error) {
+static supine_status print_page(const export_source *source, const export_page *shown, char **page,
+                                size_t *size, supine_error *error) {
   FILE *file = open_memstream(page, size);
   supine_status status = SUPINE_OK;
   bool whole = file != NULL;
   if (whole) {
-    status = supine_export_html_print(file, source, breath, title, error);
+    status = supine_export_html_print(file, source, shown, error);
     whole = ferror(file) == 0;
     whole = fclose(file) == 0 && whole;
   }
@@ -55,15 +55,15 @@ static supine_status print_page(const export_source *source, const export_breath
 supine_status supine_stream_live_page(const char *basis, double breath, const char *title,
                                       char **page, size_t *size, supine_error *error) {
   export_source source = {0};
-  export_breath deep = {0};
+  export_page shown = {.title = title};
   *page = NULL;
   *size = 0;
   supine_status status = supine_export_source_open(basis, &source, error);
   if (status == SUPINE_OK) {
-    status = supine_export_breath_set(&source, breath, 20.0, &deep, error);
+    status = supine_export_breath_set(&source, breath, 20.0, &shown.breath, error);
   }
   if (status == SUPINE_OK) {
-    status = print_page(&source, &deep, title, page, size, error);
+    status = print_page(&source, &shown, page, size, error);
   }
   supine_export_source_close(&source);
   if (status == SUPINE_OK) {

@@ -23,6 +23,17 @@ function takeTensor(name, Numbers) {
   return new Numbers(fromBase64(text).buffer);
 }
 
+/** Takes 16-bit counts out of the page: number i is in units[i % units.length]. */
+function takeCounts(name, units) {
+  const counts = takeTensor(name, Int16Array);
+  const numbers = new Float32Array(counts.length);
+  for (let i = 0; i < counts.length; i += units.length) for (let k = 0; k < units.length; ++k) numbers[i + k] = counts[i + k] * units[k];
+  return numbers;
+}
+
+/** Corners of triangles, of 16 bits where they name every vertex. */
+const takeTriangles = (name, vertices) => Uint32Array.from(takeTensor(name, vertices > 65536 ? Uint32Array : Uint16Array));
+
 /** Triangles in the order of their lungs, and where each lung's corners begin. */
 function groupByLung(basis) {
   const lungOf = (vertex) => basis.lungBegin.findIndex((begin, lung) => vertex < (basis.lungBegin[lung + 1] ?? Infinity));
@@ -53,9 +64,9 @@ function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
   basis.rest = takeTensor('vertices', Float32Array);
-  basis.direction = takeTensor('direction', Float32Array);
-  basis.coefficients = takeTensor('coefficients', Float32Array);
-  basis.corners = takeTensor('triangles', Uint32Array);
+  basis.direction = takeCounts('direction', [1 / 32767]);
+  basis.coefficients = takeCounts('coefficients', basis.units);
+  basis.corners = takeTriangles('triangles', basis.vertices);
   basis.mixes = takeTensor('modes', Float64Array);
   if (basis.hasVolume) {
     basis.linear = takeTensor('linear', Float64Array);
@@ -70,6 +81,7 @@ function readBasis() {
   const names = (basis.metadata.lungs ?? '').split(',');
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => names[i] || `lung ${i}`);
   groupByLung(basis);
+  if (basis.inside) takeInside(basis.inside);
   return basis;
 }
 

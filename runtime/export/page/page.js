@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The page: state in, picture out, and the controls between.
 
+const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // what is shown or not
 const VIEW_ANGLE = 0.5; // radians, of the camera from top to bottom
 const KIND_TEXT = {
   displacement: 'How far each place is from where it was at rest.',
@@ -40,6 +41,8 @@ function start() {
   const body = bounds(basis);
   const { centre, radius } = body;
   const letters = new Letters($('letters'), 2);
+  const { inside } = basis;
+  const look = () => { unseen = true; }; // the picture is to be drawn again
   const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // vertices are not where the state says
   let unseen = true;    // the picture is not what the state says
@@ -52,6 +55,7 @@ function start() {
   let idle = null;      // when the link is written
   let panes = [];
   const marks = [];
+  let tabled = -Infinity; // ms, when the table of what is inside was written
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -98,7 +102,7 @@ function start() {
       name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'ghost', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
-      contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
+      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), body.low[axis] + at * (body.high[axis] - body.low[axis])],
     };
@@ -148,10 +152,17 @@ function start() {
     tip.hidden = $('needle').hidden = !found;
     if (!found) return;
     const { range } = state;
-    tip.firstChild.textContent = valueText(found.value);
-    tip.lastChild.textContent = `${basis.lungNames[found.lung]} lung   ${placeText(found.at)}`;
+    if (found.part === undefined) {
+      tip.firstChild.textContent = valueText(found.value);
+      tip.lastChild.textContent = `${basis.lungNames[found.lung]} lung   ${placeText(found.at)}`;
+    } else {
+      Object.assign(found, insideAt(found));
+      tip.firstChild.textContent = `${inside.names[found.part]}  ${found.move.toFixed(2)} mm`;
+      tip.lastChild.textContent = placeText(found.place);
+    }
     const [x, y] = [Math.max(4, Math.min(pointer.x + 16, canvas.clientWidth - tip.offsetWidth - 8)), Math.max(8, pointer.y - tip.offsetHeight - 10)];
     tip.style.transform = `translate(${x}px, ${y}px)`;
+    if (!Number.isFinite(found.value)) $('needle').hidden = true;
     $('needle').style.left = `${100 * Math.min(1, Math.max(0, (found.value - range.begin) / (range.end - range.begin)))}%`;
   }
 
@@ -208,6 +219,32 @@ function start() {
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
+  /* What is inside: its table, and its names in the picture. */
+  const insideTable = inside && new InsideTable(inside, state, look);
+  const insideNames = new InsideNames($('letters'));
+
+  /** What is pointed at inside: the vertex nearest there, how far it has moved, its colour's value. */
+  function insideAt({ part, at }) {
+    const pinned = pointer && paneAt(pointer).pane.name === 'pinned';
+    const moment = pinned ? state.pinned : state.moment;
+    const vertex = insideNearest(inside, part, moment, at);
+    const [place, from] = [insidePlace(inside, moment, vertex), insidePlace(inside, originMoment(), vertex)];
+    const move = Math.hypot(...place.map((x, i) => x - from[i]));
+    const height = (pinned ? pane_lowest('pinned', moment) : pane_lowest('now', moment)) - dot(moment.gravity, place);
+    return { place, move, value: { displacement: move, difference: move, height }[state.kind] };
+  }
+
+  function showInside() {
+    const partNow = (part) => insidePart(inside, part, state.moment, originMoment());
+    const shown = state.inside ? [...new Set([...state.named, insideTable.pointed])].filter((part) => part >= 0) : [];
+    const pane = panes.at(-1);
+    insideNames.show(shown.map((part) => {
+      const { place, move } = partNow(part);
+      const at = project(pane, place, ratio());
+      return { text: `${inside.names[part]} ${move.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
+    }));
+  }
+
   /** What is at a place of the canvas, when the graphics card has said it. */
   function ask(at, then) {
     pointer = at;
@@ -216,7 +253,8 @@ function start() {
   }
 
   function addProbe(found) {
-    if (!found || state.probes.length === 8) return;
+    if (found?.part !== undefined) insideTable.keep(found.part);
+    if (!found || found.part !== undefined || state.probes.length === 8) return;
     const moment = paneAt(pointer ?? { x: 0, y: 0 }).pane.name === 'pinned' ? state.pinned : state.moment;
     state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
     look();
@@ -269,7 +307,13 @@ function start() {
     write('pinned', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
     for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
-    for (const id of ['contours', 'ghost', 'arrows', 'wires', 'beside']) $(id).checked = state[id];
+    for (const id of SHOWN) $(id).checked = state[id];
+    if (inside) {
+      const from = state.kind === 'difference' ? `${postureText(gravityOf(state.pinnedQ))} at the same breath` : basis.resting ? 'rest, supine' : 'rest';
+      write('inside-text', `Move from ${from}${inside.corners.length ? '; of a mesh, the mean' : ''}`);
+      $('inside-legend').hidden = !state.inside;
+      write('inside-legend', state.kind === 'expansion' ? 'inside, grey: points have no area' : 'balls and meshes inside: the same colours');
+    }
     state.opacity.forEach((opacity, lung) => { for (const input of document.getElementsByName(`lung-${lung}`)) input.checked = Number(input.value) === opacity; });
     $('cut-axis').value = String(state.cut.axis);
     $('cut').disabled = state.cut.axis < 0;
@@ -283,9 +327,8 @@ function start() {
     for (const { icon, posture } of buttons) drawIcon(icon, tilted(posture.q, posture.tilt));
   }
 
-  /** Vertices move, and the picture with them; `look`: only the picture. */
+  /** Vertices move, and the picture with them. */
   const touch = () => { stale = unseen = true; };
-  const look = () => { unseen = true; };
 
   function frame(now) {
     requestAnimationFrame(frame);
@@ -294,6 +337,7 @@ function start() {
     const moving = state.advance(before === null ? 0 : (now - before) / 1000);
     if (moving) stale = unseen = true;
     if (!unseen) {
+      if (inside && state.moment) insideTable.show(state.moment, originMoment());
       before = null;
       streak = 0;
       return;
@@ -311,6 +355,10 @@ function start() {
       deform();
     }
     if (state.moment) draw();
+    if (inside && state.moment && now - tabled > 250) { // not in every frame of a breath
+      insideTable.show(state.moment, originMoment());
+      tabled = now;
+    }
     asked = false;
     showState();
     stale = unseen = false;
@@ -344,6 +392,7 @@ function start() {
     panes = makePanes();
     picture.draw(panes);
     letters.show(panes, body, ratio(), plates());
+    if (inside) showInside();
     if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
   }
 
@@ -408,7 +457,8 @@ function start() {
     });
   canvas.addEventListener('dblclick', (event) => ask(within(event.clientX, event.clientY), (found) => {
     if (!found) return;
-    state.probes.pop(); // the first click's
+    if (found.part === undefined) state.probes.pop(); // the first click's
+    else insideTable.keep(found.part);
     state.camera.pivot = found.at;
     state.camera.pan = [0, 0];
     look();
@@ -489,7 +539,7 @@ function start() {
   $('play').addEventListener('click', play);
   $('pin').addEventListener('click', pin);
   $('reset').addEventListener('click', reset);
-  for (const id of ['contours', 'ghost', 'arrows', 'wires', 'beside']) $(id).addEventListener('change', () => flip(id));
+  for (const id of SHOWN) $(id).addEventListener('change', () => flip(id));
   for (const input of document.getElementsByName('kind')) input.addEventListener('change', () => colourBy(input.value));
   for (const input of document.getElementsByName('frame')) input.addEventListener('change', () => holdStill(input.value === 'room'));
   $('cut-axis').addEventListener('change', change(() => { state.cut.axis = Number($('cut-axis').value); }));
@@ -519,7 +569,7 @@ function start() {
     choice.className = 'choice';
     choice.setAttribute('role', 'radiogroup');
     choice.setAttribute('aria-label', `${name} lung`);
-    for (const [words, opacity] of [['Whole', 1], ['Faded', 0.35], ['Hidden', 0]]) {
+    for (const [words, opacity] of [['Whole', 1], ['Faded', FADED], ['Hidden', 0]]) {
       const label = document.createElement('label');
       const input = document.createElement('input');
       Object.assign(input, { type: 'radio', name: `lung-${lung}`, value: opacity, checked: opacity === state.opacity[lung] });
@@ -565,6 +615,7 @@ function start() {
   });
   window.addEventListener('hashchange', () => {
     takeLink(location.hash, state);
+    insideTable?.press();
     remeasure();
     touch();
   });
@@ -574,7 +625,7 @@ function start() {
     const kinds = Object.keys(KINDS);
     const keys = {
       n: pin, c: () => colourBy(kinds[(kinds.indexOf(state.kind) + 1) % kinds.length]), g: () => flip('ghost'), w: () => flip('wires'),
-      b: () => flip('beside'), s: () => holdStill(!state.room), 0: reset,
+      b: () => flip('beside'), s: () => holdStill(!state.room), i: () => inside && flip('inside'), 0: reset,
     };
     if (posture) buttons[Number(event.key) - 1].button.click();
     else if (event.key === ' ' && !event.target.closest('button, input, summary')) { event.preventDefault(); play(); }
@@ -624,6 +675,8 @@ function start() {
     positions: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[0],
     /** Unit normals, likewise. */
     normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
+    /** What is inside, likewise; its vertices are in the page's own order. */
+    insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     /** Weights with the breath scale in them, and the scale. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */

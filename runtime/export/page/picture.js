@@ -14,12 +14,13 @@ class Picture {
     this.gl = gl;
     this.canvas = canvas;
     this.basis = basis;
-    this.moving = this.program('vertex.vert.glsl', null, ['moved', 'turned']);
+    this.moving = this.program('vertex.vert.glsl', null, ['moved', 'turned'], this.library());
     this.surface = this.program('surface.vert.glsl', 'surface.frag.glsl');
     this.picker = this.program('surface.vert.glsl', 'pick.frag.glsl');
     this.solid = this.program('solid.vert.glsl', 'solid.frag.glsl');
     this.feedback = gl.createTransformFeedback();
     this.makeInputs();
+    if (basis.inside) this.makeInside();
     this.makeOutputs();
     this.makePick();
     this.maps = Object.fromEntries(Object.keys(basis.colours).map((name) => [name, this.makeMap(name)]));
@@ -29,18 +30,30 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** supine.glsl for this basis, and the words of its normals as attributes from location 6 on. */
-  library() {
+  /** supine.glsl for this basis. */
+  sized() {
     const { basis } = this;
-    const { words } = basis;
-    const all = Array.from({ length: words }, (_, j) => j);
-    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, words)}`,
-      source('supine.glsl'), source('vertex.vert.glsl'),
+    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
+  }
+
+  /** With the words of the normals as attributes from location 6 on. */
+  library() {
+    const all = Array.from({ length: this.basis.words }, (_, j) => j);
+    return [...this.sized(), source('vertex.vert.glsl'),
       ...all.map((j) => `layout(location = ${6 + j}) in uvec3 n${j};`),
       `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(rest, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
-  program(vertex, fragment, outputs) {
+  /** What moves vertices inside: an attribute for each axis and four modes, from location 1 on. */
+  insideLibrary() {
+    const vectors = Math.ceil(this.basis.modes / 4);
+    const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
+    const sum = (axis) => all.filter((c) => c.axis === axis).map(({ j, name }) => `dot(supine_weights[${j}], ${name})`).join(' + ');
+    return [...this.sized(), source('inside.vert.glsl'), ...all.map(({ name }, i) => `layout(location = ${1 + i}) in vec4 ${name};`),
+      `float amount(int axis) { return axis == 0 ? ${sum(0)} : axis == 1 ? ${sum(1)} : ${sum(2)}; }`].join('\n');
+  }
+
+  program(vertex, fragment, outputs, text = source(vertex)) {
     const { gl } = this;
     const program = gl.createProgram();
     const attach = (type, text) => {
@@ -50,7 +63,7 @@ class Picture {
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${vertex}: ${gl.getShaderInfoLog(shader)}`);
       gl.attachShader(program, shader);
     };
-    attach(gl.VERTEX_SHADER, outputs ? this.library() : source(vertex));
+    attach(gl.VERTEX_SHADER, text);
     attach(gl.FRAGMENT_SHADER, fragment ? source(fragment) : 'precision highp float; void main() {}');
     if (outputs) gl.transformFeedbackVaryings(program, outputs, gl.SEPARATE_ATTRIBS);
     gl.linkProgram(program);
@@ -114,6 +127,30 @@ class Picture {
     this.fewInputs = inputs(few(rest, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
+  /** What is inside: its own displacements, a ball, and what its meshes need. */
+  makeInside() {
+    const { gl, basis: { inside, modes: k } } = this;
+    this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
+    this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
+    this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
+    const fields = this.buffer(inside.fields);
+    const attributes = [[this.buffer(inside.rest), 3, 12, 0]];
+    for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([fields, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
+    this.insideInputs = this.array(attributes);
+    this.insideParts = this.buffer(inside.part);
+    this.insideNormals = this.buffer(inside.normals);
+    this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+    const [rings, sides] = [9, 18];
+    const at = (i, j) => {
+      const [a, b] = [(Math.PI * i) / rings, (2 * Math.PI * j) / sides];
+      return [Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), Math.cos(a)];
+    };
+    const ball = [];
+    for (let i = 0; i < rings; ++i) for (let j = 0; j < sides; ++j) ball.push(...at(i, j), ...at(i + 1, j), ...at(i + 1, j + 1), ...at(i, j), ...at(i + 1, j + 1), ...at(i, j + 1));
+    this.ball = { buffer: this.buffer(new Float32Array(ball)), count: ball.length / 3 };
+    this.plainMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 1, 1, new Uint8Array([140, 150, 160, 255]));
+  }
+
   texture(internal, format, type, width, height, data) {
     const { gl } = this;
     const made = gl.createTexture();
@@ -138,7 +175,7 @@ class Picture {
   state(name) {
     const { gl, basis } = this;
     const room = 16 * basis.vertices;
-    this.states[name] ??= { moved: this.buffer(room, gl.DYNAMIC_COPY), turned: this.buffer(room, gl.DYNAMIC_COPY), few: this.buffer(16 * this.fewCount, gl.DYNAMIC_COPY) };
+    this.states[name] ??= { moved: this.buffer(room, gl.DYNAMIC_COPY), turned: this.buffer(room, gl.DYNAMIC_COPY), few: this.buffer(16 * this.fewCount, gl.DYNAMIC_COPY), inside: basis.inside ? this.buffer(16 * basis.inside.vertices, gl.DYNAMIC_COPY) : null };
     return this.states[name];
   }
 
@@ -219,12 +256,12 @@ class Picture {
   }
 
   /** Every vertex of `array` into buffers: positions, normals. */
-  capture(moment, array, targets, count) {
-    const { gl, basis, moving } = this;
+  capture(moment, array, targets, count, moving = this.moving) {
+    const { gl } = this;
     gl.useProgram(moving.program);
-    const { weights, turns } = uniformsOf(basis, moment);
+    const { weights, turns } = this.uniforms(moment);
     gl.uniform4fv(moving.at.supine_weights, weights);
-    if (basis.words) gl.uniform3fv(moving.at.supine_normal_weights, turns);
+    if (moving.at.supine_normal_weights) gl.uniform3fv(moving.at.supine_normal_weights, turns);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
@@ -239,11 +276,21 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  /** Moves a state's surface. */
+  /** Moves a state's surface, and what is inside. */
   deform(name, moment) {
-    const { moved, turned, few } = this.state(name);
+    const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
     this.capture(moment, this.fewInputs, [few, this.unread], this.fewCount);
+    if (inside) this.capture(moment, this.insideInputs, [inside], this.basis.inside.vertices, this.insideMoving);
+  }
+
+  /** uniformsOf a moment, once for all that it moves. */
+  uniforms(moment) {
+    if (this.uniformsMoment !== moment) {
+      this.uniformsMoment = moment;
+      this.uniformsNow = uniformsOf(this.basis, moment);
+    }
+    return this.uniformsNow;
   }
 
   /** What the graphics card makes of a moment: positions, mm LPS, and unit normals, xyz of each vertex. */
@@ -251,13 +298,25 @@ class Picture {
     const { gl, basis } = this;
     const targets = [0, 1].map(() => this.buffer(16 * basis.vertices, gl.DYNAMIC_READ));
     this.capture(moment, this.inputs, targets, basis.vertices);
-    return targets.map((target) => {
-      const four = new Float32Array(4 * basis.vertices);
-      gl.bindBuffer(gl.ARRAY_BUFFER, target);
-      gl.getBufferSubData(gl.ARRAY_BUFFER, 0, four);
-      gl.deleteBuffer(target);
-      return new Float32Array(3 * basis.vertices).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
-    });
+    return targets.map((target) => this.take(target, basis.vertices));
+  }
+
+  /** The same of what is inside: positions. */
+  readInside(moment) {
+    const { gl, basis: { inside } } = this;
+    const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
+    this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
+    return this.take(target, inside.vertices);
+  }
+
+  /** The first three of each four floats of a buffer, which goes. */
+  take(target, count) {
+    const { gl } = this;
+    const four = new Float32Array(4 * count);
+    gl.bindBuffer(gl.ARRAY_BUFFER, target);
+    gl.getBufferSubData(gl.ARRAY_BUFFER, 0, four);
+    gl.deleteBuffer(target);
+    return new Float32Array(3 * count).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
   /** Sets a program up for a pane of the picture. */
@@ -320,6 +379,40 @@ class Picture {
     }
   }
 
+  /** What is inside, balls of `radius` mm and meshes, by a program that usePane has set up. */
+  drawInside(program, pane, radius) {
+    const { gl, basis: { inside } } = this;
+    const [now, from] = [this.state(pane.state).inside, this.state(pane.origin).inside];
+    const array = (kind, shape, each) => {
+      const key = `${kind} ${pane.state} ${pane.origin}`;
+      this.arrays[key] ??= this.array([...shape, [now, 3, 16, 0, each], [from, 3, 16, 0, each], [this.insideParts, 1, 4, 0, each]]);
+      gl.bindVertexArray(this.arrays[key]);
+    };
+    gl.uniform1f(program.at.radius, radius);
+    if (inside.points) {
+      array('balls', [[this.ball.buffer, 3, 12, 0], [this.ball.buffer, 3, 12, 0]], 1);
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.ball.count, inside.points);
+    }
+    if (inside.corners.length) {
+      array('meshes', [null, [this.insideNormals, 3, 12, 0]], 0);
+      gl.vertexAttrib3f(0, 0, 0, 0);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.insideIndices);
+      gl.drawElements(gl.TRIANGLES, inside.corners.length, gl.UNSIGNED_INT, 0);
+    }
+  }
+
+  /** The same in the colours of the lungs; what has no such value, in grey. */
+  drawContent(pane) {
+    const { gl, content } = this;
+    this.usePane(content, pane, [0, 0, 1, 1]);
+    gl.bindTexture(gl.TEXTURE_2D, pane.measure === 1 ? this.plainMap : this.maps[pane.map]);
+    gl.uniform4fv(content.at.cut, NO_CUT); // whole behind a cut: that is what a cut is for
+    gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
+    gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
+    gl.uniform1f(content.at.opacity, 1);
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // seen on small screens too
+  }
+
   /** A few arrows from where the surface was to where it is. */
   drawArrows(pane) {
     const { gl, solid } = this;
@@ -362,6 +455,7 @@ class Picture {
     for (const pane of panes) {
       gl.viewport(...pane.box);
       gl.depthFunc(gl.LEQUAL);
+      if (pane.inside) this.drawContent(pane); // first: lungs that are seen through lie over it
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);
       if (pane.arrows) this.drawArrows(pane);
@@ -389,6 +483,14 @@ class Picture {
       gl.uniform1ui(this.picker.at.lung, lung);
       if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
     });
+    if (pane.inside) {
+      gl.clearBufferfv(gl.DEPTH, 0, [1]); // found through lungs where it is seen through them
+      gl.colorMask(false, false, false, false);
+      pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
+      gl.colorMask(true, true, true, true);
+      this.usePane(this.contentPicker, pane, [x, y, pane.box[2], pane.box[3]]);
+      this.drawInside(this.contentPicker, pane, Math.max(BALL_RADIUS, 8 * pane.pixel));
+    }
     gl.bindVertexArray(null);
     this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a used one would be waited for
     gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
@@ -398,7 +500,8 @@ class Picture {
     gl.flush();
   }
 
-  /** {value, at, lung}, null where nothing was, undefined where no answer has come. */
+  /** {value, at, lung}, or {part, at} inside, null where nothing was, undefined where no answer has
+   * come. */
   picked() {
     const { gl } = this;
     if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;
@@ -409,7 +512,9 @@ class Picture {
     gl.deleteSync(this.picking);
     this.picking = null;
     const [value, ...at] = new Float32Array(bits.buffer);
-    return Number.isNaN(value) ? null : { value, at, lung: bits[0] & 15 };
+    if (!Number.isNaN(value)) return { value, at, lung: bits[0] & 15 };
+    const part = (bits[0] & 0x3fffff) - 1;
+    return part < 0 ? null : { part, at };
   }
 
   beginTiming() {

@@ -51,6 +51,8 @@ function postureFrom(text) {
   return found && Number.isFinite(Number(tilt ?? 0)) ? { q: found.q, tilt: Number(tilt ?? 0) } : null;
 }
 
+const FADED = 0.35; // opacity of lungs that are seen through
+
 const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1, pan: [0, 0], pivot: null };
 
 /** Where the viewer stands, by the letter of what faces him. */
@@ -84,7 +86,9 @@ class State {
     this.arrows = false;
     this.wires = false;
     this.beside = false;                           // the reference posture beside this one
-    this.opacity = Array(basis.lungs).fill(1);
+    this.inside = Boolean(basis.inside);           // shown
+    this.named = [];                               // parts inside whose names are kept in the picture
+    this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
     this.cut = { axis: -1, at: 0.5 };              // across x, y or z, at a share of the body
     this.ownRanges = {};                           // {begin, end} by kind, where typed
     this.probes = [];                              // vertices
@@ -117,15 +121,16 @@ class State {
     this.settle(compose(turn(axis, angle), this.q), 0, 0);
   }
 
-  /** Moves on by `seconds`; true when something is still moving. */
+  /** Moves on by `seconds`; true when something has moved. */
   advance(seconds) {
+    const goal = this.room ? 1 : 0;
+    const moves = this.playing || this.turning !== null || this.roomBlend !== goal;
     if (this.turning) {
       this.turning.time += seconds / this.turning.seconds;
       const t = Math.min(1, this.turning.time);
       this.q = slerp(this.turning.from, this.turning.to, t * t * (3 - 2 * t));
       if (t === 1) this.turning = null;
     }
-    const goal = this.room ? 1 : 0;
     if (this.roomBlend !== goal) {
       const step = matchMedia('(prefers-reduced-motion: reduce)').matches ? 1 : 2 * seconds;
       this.roomBlend += Math.max(-step, Math.min(step, goal - this.roomBlend));
@@ -134,7 +139,11 @@ class State {
       this.phase = (this.phase + (seconds * this.rate) / 60) % 1;
       this.depth = (this.tidal * (1 - Math.cos(2 * Math.PI * this.phase))) / 2;
     }
-    return this.playing || this.turning !== null || this.roomBlend !== goal;
+    return moves;
+  }
+
+  get needsPinned() {
+    return this.kind === 'difference' || this.beside;
   }
 
   /** Weights for now; false, and the old ones stay, where the surface would fold. */
@@ -142,7 +151,7 @@ class State {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (!Number.isFinite(moment.scale)) return false;
     this.moment = moment;
-    if (this.kind === 'difference' || this.beside) {
+    if (this.needsPinned) {
       const pinned = momentFor(this.basis, gravityOf(this.pinnedQ), this.depth);
       this.pinned = Number.isFinite(pinned.scale) ? pinned : moment;
     }

@@ -17,7 +17,7 @@ function xrPane(pane, view, { x, y, width, height }) {
   const toEye = product(view.transform.inverse.matrix, room);
   return {
     ...pane, box: [x, y, width, height], toEye: product(toEye, pane.toEye), arrowToEye: product(toEye, pane.arrowToEye),
-    projection: view.projectionMatrix, dark: true,
+    projection: view.projectionMatrix, pixel: 0, dark: true,
   };
 }
 

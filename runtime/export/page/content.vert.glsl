@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// What is inside the lungs on the screen: a ball around each point, or a mesh, whose `ball` is 0.
+layout(location = 0) in vec3 ball;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 moved;
+layout(location = 3) in vec3 origin; // what the colour measures from
+layout(location = 4) in float number; // of the part
+uniform mat4 toEye;
+uniform mat4 projection;
+uniform vec4 lens;
+uniform int kind;
+uniform vec4 gravity;
+uniform float radius; // of a ball, mm
+out vec3 eye;
+out vec3 facing;
+out vec3 body;
+out float value;
+flat out uint part;
+
+void main() {
+  body = moved + radius * ball;
+  vec4 at = toEye * vec4(body, 1.0);
+  eye = at.xyz;
+  facing = mat3(toEye) * normal;
+  value = kind == 2 ? gravity.w - dot(gravity.xyz, moved) : distance(moved, origin);
+  part = uint(number);
+  vec4 clip = projection * at;
+  gl_Position = vec4((clip.xy - lens.xy * clip.w) * lens.zw, clip.zw);
+}

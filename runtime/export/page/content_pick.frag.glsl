@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// Which part inside is under the pointer, as a number that is none, and where.
+precision highp float;
+precision highp int;
+in vec3 body;
+flat in uint part;
+out uvec4 picked;
+
+void main() {
+  picked = uvec4(0x7fc00001u + part, floatBitsToUint(body));
+}

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// What is inside the lungs: named points and meshes, which move by the lungs' own weights along
+// displacements of their own, [vertex][axis][mode].
+
+const BALL_RADIUS = 4; // mm, of a point
+
+/** Takes it out of the page, points before meshes, so that each kind is drawn at once. */
+function takeInside(inside) {
+  const { vertices: n, units } = inside;
+  const k = units.length;
+  const [places, fields, of, corners] = [takeTensor('inside-vertices', Float32Array), takeCounts('inside-coefficients', units),
+    takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', n)];
+  const meshed = new Uint8Array(n);
+  for (const corner of corners) meshed[corner] = 1;
+  const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
+  const rank = new Uint32Array(n);
+  order.forEach((from, to) => { rank[from] = to; });
+  inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
+  inside.rest = new Float32Array(3 * n);
+  inside.fields = new Float32Array(3 * k * n);
+  inside.part = new Float32Array(n);
+  inside.members = inside.names.map(() => []); // vertices of each part
+  order.forEach((from, to) => {
+    inside.rest.set(places.subarray(3 * from, 3 * from + 3), 3 * to);
+    inside.fields.set(fields.subarray(3 * k * from, 3 * k * (from + 1)), 3 * k * to);
+    inside.part[to] = of[from];
+    inside.members[of[from]].push(to);
+  });
+  inside.corners = corners.map((corner) => rank[corner]);
+  inside.normals = normalsOf(inside.rest, inside.corners);
+}
+
+/** Unit normals of a surface as it lies in the file. */
+function normalsOf(xyz, corners) {
+  const normals = new Float32Array(xyz.length);
+  const at = (v) => [xyz[3 * v], xyz[3 * v + 1], xyz[3 * v + 2]];
+  for (let t = 0; t < corners.length; t += 3) {
+    const [a, b, c] = [at(corners[t]), at(corners[t + 1]), at(corners[t + 2])];
+    const n = cross(b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i]));
+    for (let j = 0; j < 3; ++j) for (let i = 0; i < 3; ++i) normals[3 * corners[t + j] + i] += n[i];
+  }
+  for (let i = 0; i < normals.length; i += 3) {
+    const size = Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1;
+    for (let j = 0; j < 3; ++j) normals[i + j] /= size;
+  }
+  return normals;
+}
+
+/** Where a vertex inside is. */
+function insidePlace({ rest, fields, units: { length: k } }, { weights }, vertex) {
+  return [0, 1, 2].map((axis) => {
+    let sum = rest[3 * vertex + axis];
+    for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
+    return sum;
+  });
+}
+
+/** Where a part is in one moment, the middle of a mesh, and how far its vertices have moved since
+ * another, in the mean. */
+function insidePart(inside, part, now, from) {
+  const members = inside.members[part];
+  const place = [0, 0, 0];
+  let move = 0;
+  for (const vertex of members) {
+    const [a, b] = [insidePlace(inside, now, vertex), insidePlace(inside, from, vertex)];
+    a.forEach((x, i) => { place[i] += x / members.length; });
+    move += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / members.length;
+  }
+  return { place, move };
+}
+
+/** The vertex of a part nearest a place. */
+function insideNearest(inside, part, moment, place) {
+  let [best, least] = [inside.members[part][0], Infinity];
+  for (const vertex of inside.members[part]) {
+    const far = Math.hypot(...insidePlace(inside, moment, vertex).map((x, i) => x - place[i]));
+    if (far < least) [best, least] = [vertex, far];
+  }
+  return best;
+}
+
+/** Beyond this many rows a table is searched rather than read. */
+const ROWS_SHOWN = 200;
+
+/** The table of what is inside: a button for each part, which keeps its name in the picture; where it
+ * is, and how far it has moved. `state.named` are the parts whose names are kept; `look` asks for the
+ * picture. */
+class InsideTable {
+  constructor(inside, state, look) {
+    Object.assign(this, { inside, state, look, rows: [], pointed: -1, written: null });
+    $('inside-section').hidden = false;
+    $('inside-find').hidden = inside.names.length <= 20;
+    $('inside-find').addEventListener('input', () => this.list());
+    this.list();
+  }
+
+  /** Rows for the parts whose names hold what is searched for. */
+  list() {
+    const words = $('inside-find').value.trim().toLowerCase();
+    const found = this.inside.names.flatMap((name, part) => (name.toLowerCase().includes(words) ? [part] : []));
+    const { length } = this.inside.names;
+    write('inside-count', found.length === length && length <= ROWS_SHOWN ? '' : `${Math.min(found.length, ROWS_SHOWN)} of ${length} are listed`);
+    this.rows = found.slice(0, ROWS_SHOWN).map((part) => this.row(part));
+    $('inside-rows').replaceChildren(...this.rows.map(({ row }) => row));
+    this.press();
+    this.written = null;
+  }
+
+  row(part) {
+    const [row, head, button, place, move] = ['tr', 'th', 'button', 'td', 'td'].map((tag) => document.createElement(tag));
+    head.scope = 'row';
+    button.type = 'button';
+    button.textContent = this.inside.names[part] || '(no name)';
+    button.title = 'Keep its name in the picture';
+    button.addEventListener('click', () => this.keep(part));
+    const point = (to) => () => { this.pointed = to; this.look(); };
+    for (const [type, to] of [['focus', part], ['blur', -1]]) button.addEventListener(type, point(to));
+    for (const [type, to] of [['mouseenter', part], ['mouseleave', -1]]) row.addEventListener(type, point(to));
+    head.append(button);
+    row.append(head, place, move);
+    return { part, row, button, place, move };
+  }
+
+  /** Keeps a part's name in the picture, or lets it go. */
+  keep(part) {
+    const { state } = this;
+    state.named = state.named.includes(part) ? state.named.filter((p) => p !== part) : [...state.named, part];
+    this.press();
+  }
+
+  press() {
+    for (const { part, button } of this.rows) button.setAttribute('aria-pressed', String(this.state.named.includes(part)));
+    this.look();
+  }
+
+  /** Writes what has changed since another moment, where that is not written yet. */
+  show(now, from) {
+    if (this.written?.now === now && this.written.from === from) return;
+    this.written = { now, from };
+    const of = (part) => insidePart(this.inside, part, now, from);
+    for (const { part, button, place, move } of this.rows) {
+      const { place: at, move: far } = of(part);
+      const texts = [placeText(at).replace(' mm', ''), far.toFixed(1)];
+      if (place.textContent !== texts[0]) place.textContent = texts[0];
+      if (move.textContent !== texts[1]) move.textContent = texts[1];
+      const words = `${button.textContent}, moved ${texts[1]} mm, at ${texts[0]} mm`;
+      if (button.getAttribute('aria-label') !== words) button.setAttribute('aria-label', words);
+    }
+  }
+}
+
+/** Names over the picture, beside their points. */
+class InsideNames {
+  constructor(parent) {
+    Object.assign(this, { parent, plates: [] });
+  }
+
+  /** `names`: {text, at} in CSS pixels, at null where it is out of sight. Where two would lie on each
+   * other, the lower one goes down. */
+  show(names) {
+    const taken = [];
+    for (const name of names.filter(({ at }) => at).sort((a, b) => a.at.y - b.at.y)) {
+      const half = 3.7 * name.text.length + 10; // about; to measure it takes the page a layout
+      for (const other of taken) {
+        if (Math.abs(other.at.x - name.at.x) < half + other.half && name.at.y < other.at.y + 20) name.at.y = other.at.y + 20;
+      }
+      taken.push({ ...name, half });
+    }
+    while (this.plates.length < names.length) {
+      const plate = document.createElement('span');
+      plate.className = 'name plate';
+      this.parent.append(plate);
+      this.plates.push(plate);
+    }
+    this.plates.forEach((plate, i) => {
+      const { text, at } = names[i] ?? {};
+      if (text && plate.textContent !== text) plate.textContent = text;
+      placed(plate, at, Boolean(at));
+    });
+  }
+}

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is inside the lungs, in the page: it is where `supine deform` puts it, says its name and its
+// move at the pointer and in a table that keyboards reach, and can be hidden. Pictures are kept in
+// page_inside/ beside the test.
+import assert from 'node:assert/strict';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { browser, openLungs, picture } from './browser.mjs';
+import { folder, largestDistance, loadCommon, supine } from './support.mjs';
+
+const axe = loadCommon('axe-core').source;
+const TOLERANCE_MM = 0.005; // of displacements in 16 bits
+const PRINTED_MM = 0.001;   // of a text file's numbers
+const WRITTEN_MM = 0.051;   // of a move as the table has it
+const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
+const files = Object.fromEntries(['lungs.ply', 'tumour.obj', 'points.csv', 'lungs.safetensors', 'inside.safetensors', 'lungs.html', 'moved.csv', 'moved.obj'].map((name) => [name, join(folder, name)]));
+
+/** Four named points, and an octahedron that is a mesh. */
+supine('phantom', '-o', files['lungs.ply'], '--vertices', '1500');
+supine('precompute', files['lungs.ply'], '-o', files['lungs.safetensors']);
+const at = [[-80, -120, -90], [60, -150, -110], [70, -160, -60], [-70, -90, -150]];
+writeFileSync(files['points.csv'], `name,x,y,z\n${at.map((p, i) => `${NAMES[i]},${p.join(',')}\n`).join('')}`);
+const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]].map((c) => c.map((x, i) => 14 * x + [80, -110, -130][i]));
+const faces = [[1, 3, 5], [3, 2, 5], [2, 4, 5], [4, 1, 5], [3, 1, 6], [2, 3, 6], [4, 2, 6], [1, 4, 6]];
+writeFileSync(files['tumour.obj'], `${corners.map((c) => `v ${c.join(' ')}\n`).join('')}${faces.map((f) => `f ${f.join(' ')}\n`).join('')}`);
+supine('embed', files['lungs.safetensors'], files['points.csv'], files['tumour.obj'], '-o', files['inside.safetensors']);
+supine('export', files['lungs.safetensors'], '--inside', files['inside.safetensors'], '-o', files['lungs.html']);
+
+/** What the program makes of it: {name: [places]}. */
+function deformed(posture, volume) {
+  supine('deform', files['inside.safetensors'], '--posture', posture, '--volume', volume, '-o', files['moved.csv']);
+  const places = {};
+  for (const line of readFileSync(files['moved.csv'], 'utf8').trim().split('\n').slice(1)) {
+    const [name, , ...place] = line.split(',');
+    (places[name] ??= []).push(place.slice(0, 3).map(Number));
+  }
+  return places;
+}
+
+const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+
+/** Positions on the graphics card, in postures and at volumes, against the program's. */
+async function checkPositions(page) {
+  let worst = 0;
+  for (const [posture, gravity, volume] of [['supine', [0, 1, 0], 0], ['prone', [0, -1, 0], 320], ['left', [1, 0, 0], 700], ['0.6:0:-0.8', [0.6, 0, -0.8], 150]]) {
+    const truth = deformed(posture, `rest+${volume}`);
+    const found = await page.evaluate(([g, mL]) => {
+      const { basis: { inside }, insidePositions } = window.supine;
+      const xyz = insidePositions(g, mL);
+      return inside.names.map((name, part) => [name, inside.members[part].map((v) => Array.from(xyz.slice(3 * v, 3 * v + 3)))]);
+    }, [gravity, volume]);
+    assert.deepEqual(found.map(([name]) => name).sort(), Object.keys(truth).sort());
+    for (const [name, places] of found) {
+      assert.equal(places.length, name === 'tumour' ? 6 : 1);
+      worst = Math.max(worst, largestDistance(places.flat(), truth[name].flat()));
+    }
+  }
+  console.log(`inside: within ${worst.toFixed(4)} mm of supine deform`);
+  assert.ok(worst < TOLERANCE_MM + PRINTED_MM, `${worst} mm off`);
+}
+
+const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+const mean = (values) => values.reduce((sum, x) => sum + x, 0) / values.length;
+
+/** The moves that the table has are those between the program's places. */
+async function checkTable(page) {
+  const rest = deformed('supine', 'rest');
+  await page.keyboard.press('2');
+  for (const [depth, kind] of [[500, 'displacement'], [800, 'difference']]) {
+    await page.locator('#depth').fill(String(depth));
+    await page.locator(`[name=kind][value=${kind}]`).check();
+    await settled(page);
+    const now = deformed('prone', `rest+${depth}`);
+    const from = kind === 'difference' ? deformed('supine', `rest+${depth}`) : rest;
+    const rows = await page.evaluate(() => [...document.querySelectorAll('#inside-rows tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
+    assert.deepEqual(rows.map(([name]) => name).sort(), [...NAMES, 'tumour'].sort());
+    for (const [name, place, move] of rows) {
+      const far = mean(now[name].map((p, i) => distance(p, from[name][i])));
+      assert.ok(far > 0.5, `${name} does not move`);
+      assert.ok(Math.abs(far - Number(move)) < WRITTEN_MM, `${name}: ${move}, not ${far}`);
+      const middle = [0, 1, 2].map((i) => mean(now[name].map((p) => p[i])));
+      const said = [...place.matchAll(/([LRPAHF]) (\d+)/g)].map(([, letter, mm]) => ('LPH'.includes(letter) ? 1 : -1) * Number(mm));
+      assert.ok(distance(said, middle) < 0.9, `${name}: ${place}, not ${middle}`);
+    }
+    assert.match(await page.locator('#inside-text').textContent(), kind === 'difference' ? /supine at the same breath/ : /from rest, supine/);
+  }
+  await page.locator('[name=kind][value=displacement]').check();
+  return rest;
+}
+
+/** Where a part is on the page. */
+const onPage = (page, name) => page.evaluate((wanted) => {
+  const { basis: { inside }, insidePositions, state, panes } = window.supine;
+  const xyz = insidePositions(state.gravity, state.depth);
+  const members = inside.members[inside.names.indexOf(wanted)];
+  const place = [0, 1, 2].map((i) => members.reduce((sum, v) => sum + xyz[3 * v + i] / members.length, 0));
+  const pane = panes()[0];
+  const m = pane.toEye;
+  const eye = [0, 1, 2].map((i) => m[i] * place[0] + m[4 + i] * place[1] + m[8 + i] * place[2] + m[12 + i]);
+  const ndc = [0, 1].map((i) => (pane.projection[5 * i] * eye[i]) / -eye[2]);
+  const stage = document.getElementById('picture').getBoundingClientRect();
+  return [stage.x + ((ndc[0] + 1) / 2) * stage.width, stage.y + ((1 - ndc[1]) / 2) * stage.height];
+}, name);
+
+async function pointed(page, [x, y]) {
+  await page.mouse.move(x, y);
+  await picture(page);
+  await page.waitForFunction(() => !window.supine.picture.picking);
+  await settled(page);
+  return page.locator('#pointed').isVisible().then((shown) => (shown ? page.locator('#pointed').textContent() : ''));
+}
+
+/** The name and the move are at the pointer, through the lungs; not through whole ones, and not when
+ * hidden. */
+async function checkPointer(page, rest) {
+  const depth = await page.evaluate(() => window.supine.state.depth);
+  const now = deformed('prone', `rest+${depth}`);
+  for (const name of [...NAMES, 'tumour']) {
+    const text = await pointed(page, await onPage(page, name));
+    assert.ok(text.startsWith(name), `at ${name}: ${text}`);
+    const said = Number(/([\d.]+) mm/.exec(text.slice(name.length))[1]);
+    const moves = now[name].map((p, i) => distance(p, rest[name][i]));
+    assert.ok(said > Math.min(...moves) - 0.02 && said < Math.max(...moves) + 0.02, `${name}: ${said}, not ${moves}`);
+  }
+  const place = await onPage(page, 'tumour');
+  for (const lung of [0, 1]) await page.locator(`[name=lung-${lung}][value="1"]`).check();
+  assert.match(await pointed(page, place), /lung/);
+  for (const lung of [0, 1]) await page.locator(`[name=lung-${lung}][value="0.35"]`).check();
+  await page.locator('#inside').uncheck();
+  assert.match(await pointed(page, place), /lung/);
+  await page.locator('#inside').check();
+}
+
+/** Showing and hiding, keeping names by keyboard and by pointer, a link that brings them back. */
+async function checkControls(page) {
+  await page.mouse.move(5, 5);
+  const before = await picture(page);
+  await page.locator('#inside').uncheck();
+  const without = await picture(page);
+  assert.ok(!without.equals(before), 'nothing was shown');
+  await page.locator('#inside').check();
+  assert.ok((await picture(page)).equals(before), 'it is another after it was hidden');
+  for (const kind of ['expansion', 'height']) {
+    await page.locator(`[name=kind][value=${kind}]`).check();
+    assert.ok(!(await picture(page)).equals(before));
+  }
+  await page.locator('[name=kind][value=displacement]').check();
+  /* By keyboard alone: from the check box to the first name, kept by Enter. */
+  await page.mouse.move(5, 5); // off the rows, which show their names as well
+  await page.locator('#inside').focus();
+  const reached = [];
+  for (let i = 0; i < 5; ++i) {
+    await page.keyboard.press('Tab');
+    reached.push(await page.evaluate(() => document.activeElement.getAttribute('aria-label')));
+    await page.waitForFunction((label) => { // its name is in the picture, and no other
+      const shown = [...document.querySelectorAll('.name:not([hidden])')].map((e) => e.textContent);
+      return shown.length === 1 && label.startsWith(shown[0].replace(/ [\d.]+ mm$/, ''));
+    }, reached.at(-1));
+  }
+  assert.ok([...NAMES, 'tumour'].every((name) => reached.some((label) => label.startsWith(`${name}, moved `) && / mm, at [LR] \d+  [PA] \d+  [HF] \d+ mm$/.test(label))), reached.join('\n'));
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => window.supine.state.named.length === 1);
+  await page.evaluate(() => document.activeElement.blur());
+  await page.mouse.click(...await onPage(page, 'carina'));
+  await page.waitForFunction(() => window.supine.state.named.length === 2);
+  assert.equal(await page.evaluate(() => window.supine.state.probes.length), 0);
+  const pressed = await page.evaluate(() => [...document.querySelectorAll('#inside-rows [aria-pressed=true]')].map((e) => e.textContent));
+  assert.ok(pressed.length === 2 && pressed.includes('carina'));
+  await page.waitForFunction(() => /names=\d+\.\d+/.test(location.hash));
+  const { page: again } = await openLungs(files['lungs.html'], {}, await page.evaluate(() => `${location.hash}&inside=0`));
+  assert.deepEqual(await again.evaluate(() => [window.supine.state.named.length, document.getElementById('inside').checked]), [2, false]);
+  await again.close();
+}
+
+/** A lost context comes back with what is inside. */
+async function checkLoss(page) {
+  await page.mouse.move(5, 5);
+  const before = await picture(page);
+  await page.evaluate(() => { window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context'); window.lose.loseContext(); });
+  await page.waitForFunction(() => window.supine.picture === null);
+  await page.evaluate(() => window.lose.restoreContext());
+  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
+  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+}
+
+async function checkSizes() {
+  mkdirSync('page_inside', { recursive: true });
+  for (const [width, height, colorScheme] of [[1400, 900, 'light'], [900, 600, 'dark'], [844, 390, 'light'], [390, 844, 'dark']]) {
+    const touch = Math.min(width, height) < 400;
+    const { page, complaints } = await openLungs(files['lungs.html'], { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left&names=0.4');
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
+    if (touch) {
+      await page.touchscreen.tap(...await onPage(page, 'carina'));
+      await page.waitForFunction(() => window.supine.state.named.length === 3);
+    }
+    await page.locator('#inside-section').scrollIntoViewIfNeeded();
+    await settled(page);
+    writeFileSync(join('page_inside', `${width}x${height}-${colorScheme}.png`), await page.screenshot());
+    await page.evaluate(axe);
+    const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
+    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);
+    assert.deepEqual(complaints, []);
+    await page.close();
+  }
+}
+
+const { page, complaints } = await openLungs(files['lungs.html'], { viewport: { width: 760, height: 480 } });
+await checkPositions(page);
+await checkPointer(page, await checkTable(page));
+await checkControls(page);
+assert.deepEqual(complaints, []);
+await checkLoss(page);
+await page.close();
+await checkSizes();
+await browser.close();
