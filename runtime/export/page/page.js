@@ -48,7 +48,8 @@ function start() {
   let unseen = true;    // the picture is not what the state says
   let pointer = null;   // where on the canvas, CSS pixels
   let asked = true;     // what is there has been asked, for this picture
-  let wanted = null;    // what is done with the next answer, where a click asked
+  let wanted = null;    // {at, then}: a click's own question, and what is done with its answer
+  let question = null;  // {pane, then} that the graphics card has been asked
   let before = null;    // time of the last frame, when frames follow each other
   let streak = 0;       // frames that have followed each other
   let frameTime = NaN;  // ms, smoothed
@@ -132,16 +133,17 @@ function start() {
    * picture or the pointer has changed since. */
   function point() {
     const found = picture.picked();
-    if (found !== undefined && wanted) {
-      wanted(found);
-      wanted = null;
-    }
+    if (found) found.pane = question.pane;
+    if (found !== undefined) question.then?.(found);
     if (!pointer) showPointed(null);
     else if (found !== undefined) showPointed(found);
-    if (!asked && pointer && panes.length && !picture.picking) {
-      asked = true;
-      const { pane, x, y } = paneAt(pointer);
+    const at = wanted?.at ?? (asked ? null : pointer);
+    if (at && panes.length && !picture.picking) {
+      const { pane, x, y } = paneAt(at);
       picture.pick(pane, x, y);
+      question = { pane: pane.name, then: wanted?.then };
+      asked = !wanted;
+      wanted = null;
     }
   }
 
@@ -224,13 +226,12 @@ function start() {
   const insideNames = new InsideNames($('letters'));
 
   /** What is pointed at inside: the vertex nearest there, how far it has moved, its colour's value. */
-  function insideAt({ part, at }) {
-    const pinned = pointer && paneAt(pointer).pane.name === 'pinned';
-    const moment = pinned ? state.pinned : state.moment;
+  function insideAt({ part, at, pane }) {
+    const moment = pane === 'pinned' ? state.pinned : state.moment;
     const vertex = insideNearest(inside, part, moment, at);
     const [place, from] = [insidePlace(inside, moment, vertex), insidePlace(inside, originMoment(), vertex)];
     const move = Math.hypot(...place.map((x, i) => x - from[i]));
-    const height = (pinned ? pane_lowest('pinned', moment) : pane_lowest('now', moment)) - dot(moment.gravity, place);
+    const height = pane_lowest(pane, moment) - dot(moment.gravity, place);
     return { place, move, value: { displacement: move, difference: move, height }[state.kind] };
   }
 
@@ -248,14 +249,13 @@ function start() {
   /** What is at a place of the canvas, when the graphics card has said it. */
   function ask(at, then) {
     pointer = at;
-    asked = false;
-    wanted = then;
+    wanted = { at, then };
   }
 
   function addProbe(found) {
     if (found?.part !== undefined) insideTable.keep(found.part);
     if (!found || found.part !== undefined || state.probes.length === 8) return;
-    const moment = paneAt(pointer ?? { x: 0, y: 0 }).pane.name === 'pinned' ? state.pinned : state.moment;
+    const moment = found.pane === 'pinned' ? state.pinned : state.moment;
     state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
     look();
   }
