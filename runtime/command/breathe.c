@@ -6,6 +6,7 @@
 
 #include "runtime/breath/breath_frames.h"
 #include "runtime/command/breath_output.h"
+#include "runtime/command/drawing.h"
 #include "runtime/options/basis_input.h"
 #include "runtime/options/orientation.h"
 #include "runtime/options/volume.h"
@@ -25,31 +26,9 @@ typedef struct request {
   double fps, seconds, step; /* 0: not given */
 } request;
 
-/* "supine:left:10s" */
-static int read_turn(const char *command, const char *value, void *field) {
+static int read_turn(const char *command, const char *text, void *field) {
   request *wanted = field;
-  char text[128];
-  char *colon[2];
-  (void)snprintf(text, sizeof text, "%s", value);
-  colon[0] = strchr(text, ':');
-  colon[1] = colon[0] == NULL ? NULL : strchr(colon[0] + 1, ':');
-  if (strlen(value) >= sizeof text || colon[1] == NULL) {
-    return SUPINE_OPTION_MISFIT;
-  }
-  *colon[0] = *colon[1] = '\0';
-  char *seconds = colon[1] + 1;
-  const size_t length = strlen(seconds);
-  if (length > 0 && seconds[length - 1] == 's') {
-    seconds[length - 1] = '\0';
-  }
-  if (!supine_options_parse_number(seconds, &wanted->turn.seconds) ||
-      !(wanted->turn.seconds > 0.0)) {
-    return supine_options_usage(command, "--turn takes a time above 0 s, not '%s'", value);
-  }
-  wanted->turns = true;
-  const int result = supine_options_posture(command, text, wanted->turn.from);
-  return result == SUPINE_EXIT_OK ? supine_options_posture(command, colon[0] + 1, wanted->turn.to)
-                                  : result;
+  return supine_command_read_turn(command, text, &wanted->turn);
 }
 
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */

@@ -21,6 +21,14 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
                                  path);
 }
 
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error) {
+  supine_status status = supine_basis_open(path, inside, error);
+  status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
+  return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+}
+
 /* Adds the marks of one part: its vertices, and its name at their middle. */
 static void add_part(const supine_command_names *names, size_t part, const size_t *order,
                      size_t count, const float *xyz, const float *from, supine_command_marks *out) {

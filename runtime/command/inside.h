@@ -11,6 +11,12 @@
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
+/* Opens content of these lungs and its names; close both in any case, which begin as zeros.
+ * Statuses of opening, of its names, and of the check. */
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error);
+
 /* Marks of a picture: each named point, with how far it has moved; meshes as their vertices, and
  * their name at the middle. */
 typedef struct supine_command_marks {

@@ -3,101 +3,17 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "sh/base/output.h"
-#include <supine/compare.h>
 
-#include "runtime/command/inside.h"
+#include "runtime/command/drawing.h"
 #include "runtime/options/basis_input.h"
-#include "runtime/options/posture_list.h"
-#include "runtime/options/volume.h"
-#include "runtime/render/render.h"
 
 static const char name[] = "render";
 
-typedef struct request {
-  const char *output;
-  const char *postures;
-  supine_volume_options volume;
-  const char *reference; /* posture that colours are the difference from, or NULL */
-  const char *title;
-  const char *inside; /* a file, or NULL */
-  double scale;       /* mm, or 0: by volume */
-  double largest;
-  size_t width, height;
-  supine_view view[SUPINE_VIEWS_MAX];
-  size_t view_count;
-  unsigned theme; /* 1: dark */
-} request;
-
-/* One posture, ready to be drawn. */
-typedef struct state {
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  float *value; /* [N] */
-  char subtitle[96];
-  supine_command_marks marks;
-} state;
-
-static int find_state(const supine_basis *basis, const supine_compare *compare,
-                      const request *wanted, const supine_posture_item *item, float *distance,
-                      state *found) {
-  const size_t lungs = supine_basis_get_info(basis)->lung_count;
-  supine_error error = {SUPINE_ERROR_NUMERICAL, "gravity has no direction"};
-  if (supine_basis_weights(basis, item->gravity, found->weights) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
-  }
-  if (wanted->scale == 0.0) {
-    return supine_options_volume_scales(basis, name, &wanted->volume, item->gravity, found->weights,
-                                        found->scales);
-  }
-  supine_distance_statistics statistics;
-  for (size_t lung = 0; lung < lungs; ++lung) {
-    found->scales[lung] = 1.0;
-  }
-  supine_compare_distances(compare, found->weights, found->scales, NULL, NULL, distance);
-  supine_compare_statistics(compare, distance, &statistics);
-  if (!(statistics.max > 0.0)) {
-    supine_options_say(name, "nothing moves in %s: no scale gives %g mm", item->name,
-                       wanted->scale);
-    return SUPINE_EXIT_NUMERICAL;
-  }
-  for (size_t lung = 0; lung < lungs; ++lung) {
-    found->scales[lung] = wanted->scale / statistics.max;
-  }
-  return SUPINE_EXIT_OK;
-}
-
-/* What the colours show, and the words below the posture's name. */
-static void find_value(const supine_basis *basis, const supine_compare *compare,
-                       const state *reference, state *shown, double *p95, double *largest) {
-  supine_distance_statistics statistics;
-  supine_compare_distances(compare, shown->weights, shown->scales,
-                           reference != NULL ? reference->weights : NULL,
-                           reference != NULL ? reference->scales : NULL, shown->value);
-  supine_compare_statistics(compare, shown->value, &statistics);
-  *p95 = fmax(*p95, statistics.p95);
-  *largest = fmax(*largest, statistics.max);
-  size_t used = 0;
-  if (supine_basis_get_info(basis)->has_volume) {
-    double gain = 0.0;
-    for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-      gain += supine_basis_lung_volume(basis, lung, shown->weights, shown->scales[lung]);
-    }
-    if (supine_basis_get_info(basis)->resting_volume != NULL) { /* what the lungs hold */
-      double held[SUPINE_LUNGS_MAX];
-      supine_options_volume_reference(basis, held);
-      for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-        gain += held[lung];
-      }
-    }
-    used = (size_t)snprintf(
-        shown->subtitle, sizeof shown->subtitle,
-        supine_basis_get_info(basis)->resting_volume != NULL ? "%.0f mL, " : "%+.0f mL, ", gain);
-  }
-  (void)snprintf(shown->subtitle + used, sizeof shown->subtitle - used, "mean %.1f, max %.1f mm",
-                 statistics.mean, statistics.max);
-}
+typedef supine_command_drawing request;
+typedef supine_command_drawn state;
 
 static int write_picture(const request *wanted, supine_renderer *renderer,
                          const supine_picture *picture) {
@@ -120,11 +36,6 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
   return supine_options_finish(name);
 }
 
-static void choose_size(const request *wanted, supine_picture *picture) {
-  picture->width = wanted->width != 0 ? wanted->width : 20 + 440 * picture->panel_count;
-  picture->height = wanted->height != 0 ? wanted->height : 120 + 480 * picture->view_count;
-}
-
 /* Draws and writes what states and colours were found for. */
 static int draw(const supine_basis *basis, const request *wanted, supine_renderer *renderer,
                 const supine_posture_list *postures, const char *reference, const state *states,
@@ -132,32 +43,12 @@ static int draw(const supine_basis *basis, const request *wanted, supine_rendere
   supine_panel panel[SUPINE_PANELS_MAX];
   char label[128];
   for (size_t i = 0; i < postures->count; ++i) {
-    panel[i] = (supine_panel){.title = postures->item[i].name,
-                              .subtitle = states[i].subtitle,
-                              .weights = states[i].weights,
-                              .scales = states[i].scales,
-                              .value = states[i].value,
-                              .marks = wanted->inside != NULL ? &states[i].marks.marks : NULL};
-    memcpy(panel[i].gravity, postures->item[i].gravity, sizeof panel[i].gravity);
+    panel[i] = supine_command_drawn_panel(wanted, &states[i], postures->item[i].name,
+                                          postures->item[i].gravity);
   }
-  (void)snprintf(label, sizeof label, "%s%s, mm",
-                 reference != NULL ? "difference from "
-                 : supine_basis_get_info(basis)->resting_volume != NULL
-                     ? "displacement from full inflation"
-                     : "displacement from rest",
-                 reference != NULL ? reference : "");
-  supine_picture picture = {
-      .panel = panel,
-      .panel_count = postures->count,
-      .view = wanted->view,
-      .view_count = wanted->view_count,
-      .heading = wanted->title,
-      .bar_label = label,
-      .colours = reference != NULL ? SUPINE_COLOURS_DIFFERENCE : SUPINE_COLOURS_DISPLACEMENT,
-      .largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(ends[0]),
-      .dark = wanted->theme == 1};
-  picture.beyond = ends[1] > picture.largest;
-  choose_size(wanted, &picture);
+  supine_picture picture =
+      supine_command_drawing_picture(basis, wanted, reference, ends, postures->count, label);
+  picture.panel = panel;
   return write_picture(wanted, renderer, &picture);
 }
 
@@ -166,9 +57,7 @@ static supine_status find_marks(const supine_basis *basis, const char *path, sta
                                 size_t count, const state *reference, supine_error *error) {
   supine_basis *inside = NULL;
   supine_command_names names = {0};
-  supine_status status = supine_basis_open(path, &inside, error);
-  status = status == SUPINE_OK ? supine_command_names_open(inside, &names, error) : status;
-  status = status == SUPINE_OK ? supine_command_inside_check(basis, inside, path, error) : status;
+  supine_status status = supine_command_inside_open(basis, path, &inside, &names, error);
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     status = supine_command_marks_make(inside, &names, states[i].weights, states[i].scales,
                                        reference != NULL ? reference->weights : NULL,
@@ -200,16 +89,16 @@ static int render(const supine_basis *basis, const request *wanted,
   for (size_t i = 0; i <= count && result == SUPINE_EXIT_OK; ++i) {
     states[i].value = values + i * n;
     if (i < count || reference != NULL) {
-      result = find_state(basis, compare, wanted, i < count ? &postures->item[i] : reference,
-                          states[i].value, &states[i]);
+      result = supine_command_drawn_find(basis, compare, wanted,
+                                         i < count ? &postures->item[i] : reference, &states[i]);
     }
   }
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
   for (size_t i = 0; i < count; ++i) {
-    find_value(basis, compare, reference != NULL ? &states[count] : NULL, &states[i], &ends[0],
-               &ends[1]);
+    supine_command_drawn_value(basis, compare, reference != NULL ? &states[count] : NULL,
+                               &states[i], ends);
   }
   if (wanted->inside != NULL &&
       find_marks(basis, wanted->inside, states, count, reference != NULL ? &states[count] : NULL,
@@ -294,17 +183,27 @@ static int read_colour(const char *command, const char *text, void *field) {
   return SUPINE_OPTION_MISFIT;
 }
 
+static int read_turn(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  return supine_command_read_turn(command, text, &wanted->turn);
+}
+
 static const char *const themes[] = {"light", "dark", NULL};
 
 static const supine_option table[] = {
     {"posture", 0, "LIST", "up to 8; --postures is the same", SUPINE_FILLS(request, postures),
      .alias = "postures"},
+    {"turn", 0, "FROM:TO:SECONDS",
+     "instead: an animation in which gravity turns from one posture to another at constant speed, "
+     "as supine:left:5s, rests there for a second, and begins again",
+     .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement in each posture instead: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .rivals = "breath"},
-    {"output", 'o', "FILE", ".png", SUPINE_FILLS(request, output), .required = true,
-     .file = SUPINE_FILE_OUT, .endings = ".png"},
+    {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
+     SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
+     .endings = ".png or .webp"},
     {"size", 0, "WxH", "pixels; default: as the postures and views want", .read = read_size,
      .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
@@ -321,6 +220,8 @@ static const supine_option table[] = {
      "what is inside, of 'supine embed' from the same basis, seen through the lungs: points and "
      "meshes by name, with how far they have moved",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
+    {"opacity", 0, "SHARE", "of the lungs, 0.05 to 1: whole; default 1, with --inside 0.35",
+     SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1"},
     {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
      .standard = "light"},
     {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title)},
@@ -330,10 +231,17 @@ static const supine_option table[] = {
 /* The options make sense together; then the postures are read. */
 static int check(const request *wanted, supine_posture_list *postures,
                  supine_posture_list *reference) {
-  if (wanted->postures == NULL) {
-    return supine_options_usage(name, "which posture? Give --posture supine, for example");
+  const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* the other: .png */
+  if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
+    return supine_options_usage(name, wanted->turns
+                                          ? "give --posture or --turn, not both"
+                                          : "which posture? Give --posture supine, for example");
   }
-  int result = supine_options_posture_list_parse(name, wanted->postures, postures);
+  if (wanted->turns != moving) {
+    return supine_options_usage(name, "--turn makes a .webp, postures a .png");
+  }
+  int result = wanted->turns ? SUPINE_EXIT_OK
+                             : supine_options_posture_list_parse(name, wanted->postures, postures);
   if (result == SUPINE_EXIT_OK && wanted->reference != NULL) {
     result = supine_options_posture_list_parse(name, wanted->reference, reference);
   }
@@ -367,15 +275,18 @@ static int run(void *chosen, const supine_arguments *given) {
   if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
-  result = render(basis, wanted, &postures, reference.count == 1 ? &reference.item[0] : NULL);
+  const supine_posture_item *from = reference.count == 1 ? &reference.item[0] : NULL;
+  result = wanted->turns ? supine_command_drawing_turn(basis, wanted, from)
+                         : render(basis, wanted, &postures, from);
   supine_basis_close(basis);
   return result;
 }
 
 const supine_command supine_command_render = {
     name,
-    "draw the lungs: postures side by side, as PNG",
-    .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]",
+    "draw the lungs: postures side by side, or a turn that plays",
+    .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
+             "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about =
         "Draws the lungs, off screen, in each posture side by side: coloured by displacement, "
         "with lines at the ticks of the colour bar and a ball that shows the body's axes (left, "
@@ -386,6 +297,7 @@ const supine_command supine_command_render = {
         "Examples:\n"
         "  supine render lungs.safetensors --posture supine,prone,left,right -o "
         "postures.png\n"
+        "  supine render lungs.safetensors --turn supine:left:5s -o turn.webp\n"
         "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone "
         "\\\n"
         "      -o inside.png\n"

@@ -57,3 +57,18 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
   (void)file;
   return refuse(error);
 }
+
+supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+                                         uint32_t *pixels, supine_error *error) {
+  (void)renderer;
+  (void)picture;
+  (void)pixels;
+  return refuse(error);
+}
+
+void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+                                  double (*extent)[4]) {
+  (void)renderer;
+  (void)picture;
+  (void)extent;
+}

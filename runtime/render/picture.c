@@ -30,7 +30,6 @@ static const theme themes[2] = {
      {0.94, 0.955, 0.97},
      {0.6, 0.655, 0.71}},
 };
-static const double seen_through = 0.35;            /* of lungs with something inside */
 static const double accent[3] = {0.91, 0.33, 0.17}; /* gravity */
 
 /* Where things go, in pixels. */
@@ -249,7 +248,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   if (status == SUPINE_OK) {
     cairo_surface_mark_dirty(image);
     cairo_set_source_surface(cr, image, floor(x), floor(y));
-    cairo_paint_with_alpha(cr, panel->marks != NULL ? seen_through : 1.0);
+    cairo_paint_with_alpha(cr, 1 - picture->transparency);
     if (panel->marks != NULL) {
       status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
                           &themes[picture->dark ? 1 : 0]);
@@ -352,6 +351,24 @@ static layout make_layout(const supine_picture *picture) {
   return at;
 }
 
+/* Widens an extent to what one view of a picture shows. */
+static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
+                  double extent[4]) {
+  for (size_t column = 0; column < picture->panel_count; ++column) {
+    const supine_scene scene = {.weights = picture->panel[column].weights,
+                                .scales = picture->panel[column].scales,
+                                .view = picture->view[row]};
+    supine_render_extent(renderer, &scene, extent);
+  }
+}
+
+void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+                                  double (*extent)[4]) {
+  for (size_t row = 0; row < picture->view_count; ++row) {
+    widen(renderer, picture, row, extent[row]);
+  }
+}
+
 static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                              supine_error *error) {
   const theme *look = &themes[picture->dark ? 1 : 0];
@@ -371,11 +388,10 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
   }
   for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
     double extent[4] = SUPINE_EXTENT_NONE;
-    for (size_t column = 0; column < picture->panel_count; ++column) {
-      const supine_scene scene = {.weights = picture->panel[column].weights,
-                                  .scales = picture->panel[column].scales,
-                                  .view = picture->view[row]};
-      supine_render_extent(renderer, &scene, extent);
+    if (picture->extent != NULL) {
+      memcpy(extent, picture->extent[row], sizeof extent);
+    } else {
+      widen(renderer, picture, row, extent);
     }
     for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
       status = cell(cr, renderer, picture, &at, &bar, column, row, extent, error);
@@ -389,32 +405,60 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
   return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
 }
 
+/* The picture on a surface, which the caller destroys; its pixels are cairo's or the caller's. */
+static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
+                             const supine_picture *picture, supine_error *error) {
+  supine_status status = SUPINE_ERROR_MEMORY;
+  cairo_t *cr = cairo_create(surface);
+  if (cairo_status(cr) == CAIRO_STATUS_SUCCESS) {
+    status = compose(cr, renderer, picture, error);
+    cairo_surface_flush(surface);
+  } else {
+    (void)supine_error_set(error, status, "out of memory");
+  }
+  cairo_destroy(cr);
+  return status;
+}
+
+static supine_status check_size(const supine_picture *picture, supine_error *error) {
+  enum { SIZE_MAX_CAIRO = 32767 };
+  return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "a picture has at most %d x %d pixels", SIZE_MAX_CAIRO,
+                                SIZE_MAX_CAIRO);
+}
+
+supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+                                         uint32_t *pixels, supine_error *error) {
+  supine_status status = check_size(picture, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *surface = cairo_image_surface_create_for_data(
+      (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
+      (int)(4 * picture->width));
+  status = draw_on(surface, renderer, picture, error);
+  cairo_surface_destroy(surface);
+  return status;
+}
+
 supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
                                           FILE *file, supine_error *error) {
-  enum { SIZE_MAX_CAIRO = 32767 };
-  if (picture->width > SIZE_MAX_CAIRO || picture->height > SIZE_MAX_CAIRO) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a picture has at most %d x %d pixels",
-                            SIZE_MAX_CAIRO, SIZE_MAX_CAIRO);
+  supine_status status = check_size(picture, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  supine_status status = SUPINE_OK;
   cairo_surface_t *surface =
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  cairo_t *cr = cairo_create(surface);
-  if (cairo_status(cr) != CAIRO_STATUS_SUCCESS) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
-  }
-  status = compose(cr, renderer, picture, error);
+  status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
-    cairo_surface_flush(surface);
     const cairo_status_t written = cairo_surface_write_to_png_stream(surface, to_file, file);
     if (written != CAIRO_STATUS_SUCCESS) {
       status =
           supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s", cairo_status_to_string(written));
     }
   }
-cleanup:
-  cairo_destroy(cr);
   cairo_surface_destroy(surface);
   return status;
 }

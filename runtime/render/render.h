@@ -118,7 +118,7 @@ typedef struct supine_panel {
   const double *weights;
   const double *scales;
   const float *value;
-  const supine_marks *marks; /**< drawn over the lungs, which are then seen through; or NULL */
+  const supine_marks *marks; /**< drawn over the lungs; or NULL */
 } supine_panel;
 
 enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 7 };
@@ -131,7 +131,9 @@ typedef struct supine_picture {
   size_t view_count;   /**< 1 to SUPINE_VIEWS_MAX */
   const char *heading; /**< or NULL */
   const char *bar_label;
-  double largest; /**< mm at the end of the colours */
+  double largest;            /**< mm at the end of the colours */
+  double transparency;       /**< of the lungs: 0 whole, 1 unseen */
+  const double (*extent)[4]; /**< [view_count] supine_render_picture_extent; NULL: its own */
   supine_colours colours;
   bool beyond; /**< some values are larger: the bar ends in a point */
   bool dark;
@@ -143,10 +145,43 @@ double supine_render_bar_step(double value);
 /** The end of a bar whose values reach `value` in the main: rounded up to a tick. */
 double supine_render_bar_end(double value);
 
+/** Widens an extent for each view, as supine_render_extent, to what a picture shows, so that
+ * several pictures can be drawn to one scale.
+ * @param extent  [view_count] */
+void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+                                  double (*extent)[4]);
+
+/** Composes a picture.
+ * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; written
+ * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
+ * @retval those of supine_render_draw */
+supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+                                         uint32_t *pixels, supine_error *error);
+
 /** Composes a picture and writes it as PNG.
  * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
  * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
 supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
                                           FILE *file, supine_error *error);
+
+/** Pictures after each other, for a WebP file that plays over and over. */
+typedef struct supine_animation supine_animation;
+
+/** @retval SUPINE_ERROR_ARGUMENT     larger than WebP's 16383 pixels a side
+ * @retval SUPINE_ERROR_UNSUPPORTED  no libwebp in the build
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_render_animation_open(size_t width, size_t height,
+                                           supine_animation **animation, supine_error *error);
+/** Adds a picture of that size, which is seen for so long.
+ * @retval SUPINE_ERROR_MEMORY, and those of supine_render_picture_draw */
+supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
+                                          const supine_picture *picture, int milliseconds,
+                                          supine_error *error);
+/** Writes all of it.
+ * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
+                                            supine_error *error);
+/** Releases it; NULL is legal. */
+void supine_render_animation_close(supine_animation *animation);
 
 #endif
