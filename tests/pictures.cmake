@@ -8,6 +8,11 @@ if(TARGET PkgConfig::RENDER)
   target_link_libraries(test_pictures_command PRIVATE PkgConfig::RENDER)
   target_compile_definitions(test_pictures_command PRIVATE SUPINE_TEST_CAIRO)
 endif()
+if(TARGET PkgConfig::WEBP)
+  pkg_check_modules(WEBPDEMUX IMPORTED_TARGET libwebpdemux)
+  target_link_libraries(test_pictures_command PRIVATE PkgConfig::WEBPDEMUX)
+  target_compile_definitions(test_pictures_command PRIVATE SUPINE_TEST_WEBP)
+endif()
 # Sanitizer builds: what fontconfig keeps is no leak of ours.
 set_tests_properties(pictures_command PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")

@@ -18,6 +18,9 @@
 #ifdef SUPINE_TEST_CAIRO
 #include <cairo.h>
 #endif
+#ifdef SUPINE_TEST_WEBP
+#include <webp/demux.h>
+#endif
 
 #include <supine/status.h>
 
@@ -241,8 +244,9 @@ static void test_compare_csv_has_six_fields_a_row(void **state) {
     assert_int_equal(count_words(line, ","), 5);
     ++rows;
   }
-  /* A heading; for each posture gravity, scale, 4 statistics, 2 lungs twice, 4 numbers of 10 slabs; 3 pairs;
-   * 3 energies; 3 directions found and their 3 distances; directions, area, vertices, inflation. */
+  /* A heading; for each posture gravity, scale, 4 statistics, 2 lungs twice, 4 numbers of 10 slabs;
+   * 3 pairs; 3 energies; 3 directions found and their 3 distances; directions, area, vertices,
+   * inflation. */
   assert_int_equal(rows, 1 + 3 * (3 + 1 + 4 + 4 + 40) + 3 * 4 + 3 + (9 + 3) + 4);
   free(text);
 }
@@ -389,6 +393,13 @@ static void test_render_misuse_is_a_usage_error(void **state) {
       "render lungs.safetensors --posture left,left,left,left,left,left,left,left,left -o a.png");
   EXPECT(1, "not both", "render lungs.safetensors --posture left --volume 5 --scale 5 -o a.png");
   EXPECT(2, "nothere", "render nothere.safetensors --posture left -o a.png");
+  EXPECT(1, ".webp", "render lungs.safetensors --posture left -o a.webp");
+  EXPECT(1, ".webp", "render lungs.safetensors --turn supine:left:1s -o a.png");
+  EXPECT(1, "not both", "render lungs.safetensors --turn supine:left:1s --posture left -o a.webp");
+  EXPECT(1, "FROM:TO:SECONDS", "render lungs.safetensors --turn supine:left -o a.webp");
+  EXPECT(1, "above 0 s", "render lungs.safetensors --turn supine:left:0s -o a.webp");
+  EXPECT(1, "frames", "render lungs.safetensors --turn supine:left:1e9s -o a.webp");
+  EXPECT(1, "0.05 to 1", "render lungs.safetensors --posture left --opacity 0 -o a.png");
   EXPECT(0, "Usage", "render --help");
   assert_int_equal(count_files("a.png"), 0);
 }
@@ -406,7 +417,7 @@ static bool render(const char *format, ...) {
     print_message("skipped: %s", printed);
     return false;
   }
-  expect(0, ".png", code);
+  expect(0, " pixels", code);
   return true;
 }
 
@@ -454,6 +465,116 @@ static void test_render_agrees_with_golden_picture(void **state) {
   print_message("golden picture: %.3f apart, prone %.3f, of 255\n", same, other);
   assert_true(same < tolerance);
   assert_true(other > 2 * tolerance);
+}
+#endif
+
+#ifdef SUPINE_TEST_CAIRO
+/* Light through the lungs is a share of what is behind: whole, half and a quarter lie on a line. */
+static void test_render_opacity_is_the_lungs_share(void **state) {
+  (void)state;
+  static const char *const shares[3] = {"1", "0.5", "0.25"};
+  static const int rounding = 5; /* of 255: three numbers, weighted 1, 3 and 2, rounded twice */
+  cairo_surface_t *image[3];
+  int most = 0;
+  for (int i = 0; i < 3; ++i) {
+    char path[256];
+    if (!render("lungs.safetensors --posture supine --size 240x180 --opacity %s -o share.png",
+                shares[i])) {
+      skip();
+    }
+    (void)snprintf(path, sizeof path, "%s/share.png", folder);
+    image[i] = cairo_image_surface_create_from_png(path);
+    assert_int_equal(cairo_surface_status(image[i]), CAIRO_STATUS_SUCCESS);
+  }
+  for (int y = 0; y < 180; ++y) {
+    const unsigned char *row[3];
+    for (int i = 0; i < 3; ++i) {
+      row[i] = cairo_image_surface_get_data(image[i]) +
+               (ptrdiff_t)y * cairo_image_surface_get_stride(image[i]);
+    }
+    for (int x = 0; x < 4 * 240; ++x) {
+      if (x % 4 != 3) {
+        assert_true(abs((row[0][x] - row[1][x]) - 2 * (row[1][x] - row[2][x])) <= rounding);
+        most = row[1][x] - row[0][x] > most ? row[1][x] - row[0][x] : most;
+      }
+    }
+  }
+  assert_true(most > 40); /* half of white less violet */
+  for (int i = 0; i < 3; ++i) {
+    cairo_surface_destroy(image[i]);
+  }
+}
+#endif
+
+#ifdef SUPINE_TEST_WEBP
+/* Frame `wanted` of an animation, RGBA (malloc); what it says of itself. */
+static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
+  size_t size = 0;
+  char *bytes = read_file(name, &size);
+  const WebPData data = {(const unsigned char *)bytes, size};
+  WebPAnimDecoder *decoder = WebPAnimDecoderNew(&data, NULL);
+  assert_non_null(decoder);
+  assert_true(WebPAnimDecoderGetInfo(decoder, info));
+  const size_t area = (size_t)info->canvas_width * info->canvas_height;
+  unsigned char *copy = malloc(4 * area);
+  unsigned char *frame = NULL;
+  assert_non_null(copy);
+  for (unsigned i = 0; i <= wanted; ++i) {
+    assert_true(WebPAnimDecoderGetNext(decoder, &frame, time));
+  }
+  memcpy(copy, frame, 4 * area);
+  WebPAnimDecoderDelete(decoder);
+  free(bytes);
+  return copy;
+}
+
+/* The mean difference of two frames, of 255. */
+static double frame_difference(const unsigned char *a, const unsigned char *b, size_t area) {
+  double sum = 0;
+  for (size_t i = 0; i < 4 * area; ++i) {
+    sum += i % 4 == 3 ? 0 : abs((int)a[i] - (int)b[i]);
+  }
+  return sum / (3.0 * (double)area);
+}
+
+/* Every frame is another; the last rests; there and back again begin and end alike. */
+static void test_render_turn_plays_from_posture_to_posture(void **state) {
+  (void)state;
+  enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
+  static const double loss = 2.5; /* of 255, by the codec and the words about degrees */
+  WebPAnimInfo info;
+  int time = 0;
+  if (!render("lungs.safetensors --turn supine:left:0.4s --size 240x180 -o there.webp")) {
+    skip();
+  }
+  assert_true(render("lungs.safetensors --turn left:supine:0.4s --size 240x180 -o back.webp"));
+  unsigned char *frame[FRAMES];
+  for (unsigned i = 0; i < FRAMES; ++i) {
+    frame[i] = read_frame("there.webp", i, &info, &time);
+    assert_int_equal(time, i + 1 < FRAMES ? 66 * ((int)i + 1) : 66 * (FRAMES - 1) + 1000);
+    assert_true(i == 0 || frame_difference(frame[i - 1], frame[i], WIDTH * HEIGHT) > 0.1);
+  }
+  assert_int_equal(info.canvas_width, WIDTH);
+  assert_int_equal(info.canvas_height, HEIGHT);
+  assert_int_equal(info.frame_count, FRAMES);
+  assert_int_equal(info.loop_count, 0); /* for ever */
+  unsigned char *first = read_frame("back.webp", 0, &info, &time);
+  unsigned char *last = read_frame("back.webp", FRAMES - 1, &info, &time);
+  assert_true(frame_difference(frame[0], last, WIDTH * HEIGHT) < loss);
+  assert_true(frame_difference(frame[FRAMES - 1], first, WIDTH * HEIGHT) < loss);
+  assert_true(frame_difference(frame[0], first, WIDTH * HEIGHT) > 2 * loss);
+  for (unsigned i = 0; i < FRAMES; ++i) {
+    free(frame[i]);
+  }
+  free(first);
+  free(last);
+  EXPECT(1, "at most 16383",
+         "render lungs.safetensors --turn supine:left:1s --size 16384x200 -o "
+         "wide.webp");
+  EXPECT(4, "cannot write", "render lungs.safetensors --turn supine:left:1s -o nowhere/a.webp");
+  EXPECT(2, "nothere",
+         "render lungs.safetensors --turn supine:left:1s -o a.webp --inside "
+         "nothere.safetensors");
 }
 #endif
 
@@ -515,6 +636,10 @@ int main(void) {
       cmocka_unit_test(test_render_misuse_is_a_usage_error),
 #ifdef SUPINE_TEST_CAIRO
       cmocka_unit_test(test_render_agrees_with_golden_picture),
+      cmocka_unit_test(test_render_opacity_is_the_lungs_share),
+#endif
+#ifdef SUPINE_TEST_WEBP
+      cmocka_unit_test(test_render_turn_plays_from_posture_to_posture),
 #endif
       cmocka_unit_test(test_render_options_change_the_picture),
       cmocka_unit_test(test_render_many_postures_and_open_surfaces_work),

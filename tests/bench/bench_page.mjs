@@ -49,12 +49,15 @@ const found = await page.evaluate(() => {
     turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
-  for (let i = 0; i < 300; ++i) { // as a page that has run for some seconds, the patient turning
-    tilt += 1;
-    state.settle(state.standing.q, tilt % 60, 0);
+  const some = 20; // frames at once: browsers' clocks tick in tenths of a millisecond
+  for (let i = 0; i < 60; ++i) { // as a page that has run for some seconds, the patient turning
     const begin = performance.now();
-    frameScript();
-    times.script = Math.min(times.script, performance.now() - begin);
+    for (let j = 0; j < some; ++j) {
+      tilt += 1;
+      state.settle(state.standing.q, tilt % 60, 0);
+      frameScript();
+    }
+    times.script = Math.min(times.script, (performance.now() - begin) / some);
   }
   const end = performance.now() + 30000;
   for (let round = 0; round < 5 || (round < 30 && performance.now() < end); ++round) {
