@@ -7,3 +7,6 @@ target_sources(test_cohort_law PRIVATE cohort.c)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_command.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(patient_command PROPERTIES TIMEOUT 900)
+add_test(NAME patient_refused COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_refused.sh
+  $<TARGET_FILE:supine>)
+set_tests_properties(patient_refused PROPERTIES TIMEOUT 900)

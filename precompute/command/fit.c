@@ -93,8 +93,7 @@ static const supine_option table[] = {
     {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
     {"law", 0, "LAW",
      "paper: c1 to c6 and the force of the published law; affine: one affine map; quadratic: one "
-     "of "
-     "second degree for each lung. Default: what leaves least of points that it has not seen",
+     "of second degree for each lung. Default: what leaves least of points that it has not seen",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
     {"name", 0, "TEXT", "whose lungs these are; default: the landmarks' file", FILLS(name)},
     {"gain", 0, "G",
@@ -103,8 +102,9 @@ static const supine_option table[] = {
      FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
     {"state", 0, "POSTURE[:VOLUME]:FILE",
      "a further state from the same rest, its surface or its landmarks (.csv); may be repeated, up "
-     "to 8. In another posture than the fitted state it tells the gain. Without another state to "
-     "fit to, the first is that",
+     "to 8. In another posture than the fitted state it tells the gain, in the same one how far "
+     "that breath went; the law's other constants are the fitted state's. Without another state "
+     "to fit to, the first is that",
      .read = read_state, .alias = "third",
      .wants = "(at most 8) a posture, perhaps :full, :rest or :ML, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
@@ -544,12 +544,13 @@ const supine_command supine_command_fit = {
         "the motion of points that it has not seen each law explains. 'supine precompute "
         "--patient' makes a basis of what is kept.",
     .options = table,
-    .notes = "Example:\n"
-             "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
-             "--other supine:full -o patient.json\n"
-             "  supine fit rest.ply --state supine:full:full.ply --state prone:rest:prone.ply \\\n"
-             "      --landmarks pairs.csv -o patient.json\n"
-             "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
+    .notes =
+        "Example:\n"
+        "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
+        "--other supine:full -o patient.json\n"
+        "  supine fit rest.ply full.ply --other supine:full --landmarks pairs.csv -o patient.json\n"
+        "  supine fit rest.ply full.ply --state prone:rest:prone.ply -o patient.json\n"
+        "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
     .operands_most = 2 + SUPINE_PATIENT_OTHERS_MAX,
     .operands_missing = "one surface at rest and some in other states",

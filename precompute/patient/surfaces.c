@@ -19,6 +19,8 @@ static const double same_state = 0.02;   /* mm RMS */
 static const double overlap_least = 0.5; /* of the smaller box, along each axis */
 static const double size_most = 1.6;
 static const double matched_least = 0.3;
+static const double nearer_least =
+    0.6; /* of the distance as given: so near and reversed is no chance */
 static const double round_tolerance = 1e-4;
 /* mm^2 for each row, of polynomials while points are still being found: they would slide. */
 static const double sliding_ridge = 0.01;
@@ -212,6 +214,49 @@ static supine_status start_all(matching *m, const supine_patient_surface_task *t
   return status;
 }
 
+/* How far rest is from the state, box laid on box, some axes reversed; mm RMS to nearest points. */
+static double laid_distance(const matching *m, const boxes *b, const bool reversed[3]) {
+  double square = 0.0;
+  for (size_t i = 0; i < m->count; ++i) {
+    double at[3];
+    for (size_t k = 0; k < 3; ++k) {
+      const double t = (m->rest->mesh.vertices[3 * m->vertex[i] + k] - b->low[0][k]) /
+                       (b->high[0][k] - b->low[0][k]);
+      at[k] = b->low[1][k] + (reversed[k] ? 1.0 - t : t) * (b->high[1][k] - b->low[1][k]);
+    }
+    const supine_inside_place place = supine_inside_surface_find(m->tree, at, NULL);
+    for (size_t k = 0; k < 3; ++k) {
+      square += pow(place.nearest[k] - at[k], 2.0) / (double)m->count;
+    }
+  }
+  return sqrt(square);
+}
+
+/* Refuses lungs that are the same but for the sign of axes: RAS beside LPS, a mirror image. */
+static supine_status check_axes(const matching *m, const boxes *b, supine_error *error) {
+  static const struct {
+    const char *name;
+    bool reversed[3];
+  } ways[] = {{"x", {true, false, false}},
+              {"y", {false, true, false}},
+              {"z", {false, false, true}},
+              {"x and y", {true, true, false}}}; /* the last is RAS beside LPS */
+  const double given = laid_distance(m, b, (const bool[3]){false, false, false});
+  double least = given;
+  size_t nearest = 0;
+  for (size_t k = 0; k < sizeof ways / sizeof *ways; ++k) {
+    const double other = laid_distance(m, b, ways[k].reversed);
+    nearest = other < least ? k : nearest;
+    least = fmin(other, least);
+  }
+  return least >= nearer_least * given
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "the other surface is %.1f mm from the one at rest, box on box, "
+                                "and %.1f mm with %s reversed: are both in the same axes (--axes)?",
+                                given, least, ways[nearest].name);
+}
+
 /* How far the surfaces are apart at rest; nothing to fit where they are not. */
 static supine_status look_at_rest(matching *m, supine_patient_surface_report *report,
                                   supine_error *error) {
@@ -300,6 +345,9 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
       supine_patient_matching_append(&m, task->landmarks);
     }
     status = look_at_rest(&m, &fit->surface, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_axes(&m, &b, error);
   }
   if (status == SUPINE_OK) {
     status = start_all(&m, task, &b, &e, &fit->surface, error);

@@ -1,0 +1,131 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What 'supine fit' refuses, with what words and which exit code: test_patient_refused.sh PROGRAM
+#
+# Scans in different frames, units or sides, without overlap, mirrored, shuffled, twice the same, too
+# few, NaN: as landmarks, and as surfaces.
+set -u
+supine=$1
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+refused() { # CODE WORDS ARGUMENTS of fit
+  code=$1
+  words=$2
+  shift 2
+  "$supine" fit "$@" -o law.json >out 2>&1
+  got=$?
+  [ $got -eq "$code" ] || fail "exit code $got, not $code, of fit $*: $(cat out)"
+  grep -q -- "$words" out || fail "'$words' is not in: $(cat out)"
+  [ ! -e law.json ] || fail "fit $* left a file"
+}
+
+# Landmarks: sixty points over two lungs, moved as a breath would.
+awk 'BEGIN {
+  srand(11)
+  print "x,y,z,to_x,to_y,to_z"
+  for (i = 0; i < 60; ++i) {
+    side = i % 2 ? 1 : -1
+    X = rand(); Y = rand(); Z = rand()
+    x = side * (15 + 100 * X); y = -10 - 140 * Y; z = 40 - 230 * Z
+    printf "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n", x, y, z, x + side * 6 * X * X, y - 9 * Y, z - 20 * Z
+  }
+}' >good.csv
+"$supine" fit --landmarks good.csv -o good.json >/dev/null || fail "good landmarks"
+changed() { # WHAT AWK: good.csv with each row changed
+  awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
+}
+changed apart '$4 += 150; $5 += 150; $6 += 150'
+refused 2 'mm apart: different frames? --translation' --landmarks apart.csv
+"$supine" fit --landmarks apart.csv --translation >/dev/null || fail "--translation does not help"
+changed beyond '$6 += 5000'
+refused 2 'mm apart: different frames?' --landmarks beyond.csv
+changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
+refused 2 'in cm; landmarks are in mm' --landmarks centimetres.csv
+changed both '$1 /= 10; $2 /= 10; $3 /= 10; $4 /= 10; $5 /= 10; $6 /= 10'
+refused 2 'in cm; landmarks are in mm' --landmarks both.csv
+changed inches '$4 *= 2.54; $5 *= 2.54; $6 *= 2.54'
+refused 2 'times as large as rest: are both in mm' --landmarks inches.csv --translation
+changed sides '$4 = -$4'
+refused 2 'mirror image of the other' --landmarks sides.csv
+changed ras '$4 = -$4; $5 = -$5'
+refused 2 'they are in different axes' --landmarks ras.csv --translation
+changed same '$4 = $1; $5 = $2; $6 = $3'
+refused 2 'the same as rest' --landmarks same.csv
+changed shifted '$4 = $1; $5 = $2; $6 = $3 + 5'
+refused 2 'there is nothing to fit' --landmarks shifted.csv --translation
+changed flat '$2 = 17 + 0.3 * $1; $5 = $2 - 3'
+refused 2 'of one plane' --landmarks flat.csv
+awk -F, -v OFS=, 'NR == 1 { print; next } { from[NR] = $1 OFS $2 OFS $3; to[NR] = $4 OFS $5 OFS $6 }
+  END { for (i = 2; i <= NR; ++i) { print from[i], to[2 + (7 * i) % (NR - 1)] } }' good.csv >shuffled.csv
+refused 2 'in the same order' --landmarks shuffled.csv
+sed '20s/,[^,]*$/,nan/' good.csv >nan.csv
+refused 2 'nan.csv:20: to_z "nan" is not a finite number' --landmarks nan.csv
+sed '30s/.*/1,2,3,4,5/' good.csv >short.csv
+refused 2 'short.csv:30' --landmarks short.csv
+{ cat good.csv; sed -n 9p good.csv; } >twice.csv
+refused 2 'lines 9 and 62 both give the point' --landmarks twice.csv
+head -12 good.csv >eleven.csv
+refused 2 '11 pairs of points determine no law: give at least 12' --landmarks eleven.csv
+head -50 good.csv >few.csv
+refused 2 '49 points are fewer than the 60 unknowns of the quadratic law' --landmarks few.csv --law quadratic
+head -1 good.csv >none.csv
+refused 2 'no pairs of points' --landmarks none.csv
+sed '1s/,to_z//' good.csv >header.csv
+refused 2 'no column "to_z"' --landmarks header.csv
+refused 2 'No such file' --landmarks absent.csv
+refused 1 'what to fit to' --name nobody
+refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
+
+# Surfaces: a made lung of each side, and what breathing makes of it.
+"$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail phantom
+half() { # NAME FIRST|SECOND: one lung of the pair
+  awk -v second="$2" '/^v / { v[++n] = $0 } /^f / { f[++m] = $0 }
+    END {
+      for (i = 1; i <= n / 2; ++i) { print v[second * n / 2 + i] }
+      for (i = 1; i <= m / 2; ++i) {
+        split(f[second * m / 2 + i], c, " ")
+        print "f", c[2] - second * n / 2, c[3] - second * n / 2, c[4] - second * n / 2
+      }
+    }' pair.obj >"$1.obj"
+}
+half rest 0
+half other 1
+moved() { # NAME AWK: the lung with its vertices changed
+  awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" rest.obj >"$1.obj"
+}
+moved state 'y *= 1.05; z *= 1.08'
+"$supine" fit rest.obj state.obj -o good.json >/dev/null || fail "good surfaces"
+refused 2 'the same as the one at rest' rest.obj rest.obj
+moved far 'z += 400'
+refused 2 'do not overlap along z' rest.obj far.obj
+refused 2 'do not overlap along x' rest.obj other.obj
+moved cm 'x /= 10; y /= 10; z /= 10'
+refused 2 'different units' rest.obj cm.obj
+refused 2 'different units' cm.obj rest.obj
+moved turned 'x = -x; y = -y'
+refused 2 'do not overlap along' rest.obj turned.obj
+moved left 'x = -x'
+refused 2 'do not overlap along x' rest.obj left.obj
+changed_pair() { # NAME AWK: both lungs with their vertices changed
+  awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" pair.obj >"$1.obj"
+}
+changed_pair breath 'y *= 1.05; z *= 1.08'
+"$supine" fit pair.obj breath.obj -o good.json >/dev/null || fail "a good pair"
+changed_pair mirrored 'x = -x; y *= 1.05; z *= 1.08'
+refused 2 'mm with x reversed' pair.obj mirrored.obj
+changed_pair ras 'x = -x; y = (-310 - y) * 1.05; z *= 1.08'
+refused 2 'mm with x and y reversed: are both in the same axes' pair.obj ras.obj
+sed '5s/[-0-9.e]*$/nan/' state.obj >broken.obj
+refused 2 'broken.obj' rest.obj broken.obj
+refused 2 'No such file' rest.obj absent.obj
+refused 2 'give each lung once' rest.obj,rest.obj state.obj
+refused 1 'two lungs at most' rest.obj,other.obj,state.obj state.obj
+refused 1 'name the one at rest as well' --state prone:state.obj
+refused 2 'find a further state' rest.obj state.obj --state prone:far.obj
+refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj
+echo passed
