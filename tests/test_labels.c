@@ -10,6 +10,7 @@
 
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
+#include "mesh/labels/shapes.h"
 #include "precompute/inside/surface.h"
 #include "precompute/phantom/phantom.h"
 
@@ -565,6 +566,84 @@ static void refused(const char *name, const supine_labels_options *options, supi
   assert_null(out.surface[1].vertices);
 }
 
+/* A ball in two pieces and a tube, in voxels that are no cubes, each with its surface. */
+static void test_labels_shapes_of_any_label(void **state) {
+  (void)state;
+  supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
+  static const double spacing[3] = {0.8, 0.9, 1.3};
+  image.values = calloc(voxels(&image), sizeof(uint16_t));
+  uint16_t *at = image.values;
+  for (int a = 0; a < 3; ++a) {
+    image.origin[a] = 31.7 - 40.3 * a;
+    image.step[a][a] = a == 1 ? -spacing[a] : spacing[a]; /* left-handed */
+  }
+  for (size_t i = 0; i < voxels(&image); ++i) {
+    const double p[3] = {spacing[0] * (double)(i % 60), spacing[1] * (double)(i / 60 % 50),
+                         spacing[2] * (double)(i / 3000)};
+    const double ball = hypot(hypot(p[0] - 12.0, p[1] - 20.0), p[2] - 20.0);
+    const double other = hypot(hypot(p[0] - 12.0, p[1] - 36.0), p[2] - 36.0);
+    const double tube = hypot(p[0] - 36.0, p[1] - 20.0);
+    at[i] = ball < 8.0 || other < 4.0 ? 700 : tube < 5.0 && tube > 2.5 ? 9 : 0;
+  }
+  const char *path = in_folder("shapes.nii.gz");
+  supine_labels_shape *shapes = NULL;
+  supine_error error = {0};
+  size_t count = 0;
+  assert_int_equal(supine_image_write(path, &image, NULL, &error), SUPINE_OK);
+  if (supine_labels_shapes(path, NULL, 0, &shapes, &count, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(count, 2);
+  assert_true(shapes[0].label == 9 && shapes[1].label == 700);
+  for (size_t s = 0; s < 2; ++s) {
+    size_t wanted = 0;
+    supine_topology topology = {0};
+    for (size_t i = 0; i < voxels(&image); ++i) {
+      wanted += at[i] == shapes[s].label;
+    }
+    const double ml = 1e-3 * 0.8 * 0.9 * 1.3 * (double)wanted;
+    const double surface = 1e-3 * supine_mesh_volume(&shapes[s].surface);
+    printf("label %u: %.4f mL, surface %.4f mL, within %.2f mm\n", shapes[s].label, ml, surface,
+           shapes[s].farthest);
+    assert_true(fabs(shapes[s].mask - ml) < 1e-6 * ml);
+    assert_true(fabs(surface - ml) < 0.06 * ml);
+    assert_true(shapes[s].farthest <= 0.5 * 1.3);
+    assert_int_equal(supine_mesh_topology_create(&shapes[s].surface, &topology), SUPINE_OK);
+    assert_true(topology.closed);
+    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* every piece is kept */
+    supine_mesh_topology_free(&topology);
+  }
+  double low[3];
+  double high[3];
+  supine_mesh_box(&shapes[1].surface, low, high); /* where the header has it */
+  assert_true(fabs(low[0] - (31.7 + 4.0)) < 0.65 && fabs(high[0] - (31.7 + 20.0)) < 0.65);
+  assert_true(fabs(high[1] - (31.7 - 40.3 - 12.0)) < 0.65);
+  supine_labels_shapes_free(shapes, count);
+  const unsigned chosen[] = {700, 9};
+  assert_int_equal(supine_labels_shapes(path, chosen, 2, &shapes, &count, &error), SUPINE_OK);
+  assert_true(count == 2 && shapes[0].label == 700);
+  supine_labels_shapes_free(shapes, count);
+  static const unsigned absent[] = {9, 8, 0, 70000};
+  for (size_t i = 1; i < 4; ++i) {
+    assert_int_equal(supine_labels_shapes(path, &absent[i], 1, &shapes, &count, &error),
+                     SUPINE_ERROR_MESH);
+    assert_non_null(strstr(error.message, "no voxel holds the label"));
+  }
+  memset(at, 0, voxels(&image) * sizeof *at);
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_labels_shapes(path, NULL, 0, &shapes, &count, &error), SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "all voxels hold 0"));
+  for (size_t i = 0; i < voxels(&image); ++i) {
+    at[i] = (uint16_t)(i % 400);
+  }
+  assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_labels_shapes(path, NULL, 0, &shapes, &count, &error), SUPINE_ERROR_MESH);
+  assert_non_null(strstr(error.message, "more than 256 labels"));
+  assert_int_equal(supine_labels_shapes(in_folder("absent.nrrd"), NULL, 0, &shapes, &count, &error),
+                   SUPINE_ERROR_READ);
+  supine_image_free(&image);
+}
+
 static void test_labels_bad_maps_refused(void **state) {
   (void)state;
   const supine_labels_options plain = {.edge = 5.0};
@@ -736,6 +815,7 @@ int main(void) {
       cmocka_unit_test(test_labels_cut_at_the_border_counted),
       cmocka_unit_test(test_labels_farthest_is_true),
       cmocka_unit_test(test_labels_noise_closed_manifold),
+      cmocka_unit_test(test_labels_shapes_of_any_label),
       cmocka_unit_test(test_labels_bad_maps_refused),
       cmocka_unit_test(test_labels_voxels_that_are_none_refused),
       cmocka_unit_test(test_labels_damaged_files_refused),

@@ -151,7 +151,7 @@ static supine_status one_piece(labels_cubes *cubes) {
   return status;
 }
 
-supine_status supine_labels_cubes_create(const labels_mask *mask, double edge,
+supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          labels_cubes *cubes) {
   const size_t *n = mask->size;
   labels_cubes made = {.share = NULL};
@@ -177,7 +177,7 @@ supine_status supine_labels_cubes_create(const labels_mask *mask, double edge,
   free(rows);
   free(planes);
   for (bool mended = true; mended && status == SUPINE_OK;) {
-    status = one_piece(&made);
+    status = one ? one_piece(&made) : SUPINE_OK;
     mended = status == SUPINE_OK && mend(m, made.share);
   }
   if (status != SUPINE_OK) {

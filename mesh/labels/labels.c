@@ -251,35 +251,6 @@ static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
   return status;
 }
 
-/* The net of one lung's cubes, smoothed and held to the mask, as a mesh. */
-static supine_status extract_surface(const work *w, const labels_mask *mask,
-                                     supine_labels_lung *lung, supine_mesh *mesh) {
-  labels_cubes cubes = {.share = NULL};
-  labels_net net = {0};
-  double(*before)[3] = NULL;
-  supine_status status = supine_labels_cubes_create(mask, w->edge, &cubes);
-  status = status == SUPINE_OK ? supine_labels_net_create(&cubes, &net) : status;
-  if (status == SUPINE_OK) {
-    before = malloc((net.count + 1) * sizeof *before);
-    status = before == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  }
-  if (status == SUPINE_OK && net.count > 0) {
-    memcpy(before, net.at, net.count * sizeof *before);
-    status = supine_labels_net_relax(&net);
-  }
-  if (status == SUPINE_OK) {
-    lung->held =
-        0.5 * fmax(w->edge, fmax(mask->spacing[0], fmax(mask->spacing[1], mask->spacing[2])));
-    lung->farthest =
-        supine_labels_net_hold(&net, (const double(*)[3])before, &cubes, mask, lung->held);
-    status = supine_labels_net_mesh(&net, &cubes, mask, mesh);
-  }
-  free(before);
-  supine_labels_net_free(&net);
-  supine_labels_cubes_free(&cubes);
-  return status;
-}
-
 static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
                                supine_error *error) {
   labels_mask mask;
@@ -311,7 +282,9 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
       return status;
     }
   }
-  status = status == SUPINE_OK ? extract_surface(w, &mask, lung, mesh) : status;
+  status = status == SUPINE_OK ? supine_labels_mask_surface(&mask, w->edge, true, &lung->held,
+                                                            &lung->farthest, mesh)
+                               : status;
   supine_labels_mask_free(&mask);
   supine_topology topology = {0};
   status = status == SUPINE_OK && mesh->triangle_count > 0

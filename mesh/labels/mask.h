@@ -107,7 +107,9 @@ typedef struct labels_cubes {
   float *share;     /**< [size], 0 to 1; a layer of 0 around it all */
 } labels_cubes;
 
-supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, labels_cubes *cubes);
+/** @param one  keeps the largest piece, without cavities */
+supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
+                                         labels_cubes *cubes);
 void supine_labels_cubes_free(labels_cubes *cubes);
 
 /* ---- net.c, relax.c ---- */
@@ -135,6 +137,13 @@ double supine_labels_net_hold(labels_net *net, const double (*before)[3], const 
 /** Triangles, in mm. */
 supine_status supine_labels_net_mesh(const labels_net *net, const labels_cubes *cubes,
                                      const labels_mask *mask, supine_mesh *mesh);
+
+/* ---- surface.c ---- */
+
+/** The net of a mask's cubes, of `one` piece or of all, smoothed and held to it within `held` mm,
+ * which is half a voxel; the farthest vertex is so many mm from it. */
+supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
+                                         double *held, double *farthest, supine_mesh *mesh);
 
 /* ---- anatomy.c ---- */
 

@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "mesh/image/image.h"
+#include "mesh/labels/shapes.h"
 #include "precompute/inside/embed.h"
 #include "precompute/inside/grid.h"
 
@@ -15,8 +16,19 @@ static const char name[] = "embed";
 /* Room around the lungs in which 'supine deform' lets a field fade out, mm. */
 static const double margin = 60.0;
 
+enum { LABELS_MOST = 64 };
+
+/* Labels by number; a name of NULL: "label 7". */
+typedef struct label_list {
+  bool given;
+  size_t count; /* 0: all */
+  unsigned label[LABELS_MOST];
+  char name[LABELS_MOST][32];
+} label_list;
+
 typedef struct request {
   const char *path;
+  label_list labels;
   bool has_grid;
   double grid; /* mm */
   bool clamp;
@@ -24,6 +36,33 @@ typedef struct request {
 } request;
 
 static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+/* "all", "7", "7=nodule,8=vessels" */
+static int read_labels(const char *command, const char *text, void *field) {
+  label_list *list = field;
+  (void)command;
+  list->given = true;
+  list->count = 0;
+  for (const char *at = text; strcmp(text, "all") != 0;) {
+    const size_t length = strcspn(at, ",");
+    const size_t digits = strspn(at, "0123456789");
+    const bool named = at[digits] == '=' && digits < length;
+    char *called = list->name[list->count];
+    if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
+        length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
+      return SUPINE_OPTION_MISFIT;
+    }
+    list->label[list->count] = (unsigned)strtoul(at, NULL, 10);
+    (void)snprintf(called, sizeof list->name[0], "%s%.*s", named ? "" : "label ",
+                   (int)(named ? length - digits - 1 : digits), named ? at + digits + 1 : at);
+    ++list->count;
+    at += length;
+    if (*at++ == '\0') {
+      break;
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", "basis of what is inside, a safetensors file",
@@ -33,6 +72,11 @@ static const supine_option table[] = {
      "about as far, every n-th of its voxels",
      SUPINE_FILLS(request, grid), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
      SUPINE_ABOVE_ZERO, .wants = "millimetres"},
+    {"labels", 0, "all|N[=NAME],...",
+     "images as CONTENT are label maps: the surface of each of these labels is a part, by name, "
+     "beside points and meshes",
+     SUPINE_FILLS(request, labels), .read = read_labels,
+     .wants = "all, or at most 64 labels with names of up to 31 letters, as 7=nodule,8=vessels"},
     {"clamp", 0, NULL,
      "what lies outside the lungs moves as the nearest point of their surface, instead of as the "
      "inside would if it went on",
@@ -67,15 +111,44 @@ static supine_status read_grid(const supine_inside_shells *shells, const request
   return supine_inside_content_grid(shells, &like, wanted->grid, margin, content, error);
 }
 
+/* The labels of a map, each a part. */
+static supine_status read_labelled(const request *wanted, const char *path,
+                                   supine_inside_content *content, supine_error *error) {
+  supine_labels_shape *parts = NULL;
+  size_t count = 0;
+  const label_list *list = &wanted->labels;
+  supine_status status =
+      supine_labels_shapes(path, list->label, list->count, &parts, &count, error);
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    char text[32];
+    (void)snprintf(text, sizeof text, "label %u", parts[i].label);
+    const char *part = list->count > 0 ? list->name[i] : text;
+    if (parts[i].surface.triangle_count == 0) {
+      supine_options_say(name, "%s: %s is thinner than half a voxel everywhere: left out", path,
+                         part);
+      continue;
+    }
+    supine_options_say(name,
+                       "%s: %s, %.3g mL of voxels, %.3g mL within its surface, which is "
+                       "within %.2g mm of them",
+                       path, part, parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface),
+                       parts[i].farthest);
+    status = supine_inside_content_surface(part, &parts[i].surface, content, error);
+  }
+  supine_labels_shapes_free(parts, count);
+  return status;
+}
+
 static supine_status read_content(const supine_inside_shells *shells, const request *wanted,
                                   char **paths, size_t count, supine_inside_content *content,
                                   supine_error *error) {
-  if (count == 0 || supine_image_supports(paths[0])) {
+  if (count == 0 || (!wanted->labels.given && supine_image_supports(paths[0]))) {
     return read_grid(shells, wanted, count > 0 ? paths[0] : NULL, content, error);
   }
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = ends_in(paths[i], ".csv")
+    status = supine_image_supports(paths[i]) ? read_labelled(wanted, paths[i], content, error)
+             : ends_in(paths[i], ".csv")
                  ? supine_inside_content_points(paths[i], &wanted->load, content, error)
                  : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
   }
@@ -167,7 +240,18 @@ static int run(void *chosen, const supine_arguments *given) {
     return supine_options_usage(name, "which content? Name points (.csv), meshes or an image, or "
                                       "give --grid MM");
   }
-  if ((image && given->count > 2) || (!image && given->count > 1 && wanted->has_grid)) {
+  if (wanted->labels.given && (!image || wanted->has_grid)) {
+    return supine_options_usage(name, image ? "--labels takes surfaces, --grid voxels: one of the "
+                                              "two"
+                                            : "--labels is of label maps: name one (.nrrd, .nii, "
+                                              ".nii.gz)");
+  }
+  if (!wanted->labels.given && image && given->count > 2) {
+    return supine_options_usage(name,
+                                "a grid, or an image, goes into a file of its own; of a label "
+                                "map, --labels takes the parts");
+  }
+  if (!image && given->count > 1 && wanted->has_grid) {
     return supine_options_usage(name, "a grid, or an image, goes into a file of its own");
   }
   if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
@@ -185,18 +269,21 @@ const supine_command supine_command_embed = {
              "BASIS --grid MM -o FILE",
     .about =
         "Makes a basis of what is inside the lungs of a basis: points (a CSV file with the columns "
-        "x, y, z and name), meshes (airways, vessels, nodules), or the nodes of a grid, of its own "
-        "or of an image (.nrrd, .nii, .nii.gz). It moves with the lungs' own weights and breath, "
+        "x, y, z and name), meshes (airways, vessels, nodules), the parts of a label map, or the "
+        "nodes of a grid, of its own or of an image (.nrrd, .nii, .nii.gz). It moves with the "
+        "lungs' own weights and breath, "
         "through every command that reads a basis.\n"
         "\n"
         "Displacements inside are the biharmonic interpolation of the surface's, lung by lung: a "
         "point on the surface moves with it, and an affine motion goes on inside.",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
-             "  supine deform inside.safetensors --posture prone -o prone.csv\n"
-             "  supine embed lungs.safetensors ct.nii.gz -o grid.safetensors\n"
-             "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
+    .notes =
+        "Examples:\n"
+        "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
+        "  supine deform inside.safetensors --posture prone -o prone.csv\n"
+        "  supine embed lungs.safetensors labels.nii.gz --labels 7=nodule -o inside.safetensors\n"
+        "  supine embed lungs.safetensors ct.nii.gz -o grid.safetensors\n"
+        "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
     .operands_least = 1,
     .operands_most = SIZE_MAX,
     .operands_missing = "name a basis file (made by 'supine precompute'), then what is inside",

@@ -106,36 +106,45 @@ static const char *part_name(const char *path, size_t *length) {
   return name;
 }
 
+static supine_status add_surface(const char *name, size_t length, const supine_mesh *mesh,
+                                 supine_inside_content *content, supine_error *error) {
+  size_t capacity = content->count;
+  size_t used = content->names != NULL ? strlen(content->names) : 0;
+  size_t room = used;
+  const uint32_t part = (uint32_t)content->part_count;
+  const size_t triangles = content->triangle_count + mesh->triangle_count;
+  uint32_t *joined = realloc(content->triangles, 3 * triangles * sizeof *joined);
+  content->triangles = joined != NULL ? joined : content->triangles;
+  if (joined == NULL || !reserve(content, &capacity, mesh->vertex_count) ||
+      !add_name(content, name, length, &used, &room)) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%.*s: out of memory", (int)length, name);
+  }
+  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    joined[3 * content->triangle_count + i] = mesh->triangles[i] + (uint32_t)content->count;
+  }
+  memcpy(content->points + 3 * content->count, mesh->vertices,
+         3 * mesh->vertex_count * sizeof *mesh->vertices);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    content->part[content->count + i] = part;
+  }
+  content->count += mesh->vertex_count;
+  content->triangle_count = triangles;
+  return SUPINE_OK;
+}
+
+supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
+                                            supine_inside_content *content, supine_error *error) {
+  return add_surface(name, strlen(name), mesh, content, error);
+}
+
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error) {
   supine_mesh mesh = {0};
   supine_status status = supine_mesh_load(path, options, &mesh, NULL, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  size_t capacity = content->count;
-  size_t used = content->names != NULL ? strlen(content->names) : 0;
-  size_t room = used;
-  size_t length = 0;
-  const char *name = part_name(path, &length);
-  const uint32_t part = (uint32_t)content->part_count;
-  const size_t triangles = content->triangle_count + mesh.triangle_count;
-  uint32_t *joined = realloc(content->triangles, 3 * triangles * sizeof *joined);
-  content->triangles = joined != NULL ? joined : content->triangles;
-  if (joined == NULL || !reserve(content, &capacity, mesh.vertex_count) ||
-      !add_name(content, name, length, &used, &room)) {
-    status = no_memory(path, error);
-  } else {
-    for (size_t i = 0; i < 3 * mesh.triangle_count; ++i) {
-      joined[3 * content->triangle_count + i] = mesh.triangles[i] + (uint32_t)content->count;
-    }
-    memcpy(content->points + 3 * content->count, mesh.vertices,
-           3 * mesh.vertex_count * sizeof *mesh.vertices);
-    for (size_t i = 0; i < mesh.vertex_count; ++i) {
-      content->part[content->count + i] = part;
-    }
-    content->count += mesh.vertex_count;
-    content->triangle_count = triangles;
+  if (status == SUPINE_OK) {
+    size_t length = 0;
+    const char *name = part_name(path, &length);
+    status = add_surface(name, length, &mesh, content, error);
   }
   supine_mesh_free(&mesh);
   return status;

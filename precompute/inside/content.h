@@ -41,6 +41,11 @@ supine_status supine_inside_content_points(const char *path,
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error);
 
+/** Appends a surface, one part of that name.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
+                                            supine_inside_content *content, supine_error *error);
+
 void supine_inside_content_free(supine_inside_content *content);
 
 #endif
