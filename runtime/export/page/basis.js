@@ -108,7 +108,11 @@ function harmonics(band, [x, y, z]) {
   let re = 1;
   let im = 0;
   for (let m = 0; m <= band; ++m) {
-    if (m > 0) [re, im] = [re * x - im * y, re * y + im * x];
+    if (m > 0) {
+      const next = re * x - im * y;
+      im = re * y + im * x;
+      re = next;
+    }
     let before = 0;
     let q = tops[m];
     for (let l = m; l <= band; ++l) {

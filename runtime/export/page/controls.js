@@ -56,9 +56,9 @@ function write(id, text) {
 /** Sets a slider, the number beside it, and what it says. */
 function setSlider(id, value, text, digits = 0) {
   const slider = $(id);
-  const number = $(`${id}-number`);
-  if (document.activeElement !== number && number.value !== value.toFixed(digits)) number.value = value.toFixed(digits);
   if (slider.written === text) return;
+  const number = $(`${id}-number`);
+  if (document.activeElement !== number) number.value = value.toFixed(digits);
   slider.written = text;
   slider.value = value;
   slider.setAttribute('aria-valuetext', text);
@@ -73,7 +73,12 @@ function onSlider(id, act) {
     if (Number.isFinite(value)) act(Math.max(Number(slider.min), Math.min(Number(slider.max), value)));
   };
   $(id).addEventListener('input', () => take($(id)));
-  $(`${id}-number`).addEventListener('change', () => take($(`${id}-number`)));
+  for (const [type, then] of [['change', take], ['blur', () => {}]]) {
+    $(`${id}-number`).addEventListener(type, () => {
+      $(id).written = ''; // what was typed may be none, or beyond the ends
+      then($(`${id}-number`));
+    });
+  }
 }
 
 function makePostureButtons(choose) {

@@ -19,6 +19,8 @@ const BODY = [
   { at: [-0.105, -0.09, -0.87], size: [0.055, 0.12, 0.04], tone: 'body' },
 ];
 
+for (const part of BODY) part.squares = part.size.map((x) => x * x);
+
 /** The ends of the patient's axes. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
@@ -41,20 +43,23 @@ function lightsOf(context, tones) {
 function drawFigure(context, q, x, y, scale, tones) {
   const [ex, ey, ez] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
   const light = lightsOf(context, tones);
-  const parts = BODY.map(({ at, size: [a, b, c], tone }) => {
-    const on = (i) => at[0] * ex[i] + at[1] * ey[i] + at[2] * ez[i];
-    const shape = (i, j) => a * a * ex[i] * ex[j] + b * b * ey[i] * ey[j] + c * c * ez[i] * ez[j];
+  const parts = BODY.map(({ at, squares: [a, b, c], tone }) => ({
+    tone,
+    x: at[0] * ex[0] + at[1] * ey[0] + at[2] * ez[0],
+    y: at[0] * ex[1] + at[1] * ey[1] + at[2] * ez[1],
+    xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
+    xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
+    yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
     // The half axis that points most to the viewer decides what hides what.
-    return { tone, x: on(0), y: on(1), xx: shape(0, 0), xy: shape(0, 1), yy: shape(1, 1), front: on(2) + 0.5 * Math.sqrt(shape(2, 2)) };
-  }).sort((a, b) => a.front - b.front);
+    front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
+  })).sort((a, b) => a.front - b.front);
   context.save();
-  const screen = context.getTransform();
+  const { a: ratio } = context.getTransform(); // the screen's pixels, of freshContext
   for (const part of parts) {
     // The root of the ellipse's matrix takes the circle there, its light still from above.
     const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
-    const by = scale / Math.sqrt(part.xx + part.yy + 2 * det);
-    context.setTransform(screen);
-    context.transform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), x + scale * part.x, y - scale * part.y);
+    const by = (ratio * scale) / Math.sqrt(part.xx + part.yy + 2 * det);
+    context.setTransform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), ratio * (x + scale * part.x), ratio * (y - scale * part.y));
     context.beginPath();
     context.arc(0, 0, 1, 0, 2 * Math.PI);
     context.fillStyle = light[part.tone];
@@ -123,18 +128,21 @@ function glyphsOf() {
 }
 
 /** The ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
-let drawn = ''; // what it shows
+let drawn = [];   // what it shows
+let glass = null; // its light, made once a size and theme
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);
-  const now = [size, window.devicePixelRatio, theme.ink, ...[...toEye, ...gravity].map((x) => x.toFixed(5))].join();
-  if (now === drawn) return;
-  drawn = now;
+  const now = [size, window.devicePixelRatio, theme.tones, ...toEye, ...gravity];
+  if (now.every((x, i) => x === drawn[i])) return;
   const context = freshContext(canvas);
   const centre = size / 2;
   const radius = size / 2 - 9;
-  const glass = context.createRadialGradient(centre - radius * 0.35, centre - radius * 0.45, radius * 0.1, centre, centre, radius);
-  glass.addColorStop(0, css('--ball-light'));
-  glass.addColorStop(1, css('--ball-dark'));
+  if (glass === null || now[0] !== drawn[0] || now[2] !== drawn[2]) {
+    glass = context.createRadialGradient(centre - radius * 0.35, centre - radius * 0.45, radius * 0.1, centre, centre, radius);
+    glass.addColorStop(0, css('--ball-light'));
+    glass.addColorStop(1, css('--ball-dark'));
+  }
+  drawn = now;
   context.beginPath();
   context.arc(centre, centre, radius, 0, 2 * Math.PI);
   context.fillStyle = glass;

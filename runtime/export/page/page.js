@@ -287,7 +287,7 @@ function start() {
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
     }
     const gains = state.moment?.gains?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
-    const rest = restFor(basis, gravity) - restFor(basis, state.firstGravity);
+    const rest = restFor(basis, gravity) - state.firstRest;
     write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
     for (const [id, place] of [['left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`], ['right-name', name]]) {

@@ -75,7 +75,8 @@ class State {
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
     this.depth = this.tidal;
     this.firstGravity = gravityOf(POSTURES[0].q);  // whose rest is the ghost
-    this.depthMax = Math.max(2 * this.tidal, -restFor(basis, this.firstGravity));
+    this.firstRest = restFor(basis, this.firstGravity);
+    this.depthMax = Math.max(2 * this.tidal, -this.firstRest);
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
