@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page by pointer, touch and keyboard: every key and button does what it says, numbers can be
+// typed, probes measure what the program computes, gravity's arrow is seen from every side, motion is
+// as long as it should be, and a lost context comes back with camera, posture and pins.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { browser, openLungs, picture } from './browser.mjs';
+import { evaluate, folder, supine } from './support.mjs';
+
+const PROBE_MM = 0.06; // of a distance written with one digit
+const mesh = join(folder, 'lungs.ply');
+const basis = join(folder, 'lungs.safetensors');
+const html = join(folder, 'lungs.html');
+supine('phantom', '-o', mesh, '--vertices', '1500');
+supine('precompute', mesh, '-o', basis);
+supine('export', basis, '-o', html);
+
+const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
+
+/** Keys change what they say, and a second press or its opposite undoes it. */
+async function checkKeys(page) {
+  await page.locator('#picture').focus();
+  const press = async (...keys) => { for (const key of keys) await page.keyboard.press(key); await settled(page); };
+  for (const [key, name] of [['g', 'ghost'], ['w', 'wires'], ['b', 'beside'], ['s', 'room']]) {
+    await press(key);
+    assert.equal(await state(page, name), true, key);
+    await press(key);
+    assert.equal(await state(page, name), false, key);
+  }
+  for (const kind of ['difference', 'expansion', 'height', 'displacement']) {
+    await press('c');
+    assert.equal(await state(page, 'kind'), kind);
+  }
+  for (const [key, posture] of [['1', 'supine'], ['2', 'prone'], ['3', 'left'], ['4', 'right'], ['5', 'upright'], ['6', 'supine+15']]) {
+    await press(key);
+    assert.equal(await page.locator('#posture-name').inputValue(), posture);
+  }
+  await press('n');
+  assert.match(await page.locator('#pinned').textContent(), /supine\+15/);
+  await press('1', 'n');
+  const camera = await state(page, 'camera');
+  await press('ArrowLeft', 'ArrowUp', '+', 'Shift+ArrowRight');
+  const turned = await state(page, 'camera');
+  assert.ok(turned.azimuth < camera.azimuth && turned.elevation < camera.elevation && turned.zoom > camera.zoom && turned.pan[0] !== camera.pan[0]);
+  await press('0');
+  assert.deepEqual(await state(page, 'camera'), camera);
+  await press(' ');
+  assert.equal(await state(page, 'playing'), true);
+  await press(' ');
+  assert.equal(await state(page, 'playing'), false);
+}
+
+/** The views' buttons, double click, full screen and the picture to keep. */
+async function checkButtons(page) {
+  for (const [letter, azimuth, elevation] of [['A', 0, 0], ['P', Math.PI, 0], ['L', -Math.PI / 2, 0], ['R', Math.PI / 2, 0], ['H', 0, Math.PI / 2], ['F', 0, -Math.PI / 2]]) {
+    await page.locator('#views button').filter({ hasText: letter }).click();
+    const { azimuth: a, elevation: e } = await state(page, 'camera');
+    assert.deepEqual([a, e], [azimuth, elevation], letter);
+  }
+  await page.locator('#views button').filter({ hasText: 'A' }).click();
+  await settled(page);
+  const box = await page.locator('#picture').boundingBox();
+  await page.mouse.dblclick(box.x + box.width * 0.36, box.y + box.height * 0.5);
+  await page.waitForFunction(() => window.supine.state.camera.pivot !== null);
+  await settled(page);
+  const off = await page.evaluate(() => { // the pivot is in the middle of the picture
+    const { toEye: m } = window.supine.panes()[0];
+    const { pivot } = window.supine.state.camera;
+    return [0, 1].map((i) => m[i] * pivot[0] + m[4 + i] * pivot[1] + m[8 + i] * pivot[2] + m[12 + i]);
+  });
+  assert.ok(Math.hypot(...off) < 1e-3, `the pivot is ${off} mm off`);
+  assert.equal((await state(page, 'probes')).length, 0, 'a double click leaves a probe');
+  await page.locator('#reset').click();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#save').click()]);
+  const png = readFileSync(await download.path());
+  assert.deepEqual([...png.subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
+  assert.match(download.suggestedFilename(), /\.png$/);
+  await page.locator('#full').click();
+  await page.waitForFunction(() => document.fullscreenElement !== null);
+  await page.locator('#full').click();
+  await page.waitForFunction(() => document.fullscreenElement === null);
+}
+
+/** Typed numbers are taken, and held within their ends; what is no number is not. */
+async function checkTyped(page) {
+  const type = async (id, text) => { await page.locator(id).fill(text); await page.keyboard.press('Enter'); await settled(page); };
+  await type('#depth-number', '123');
+  assert.equal(await state(page, 'depth'), 123);
+  await type('#tilt-number', '-20');
+  assert.equal(await page.locator('#posture-name').inputValue(), 'supine-20');
+  await type('#tilt-number', '400');
+  assert.equal((await state(page, 'standing')).tilt, 90);
+  await type('#tilt-number', '0');
+  await type('#rate-number', '15');
+  assert.equal(await state(page, 'rate'), 15);
+  await type('#tidal-number', '');
+  await page.locator('#tidal-number').blur();
+  await page.locator('#depth').fill('500');
+  await settled(page);
+  assert.equal(await page.locator('#tidal-number').inputValue(), '500');
+  await type('#range-begin', '5');
+  await type('#range-end', '25');
+  assert.deepEqual(await page.evaluate(() => [window.supine.state.range.begin, window.supine.state.range.end]), [5, 25]);
+  assert.deepEqual(await page.evaluate(() => [...document.querySelectorAll('#ticks span')].map((tick) => tick.textContent)), ['5', '10', '15', '20', '25']);
+  await page.locator('#range-auto').click();
+  await page.evaluate(() => document.activeElement.blur());
+}
+
+/** What probes say is what the library computes, between two of them as well. */
+async function checkProbes(page) {
+  await page.keyboard.press('2');
+  await settled(page);
+  const box = await page.locator('#picture').boundingBox();
+  for (const [i, [x, y]] of [[0.38, 0.5], [0.62, 0.55]].entries()) {
+    await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
+    await page.waitForFunction((n) => window.supine.state.probes.length > n, i);
+  }
+  await page.mouse.move(5, 5);
+  await settled(page);
+  const [probes, lines, between, rests, names] = await page.evaluate(() => {
+    const { state: s, basis: b, gravityOf } = window.supine;
+    const rest = (g) => { const y = window.supine.moment(g, 0); return y.scale; };
+    return [s.probes, [...document.querySelectorAll('#probes li span')].map((e) => e.textContent), document.getElementById('probes-text').textContent, [[0, 1, 0], gravityOf(s.q)].map(rest), s.probes.map((v) => b.lungNames[b.lungBegin.findLastIndex((begin) => v >= begin)])];
+  });
+  assert.ok(rests.every(Number.isFinite));
+  const resting = async (gravity) => page.evaluate((g) => { // mL relative to the file's surface
+    const s = Math.sqrt(1 / Math.PI); // bands 0 to 2 of harmonics
+    const [x, y, z] = g;
+    const values = [s / 2, (Math.sqrt(3) / 2) * s * y, (Math.sqrt(3) / 2) * s * z, (Math.sqrt(3) / 2) * s * x, (Math.sqrt(15) / 2) * s * x * y, (Math.sqrt(15) / 2) * s * y * z, (Math.sqrt(5) / 4) * s * (3 * z * z - 1), (Math.sqrt(15) / 2) * s * x * z, (Math.sqrt(15) / 4) * s * (x * x - y * y)];
+    return values.reduce((sum, v, i) => sum + v * window.supine.basis.resting[i], 0);
+  }, gravity);
+  const depth = await state(page, 'depth');
+  const [now, rest] = evaluate(basis, [[[0, -1, 0], await resting([0, -1, 0]) + depth], [[0, 1, 0], await resting([0, 1, 0])]]);
+  const at = ({ xyz }, v) => Array.from(xyz.slice(3 * v, 3 * v + 3));
+  const apart = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+  probes.forEach((v, i) => {
+    const [, number, lung, mm] = /^(\d)  (left|right) lung  ([\d.]+) mm/.exec(lines[i]);
+    assert.equal(Number(number), i + 1);
+    assert.equal(lung, names[i]);
+    assert.ok(Math.abs(Number(mm) - apart(at(now, v), at(rest, v))) < PROBE_MM, `${lines[i]}, not ${apart(at(now, v), at(rest, v))}`);
+  });
+  const [, distance, before] = /1 to 2: ([\d.]+) mm, at rest ([\d.]+) mm/.exec(between);
+  assert.ok(Math.abs(Number(distance) - apart(at(now, probes[0]), at(now, probes[1]))) < PROBE_MM);
+  assert.ok(Math.abs(Number(before) - apart(at(rest, probes[0]), at(rest, probes[1]))) < PROBE_MM);
+}
+
+/** With probes, a camera of its own and a reference, a context lost comes back pixel for pixel. */
+async function checkLoss(page) {
+  await page.keyboard.press('3');
+  await page.evaluate(() => { document.getElementById('pin').click(); document.getElementById('beside').click(); });
+  await page.keyboard.press('ArrowLeft');
+  await page.keyboard.press('2');
+  const facts = () => page.evaluate(() => [window.supine.state.camera, window.supine.state.probes, window.supine.state.pinnedQ, window.supine.state.q, document.getElementById('probes').textContent]);
+  const [before, told] = [await picture(page), await facts()];
+  await page.evaluate(() => { window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context'); window.lose.loseContext(); });
+  await page.waitForFunction(() => window.supine.picture === null);
+  await page.evaluate(() => window.lose.restoreContext());
+  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
+  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+  assert.deepEqual(await facts(), told);
+  await page.locator('#beside').uncheck();
+  await page.locator('#probes-clear').click();
+}
+
+/** Pixels of the arrow's hue, lit or seen through something. */
+const warmPixels = (page) => page.evaluate(() => {
+  const { picture: p, panes } = window.supine;
+  const pane = panes()[0];
+  p.draw(panes());
+  const pixels = new Uint8Array(4 * pane.box[2] * pane.box[3]);
+  p.gl.readPixels(0, 0, pane.box[2], pane.box[3], p.gl.RGBA, p.gl.UNSIGNED_BYTE, pixels);
+  const [r, g, b] = pane.tint;
+  let count = 0;
+  for (let i = 0; i < pixels.length; i += 4) {
+    const [x, y, z] = pixels.subarray(i, i + 3);
+    if (x > 110 && x - z > 0.5 * (r - b) * 255 * 0.8 && Math.abs((x - y) / (x - z) - (r - g) / (r - b)) < 0.2) ++count;
+  }
+  return count;
+});
+
+/** Gravity's arrow is seen from every side, whatever hides it. */
+async function checkArrow(page) {
+  await page.evaluate(() => { window.supine.picture.drawGravity = () => {}; });
+  assert.equal(await warmPixels(page), 0, 'something else has the arrow\'s colour');
+  await page.evaluate(() => { delete window.supine.picture.drawGravity; });
+  for (const posture of ['1', '2', '3', '5']) {
+    for (const view of ['a', 'p', 'l', 'h']) {
+      await page.keyboard.press(posture);
+      await page.keyboard.press(view);
+      await settled(page);
+      const warm = await warmPixels(page);
+      assert.ok(warm > 60, `posture ${posture} from ${view}: ${warm} pixels of the arrow`);
+    }
+  }
+}
+
+/** What the page writes, the program reads: the same direction. */
+async function checkNotation(page) {
+  for (const gravity of [[0.6, 0, -0.8], [0, 0.9659258, 0.2588190], [0, -0.9396926, 0.3420201], [0, 0, -1]]) {
+    const text = await page.evaluate((g) => window.supine.postureText(g), gravity);
+    const moved = join(folder, 'moved.obj');
+    supine('deform', basis, '--posture', text, '--volume', 'rest+200', '-o', moved);
+    const said = [...readFileSync(moved, 'utf8').matchAll(/^v (\S+) (\S+) (\S+)/gm)].flatMap(([, ...v]) => v.map(Number));
+    const found = await page.evaluate((g) => Array.from(window.supine.positions(g, 200)), gravity);
+    const worst = said.reduce((most, x, i) => Math.max(most, Math.abs(x - found[i])), 0);
+    assert.ok(worst < 0.05, `${text}: ${worst} mm`); // a degree of gravity moves lungs by more
+  }
+}
+
+/** A finger's drag turns, two fingers zoom and move, a tap keeps a probe: as touch events. */
+async function checkTouch() {
+  const { page, complaints } = await openLungs(html, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  const cdp = await page.context().newCDPSession(page);
+  const box = await page.locator('#picture').boundingBox();
+  const middle = [box.x + box.width / 2, box.y + box.height / 2];
+  const touch = (type, points) => cdp.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+  const before = await state(page, 'camera');
+  await touch('touchStart', [middle]);
+  for (let i = 1; i <= 5; ++i) await touch('touchMove', [[middle[0] + 16 * i, middle[1]]]);
+  await touch('touchEnd', []);
+  await settled(page);
+  const dragged = await state(page, 'camera');
+  assert.ok(dragged.azimuth > before.azimuth + 0.3, 'a drag does not turn');
+  assert.equal((await state(page, 'probes')).length, 0, 'a drag keeps a probe');
+  const two = (gap, shift) => [[middle[0] - gap + shift, middle[1]], [middle[0] + gap + shift, middle[1]]];
+  await touch('touchStart', two(30, 0));
+  for (let i = 1; i <= 5; ++i) await touch('touchMove', two(30 + 8 * i, 4 * i));
+  await touch('touchEnd', []);
+  await settled(page);
+  const pinched = await state(page, 'camera');
+  assert.ok(pinched.zoom > 1.5 * dragged.zoom && pinched.pan[0] > dragged.pan[0], JSON.stringify(pinched));
+  assert.equal(pinched.azimuth, dragged.azimuth);
+  /* The ball turns the patient by a finger too. */
+  const ball = await page.locator('#ball').boundingBox();
+  const gravity = await page.evaluate(() => window.supine.state.gravity);
+  await touch('touchStart', [[ball.x + 60, ball.y + 60]]);
+  for (let i = 1; i <= 4; ++i) await touch('touchMove', [[ball.x + 60 + 6 * i, ball.y + 60]]);
+  await touch('touchEnd', []);
+  const after = await page.evaluate(() => window.supine.state.gravity);
+  assert.ok(Math.hypot(...after.map((x, i) => x - gravity[i])) > 0.1, 'the ball does not turn');
+  assert.deepEqual(complaints, []);
+  await page.close();
+}
+
+/** Where motion is wanted a posture takes its time, and ends where it should; where it is not, none.
+ * Slow frames do not slow the breath: what the state is told adds up to the frames' own clock. */
+async function checkMotion() {
+  const { page, complaints } = await openLungs(html, { viewport: { width: 700, height: 420 }, reducedMotion: 'no-preference' });
+  const frames = await page.evaluate(() => new Promise((done) => {
+    const { state: s, picture: p } = window.supine;
+    const deform = p.deform.bind(p);
+    const seen = [];
+    p.deform = (name, moment) => { if (name === 'now') seen.push(moment.gravity); deform(name, moment); };
+    document.querySelector('[data-posture=prone]').click();
+    const wait = () => (s.turning ? requestAnimationFrame(wait) : requestAnimationFrame(() => requestAnimationFrame(() => done(seen))));
+    requestAnimationFrame(wait);
+  }));
+  assert.ok(frames.length >= 1);
+  assert.ok(Math.hypot(frames.at(-1)[0], frames.at(-1)[1] + 1, frames.at(-1)[2]) < 1e-9, `the turn ends at ${frames.at(-1)}`);
+  const [told, clock, phases] = await page.evaluate(() => new Promise((done) => {
+    const { state: s } = window.supine;
+    const advance = s.advance.bind(s);
+    let [sum, begin, first, count] = [0, NaN, NaN, 0];
+    s.advance = (seconds) => { sum += seconds; return advance(seconds); };
+    document.getElementById('play').click();
+    const next = (now) => { // after the page's own frame, whose clock is the same
+      if (count === 2) [begin, sum, first] = [now, 0, s.phase];
+      if (++count === 8) {
+        done([sum, (now - begin) / 1000, [first, s.phase, s.rate]]);
+        return;
+      }
+      const until = performance.now() + 150; // at most 7 frames a second
+      while (performance.now() < until);
+      requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+  }));
+  assert.ok(clock > 0.7 && Math.abs(told - clock) < 1e-6, `${told} s of ${clock}`);
+  const went = (phases[1] - phases[0] + 1) % 1;
+  assert.ok(Math.abs(went - ((clock * phases[2]) / 60) % 1) < 1e-6, `the breath went on by ${went}`);
+  assert.deepEqual(complaints, []);
+  await page.close();
+}
+
+/** Plain words first, the rest behind a button. */
+async function checkWords(page) {
+  assert.match(await page.locator('#title p').textContent(), /not for diagnosis/);
+  const behind = await page.evaluate(() => [...document.querySelectorAll('dl#facts dd')].map((e) => [e.textContent, e.closest('details').open]));
+  assert.ok(behind.some(([text]) => /modes of band/.test(text)) && behind.every(([, open]) => !open));
+  const { page: still } = await openLungs(html, { viewport: { width: 700, height: 420 } });
+  await still.locator('[data-posture=prone]').click();
+  assert.equal(await still.evaluate(() => window.supine.state.turning), null, 'it moves where motion is not wanted');
+  await still.close();
+}
+
+const { page, complaints } = await openLungs(html, { viewport: { width: 700, height: 420 } });
+for (const check of [checkKeys, checkButtons, checkTyped, checkProbes, checkLoss, checkArrow, checkNotation, checkWords]) {
+  await check(page);
+  console.log(check.name);
+}
+assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
+await page.close();
+await checkTouch();
+await checkMotion();
+await browser.close();
