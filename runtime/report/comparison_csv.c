@@ -60,7 +60,21 @@ static void extreme(FILE *file, const char *quantity, const char *part, const do
   row(file, quantity, "all", other, "rms", rms, "mm");
 }
 
+/* The file's name goes with its vertices, quoted [RFC 4180]: names may hold anything. */
+static void vertices_row(const supine_comparison *c, FILE *file) {
+  (void)fputs("vertices,rest,,\"", file);
+  for (const char *at = c->path; *at != '\0'; ++at) {
+    (void)fputs(*at == '"' ? "\"" : "", file);
+    (void)fputc(*at, file);
+  }
+  (void)fprintf(file, "\",%zu,1\n", supine_basis_get_info(c->basis)->vertex_count);
+}
+
 void supine_report_csv(const supine_comparison *c, FILE *file) {
+  const char *const kinds[] = {[SUPINE_INFLATION_REST] = "above rest",
+                               [SUPINE_INFLATION_VOLUME] =
+                                   supine_report_knows_rest(c) ? "above full" : "above the surface",
+                               [SUPINE_INFLATION_RMS] = "RMS displacement"};
   const size_t count = c->postures.count;
   (void)fputs("quantity,posture,other,part,value,unit\n", file);
   for (size_t i = 0; i < count; ++i) {
@@ -81,7 +95,7 @@ void supine_report_csv(const supine_comparison *c, FILE *file) {
   extreme(file, "farthest", "", e->farthest, "supine", e->farthest_rms);
   row(file, "directions", "all", "", "", (double)e->directions, "1");
   row(file, "area", "rest", "", "", supine_compare_area(c->compare), "mm2");
-  row(file, "vertices", "rest", "", "", (double)supine_basis_get_info(c->basis)->vertex_count, "1");
-  row(file, "inflation", "all", "", "", c->inflation.amount,
-      c->inflation.kind == SUPINE_INFLATION_VOLUME ? "mL" : "mm");
+  vertices_row(c, file);
+  row(file, "inflation", "all", "", kinds[c->inflation.kind], c->inflation.amount,
+      c->inflation.kind == SUPINE_INFLATION_RMS ? "mm" : "mL");
 }

@@ -144,17 +144,37 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* The command that makes this report again, and all that the basis says of itself. */
+/* The command that makes this report again, cut where it is longer than `size`. */
+static void write_command(const supine_comparison *c, const char *file, char *command,
+                          size_t size) {
+  FILE *to = fmemopen(command, size, "w");
+  if (to == NULL) {
+    return;
+  }
+  const double amount = c->inflation.amount;
+  (void)fprintf(to, "supine compare %s ", file);
+  if (c->inflation.kind == SUPINE_INFLATION_RMS) {
+    (void)fprintf(to, "--rms %.9g", amount);
+  } else if (c->inflation.kind == SUPINE_INFLATION_REST || supine_report_knows_rest(c)) {
+    (void)fprintf(to, "--volume %s", c->inflation.kind == SUPINE_INFLATION_REST ? "rest" : "full");
+    (void)fprintf(to, amount != 0.0 ? "%+.9g" : "", amount);
+  } else {
+    (void)fprintf(to, "--volume %.9g", amount);
+  }
+  (void)fprintf(to, "%s --breath %.9g --postures ", c->allow_folds ? " --allow-folds" : "",
+                c->breath);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)fprintf(to, "%s%s", i > 0 ? "," : "", c->postures.item[i].name);
+  }
+  (void)fclose(to);
+  command[size - 1] = '\0';
+}
+
+/* That command, and all that the basis says of itself. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
   json_t *list = json_array();
-  char command[2048];
-  size_t used = (size_t)snprintf(
-      command, sizeof command, "supine compare %s --%s %g --postures ", json_string_value(file),
-      c->inflation.kind == SUPINE_INFLATION_VOLUME ? "volume" : "rms", c->inflation.amount);
-  for (size_t i = 0; i < c->postures.count && used < sizeof command; ++i) {
-    used += (size_t)snprintf(command + used, sizeof command - used, "%s%s", i > 0 ? "," : "",
-                             c->postures.item[i].name);
-  }
+  char command[2048] = "";
+  write_command(c, json_string_value(file), command, sizeof command);
   size_t count = 0;
   const supine_metadata *metadata = supine_basis_all_metadata(c->basis, &count);
   add_fact(list, "command", json_string(command));

@@ -19,7 +19,7 @@ const basis = join(folder, 'lungs.safetensors');
 const html = join(folder, 'report.html');
 supine('phantom', '-o', mesh, '--vertices', '500');
 supine('precompute', mesh, '-o', basis);
-supine('compare', basis, '--postures', postures.join(','), '-o', html);
+supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350', '-o', html);
 
 const { page, complaints } = await open(html);
 const cells = await page.evaluate(() => [...document.querySelectorAll('table')].map((table) => ({
@@ -27,6 +27,37 @@ const cells = await page.evaluate(() => [...document.querySelectorAll('table')].
   cells: [...table.querySelectorAll('td')].map((cell) => cell.textContent.trim()).filter(Boolean),
 })));
 assert.ok(cells.length >= 6);
+const cards = await page.evaluate(() => [...document.querySelectorAll('section')].map((section) => ({
+  heading: section.querySelector('h2').textContent,
+  first: section.innerText.split('\n').map((line) => line.trim()).filter(Boolean)[1].split(/\s+/)[0],
+})));
+assert.ok(cards.length >= 6);
+/* Whatever is a picture is held together where sheets end. */
+await page.emulateMedia({ media: 'print' });
+const parted = await page.evaluate(() => [...document.querySelectorAll('tr, figure, .scale, .matrix, .shot img')].filter((e) => e.tagName !== 'IMG' && getComputedStyle(e).breakInside !== 'avoid').length);
+assert.equal(parted, 0);
+await page.emulateMedia({ media: null });
+
+/* The CSV has every number of the JSON, under its posture, and the file's name. */
+const csv = join(folder, 'rows.csv');
+const json = JSON.parse(supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--csv', csv, '--json').replace(/^[^{]*/, ''));
+const rows = readFileSync(csv, 'utf8').trim().split('\n').slice(1).map((line) => line.split(','));
+const near = (value) => Number(value).toPrecision(8);
+function leaves(node, path = []) {
+  return node !== null && typeof node === 'object' ? Object.entries(node).flatMap(([key, inner]) => leaves(inner, [...path, key])) : [{ path, value: node }];
+}
+const told = (wanted, list) => { const values = new Set(list.map((row) => near(row[4]))); return wanted.filter(({ path, value }) => typeof value === 'number' && path[2] !== 'height' && !values.has(near(value))); };
+for (const posture of json.postures) {
+  assert.deepEqual(told(leaves(posture), rows.filter((row) => row[1] === posture.name)), [], posture.name);
+  for (const { height } of posture.slabs) {
+    const part = `height ${Math.round(100 * height[0])}-${Math.round(100 * height[1])} %`;
+    assert.ok(rows.some((row) => row[1] === posture.name && row[3] === part), part);
+  }
+}
+for (const { a, b, distance_mm: distance } of json.pairs) assert.deepEqual(told(leaves(distance), rows.filter((row) => row[0] === 'distance' && row[1] === a && row[2] === b)), [], `${a}, ${b}`);
+assert.deepEqual(told(leaves({ energy: json.energy, sphere: json.sphere, area: json.area_mm2, vertices: json.vertices, inflation: json.inflation }), rows), []);
+assert.deepEqual(rows.filter((row) => row[0] === 'inflation'), [['inflation', 'all', '', 'above rest', '120', 'mL']]);
+assert.ok(rows.some((row) => row[3] === `"${json.file}"`));
 for (const format of ['A4', 'Letter']) {
   const pdf = join(folder, `${format}.pdf`);
   await page.pdf({ path: pdf, format, preferCSSPageSize: false, printBackground: true });
@@ -48,10 +79,23 @@ for (const format of ['A4', 'Letter']) {
     }
   });
   assert.ok(text.includes(`page ${sheets.length} of ${sheets.length}`));
-  for (const word of ['error_rms_percent', 'made_by', 'supinecompare', 'notfordiagnosis']) assert.ok(packed.includes(word), `no ${word}`);
+  for (const word of ['error_rms_percent', 'made_by', 'supinecompare', 'notfordiagnosis', 'lawdeep', 'scannedfull', 'checksumxxh64:']) assert.ok(packed.includes(word), `no ${word}`);
+  const bySheet = text.split('\f').map((sheet) => sheet.replace(/\s+/g, ''));
+  for (const { heading, first } of cards) { // a card's beginning stays with its heading
+    assert.ok(bySheet.some((sheet) => { const at = sheet.indexOf(heading.replace(/\s+/g, '')); return at >= 0 && sheet.indexOf(first, at + heading.replace(/\s+/g, '').length) >= 0; }), `${format}: '${heading}' is parted from '${first}'`);
+  }
   assert.match(text, /\d{4}-\d\d-\d\d/);
   console.log(`${format}: ${sheets.length} sheets`);
 }
+
+/* The command that it names makes it again, but for the time. */
+const printed = await page.evaluate(() => [...document.querySelectorAll('.provenance tr')].find((row) => row.cells[0].textContent === 'command').cells[1].textContent);
+const words = printed.split(' ').map((word) => (word === 'lungs.safetensors' ? basis : word));
+assert.deepEqual(words.slice(0, 3), ['supine', 'compare', basis]);
+const second = join(folder, 'again.html');
+supine(...words.slice(1), '-o', second);
+const undated = (path) => readFileSync(path, 'utf8').replace(/\d{4}-\d\d-\d\d[^<]*/g, '');
+assert.equal(undated(second), undated(html));
 
 /* Each picture has four letters, and they are where the body's axes put them. */
 const shots = await page.evaluate(() => [...document.querySelectorAll('.shot')].map((shot) => ({
