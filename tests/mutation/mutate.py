@@ -26,6 +26,7 @@ COPY = FOLDER / "source"
 BUILD = FOLDER / "build"
 ROOMS = ("sh", "mesh", "precompute", "runtime")
 QUICK, SLOW = 2.0, 15.0  # s, without a mutant
+JOBS = str(len(os.sched_getaffinity(0)))  # as many as it may use
 # What reads the sources rather than the program, or asks more of the machine than it has at hand.
 LEFT_OUT = r"house|readme_example|install|stream_|export_.*_node|cohort|manual"
 
@@ -51,12 +52,12 @@ def prepare():
 
 def build(targets=()):
     wanted = [word for target in targets for word in ("--target", target)]
-    return run("cmake", "--build", str(BUILD), *wanted)[0] == 0
+    return run("cmake", "--build", str(BUILD), "-j", JOBS, *wanted)[0] == 0
 
 
-def failed_tests(regex, jobs=2, limit=300):
+def failed_tests(regex, limit=300):
     """Names of the tests among those of the pattern that fail, at most a few."""
-    _, said = run("ctest", "-R", regex, "-j", str(jobs), "--timeout", str(limit),
+    _, said = run("ctest", "-R", regex, "-j", JOBS, "--timeout", str(limit),
                   "--stop-on-failure")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*", said)
 
@@ -159,7 +160,7 @@ def random_ones(count, seed):
 
 def measured_groups():
     """Patterns of the quick and the slower tests that pass unchanged."""
-    _, said = run("ctest", "-E", LEFT_OUT, "-j", "2", "--timeout", "60")
+    _, said = run("ctest", "-E", LEFT_OUT, "-j", JOBS, "--timeout", "60")
     passed = re.findall(r"Test +#\d+: (\S+) \.+ +Passed +([\d.]+) sec", said)
     quick = [name for name, took in passed if float(took) <= QUICK]
     slower = [name for name, took in passed if QUICK < float(took) <= SLOW]
