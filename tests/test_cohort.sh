@@ -1,9 +1,13 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Forty made subjects, three of them broken, through the cohort's workflow: test_cohort.sh PROGRAM COHORT
+# Forty made subjects, three of them broken, through the cohort's workflow:
+#
+#     test_cohort.sh PROGRAM COHORT [SNAKEMAKE'S OPTIONS]     --cores 2 by default; --slurm --jobs 2
 set -u
 supine=$1
 cohort=$2
+shift 2
+[ $# -gt 0 ] || set -- --cores 2
 command -v snakemake >/dev/null || { echo "skipped: snakemake is not installed"; exit 77; }
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -28,10 +32,10 @@ printf 'v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\n' >
 sed -i 's/23.ply/23.obj/' subjects.csv                      # open
 
 flow() {
-  snakemake -s "$cohort/Snakefile" --cores 2 --nocolor --config table=subjects.csv out=results \
-    supine="$supine" report=no "$@" >said 2>&1
+  snakemake -s "$cohort/Snakefile" --nocolor "$@" --config table=subjects.csv out=results \
+    supine="$supine" report=no >said 2>&1
 }
-flow || fail "the first run: $(tail -5 said)"
+flow "$@" || fail "the first run: $(tail -5 said)"
 [ "$(tr -d '\r' <results/group.csv | grep -c '^sub-')" -eq 40 ] || fail "rows: $(wc -l <results/group.csv)"
 [ "$(ls results/*/basis.safetensors | wc -l)" -ge 37 ] || fail "bases: $(ls results/*/basis.safetensors | wc -l)"
 grep -q '<h1>40 subjects: 37 done, 3 failed</h1>' results/group.html || fail "$(grep '<h1>' results/group.html)"
@@ -39,14 +43,14 @@ for failed in 'sub-05.*05.ply' 'sub-11.*11.ply' 'sub-23.*volume'; do
   grep -q "^$failed" results/group.csv || fail "no failure like $failed: $(grep "${failed%%.*}" results/group.csv)"
 done
 tr -d '\r' <results/group.csv | grep '^sub-17' | grep -q 'left_lung_ml' || fail "sub-17 does not stand apart"
-flow || fail "the second run"
+flow "$@" || fail "the second run"
 grep -q 'Nothing to be done' said || fail "the second run did something: $(cat said)"
 cp results/sub-08/result.json before.json
 "$supine" phantom --vertices 300 --volume 2222 -o meshes/07.ply >/dev/null
-flow || fail "the third run"
+flow "$@" || fail "the third run"
 grep -q '^subject *1' said || fail "one changed input redid: $(grep -A6 '^job' said)"
 cmp -s before.json results/sub-08/result.json || fail "another subject was done again"
 rm -r results/sub-09
-flow || fail "the fourth run"
+flow "$@" || fail "the fourth run"
 grep -q '^subject *1' said || fail "one missing result redid: $(grep -A6 '^job' said)"
 [ $failures -eq 0 ] || exit 1
