@@ -12,13 +12,15 @@ mount -t proc proc "$root/proc"
 cp "$package" "$root/root/supine.deb"
 cp "$example" "$root/root/example.c"
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive sh -ec "$1"; }
-inside 'apt-get update -qq; apt-get install -y -qq --no-install-recommends gcc libc6-dev pkg-config >/dev/null 2>&1'
+inside 'apt-get update -qq; apt-get install -y -qq --no-install-recommends gcc libc6-dev pkg-config python3-numpy >/dev/null 2>&1'
 inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*"' >"$root/before"
 inside 'apt-get install -y -qq --no-install-recommends /root/supine.deb >/dev/null 2>&1'
 inside 'cd /root; supine phantom --vertices 2000 -o lungs.ply; supine precompute lungs.ply --band 3 -o lungs.safetensors
   supine deform lungs.safetensors --posture prone -o prone.vtp
   gcc -o example example.c $(pkg-config --cflags --libs supine-runtime) && ./example lungs.safetensors prone 500
-  gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone 500'
+  gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone 500
+  python3 -c "import supine; lungs = supine.open(\"lungs.safetensors\"); print(lungs.deform(lungs.weights(\"prone\"), 1.0)[0])"
+  man -w supine-deform 2>/dev/null || ls /usr/share/man/man1/supine-deform.1.gz /usr/share/bash-completion/completions/supine'
 inside 'apt-get purge -y -qq supine >/dev/null 2>&1'
 inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*" ! -path "/var/log/*"' >"$root/after"
 cmp "$root/before" "$root/after"

@@ -22,6 +22,8 @@ fail() {
 "$supine" precompute lungs.ply --band 3 -o lungs.safetensors >/dev/null || exit 1
 "$supine" pv show | cut -d, -f1,2 | sed '1s/.*/pressure_cmH2O,volume_mL/' >samples.csv
 "$supine" pv fit samples.csv -o lungs.pv >/dev/null || exit 1
+awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
+"$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
 # refused INPUT ENDING COMMAND...: the command, with -o and each name of the input, changes nothing.
 refused() {
@@ -51,6 +53,12 @@ refused lungs.safetensors .glb export input.glb
 refused lungs.safetensors .pvd breathe input.pvd --posture prone
 refused lungs.pv .pvd breathe lungs.safetensors --posture prone --pv input.pvd
 refused samples.csv .csv pv fit input.csv
+refused points.csv .safetensors embed lungs.safetensors input.safetensors
+refused points.csv .json fit --landmarks input.json
+refused lungs.ply .png validate lungs.safetensors --state prone:input.png
+printf 'seconds,w,x,y,z\n0,1,0,0,0\n' >poses.csv && cp poses.csv poses.before
+"$supine" stream lungs.safetensors --replay poses.csv --record poses.csv >said 2>&1
+[ $? -eq 1 ] && cmp -s poses.csv poses.before || fail "stream --record replaced what it replays: $(cat said)"
 cp lungs.safetensors same.csv
 "$supine" compare same.csv --csv same.csv >/dev/null 2>&1
 cmp -s lungs.safetensors same.csv || fail "compare --csv replaced its basis"
@@ -140,6 +148,9 @@ writer lung.png render lungs.safetensors --posture supine
 writer page.html export lungs.safetensors
 writer lungs.glb export lungs.safetensors --animate
 writer frames.safetensors breathe lungs.safetensors --posture prone
+writer inside.safetensors embed lungs.safetensors lungs.ply
+writer moved.csv deform points.safetensors --posture prone
+writer errors.png validate lungs.safetensors --state prone:lungs.ply
 
 # A series is a folder of files and an index, and a folder cannot be nameless: a process of its own
 # removes it, whatever ended the program, a moment later.
