@@ -17,17 +17,21 @@ trap 'rm -rf "$work"' EXIT
 mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
-#!/usr/bin/awk -f
-{ # four digits of each decimal number; 0 for what is rounding alone
+#!/bin/sh
+# rounded [DIGITS] [FILE]: four digits of each decimal number; 0 for what is rounding alone. Fewer
+# DIGITS where a number lies between two of four.
+digits=4
+case ${1-} in [1-9]) digits=$1; shift ;; esac
+exec awk -v digits="$digits" '{
   line = $0
   out = ""
   while (match(line, /-?[0-9]+(\.[0-9]+(e[-+]?[0-9]+)?|e[-+]?[0-9]+)/)) {
     number = substr(line, RSTART, RLENGTH) + 0
-    out = out substr(line, 1, RSTART - 1) sprintf("%.4g", number * number < 1e-14 ? 0 : number)
+    out = out substr(line, 1, RSTART - 1) sprintf("%.*g", digits, number * number < 1e-14 ? 0 : number)
     line = substr(line, RSTART + RLENGTH)
   }
   print out line
-}
+}' "$@"
 END
 chmod +x "$work/bin/rounded"
 PATH="$work/bin:$PATH"
