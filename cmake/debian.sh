@@ -3,6 +3,7 @@
 # On a bare Debian 12, as root: install what is needed, build, then
 #   sh cmake/debian.sh demo    make a pair of lungs, precompute and deform them
 #   sh cmake/debian.sh test    build and pass the tests
+#   sh cmake/debian.sh count   print which lines the quick tests reach
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -28,6 +29,11 @@ install_missing() {
 }
 
 case "${1-}" in
+count)
+  # shellcheck disable=SC2086
+  install_missing $build $tests gcovr
+  exec timeout 600 sh tests/coverage.sh quick
+  ;;
 demo)
   # shellcheck disable=SC2086
   install_missing $build
@@ -49,7 +55,7 @@ test)
   exec ctest --preset release
   ;;
 *)
-  echo "usage: sh cmake/debian.sh demo|test" >&2
+  echo "usage: sh cmake/debian.sh demo|test|count" >&2
   exit 1
   ;;
 esac

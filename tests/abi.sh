@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # What programs that were linked with an older run-time library would miss: tests/abi.sh [REVISION]
 #
-# Compares the library of REVISION (the last tag, by default) with the one that is here, by abidiff
-# (Debian's abigail-tools). Ends with 0 where nothing changed, and with abidiff's code and report else.
+# Compares the library of REVISION with the one that is here, by abidiff (Debian's abigail-tools). By
+# default that is the last tag's; while there is none, that of the commit which gave this version its number. Ends with 0 where nothing changed, and with abidiff's code and report else.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
-revision=${1:-$(git -C "$source" describe --tags --abbrev=0)}
+revision=${1:-$(git -C "$source" describe --tags --abbrev=0 2>/dev/null ||
+  git -C "$source" log -1 --format=%h -G'define SUPINE_VERSION "' -- runtime/include/supine/version.h)}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 build() { # build REVISION: its library and headers in $work/REVISION's place

@@ -1,0 +1,61 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Are outputs the same bytes with 1, 2, 3 and 7 threads, and of several builds?
+#
+#     tests/same_bytes.sh build/release/supine [build/debug/supine ...]
+#
+# Each writer runs with each number of threads in each build, on the first build's inputs. Ends with 1
+# where threads make a difference; what differs from build to build is named.
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+first=$(realpath "$1")
+for program in "$@"; do
+  programs="${programs-} $(realpath "$program")"
+done
+cd "$work"
+"$first" phantom --vertices 9000 -o lungs.ply >/dev/null
+"$first" precompute lungs.ply --band 5 -o lungs.safetensors >/dev/null
+printf 'name,x,y,z\na,60,-150,-100\nb,-70,-120,-90\n' >points.csv
+"$first" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1
+
+failed=0
+# made ENDING COMMAND...: the command's output by every build and number of threads.
+made() {
+  ending=$1
+  shift
+  sums=""
+  for program in $programs; do
+    each=""
+    for threads in 1 2 3 7; do
+      SUPINE_THREADS=$threads "$program" "$@" -o "out.$ending" >said 2>&1 || { cat said; exit 1; }
+      each="$each $(sha256sum <"out.$ending" | cut -c1-16)"
+      rm "out.$ending"
+    done
+    # shellcheck disable=SC2086
+    if [ "$(printf '%s\n' $each | sort -u | wc -l)" -ne 1 ]; then
+      echo "$1 .$ending: threads make a difference in $program:$each"
+      failed=1
+    fi
+    sums="$sums ${each##* }"
+  done
+  # shellcheck disable=SC2086
+  case $(printf '%s\n' $sums | sort -u | wc -l) in
+  1) echo "$1 .$ending: the same bytes" ;;
+  *) echo "$1 .$ending: differs from build to build" ;;
+  esac
+}
+made ply phantom --vertices 9000
+made safetensors precompute lungs.ply --band 5
+made safetensors precompute lungs.ply --band 3 --soften 1
+made ply solve lungs.ply --posture left
+made ply deform lungs.safetensors --posture prone
+made vtp deform lungs.safetensors --posture prone
+made html compare lungs.safetensors --postures supine,prone
+made png render lungs.safetensors --posture supine
+made html export lungs.safetensors
+made glb export lungs.safetensors
+made vtp breathe lungs.safetensors --posture prone
+made safetensors embed lungs.safetensors points.csv
+made csv deform points.safetensors --posture prone
+exit $failed
