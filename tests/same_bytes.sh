@@ -7,6 +7,7 @@
 # Each writer runs with each number of threads in each build, on the first build's inputs. Ends with 1
 # where threads make a difference; what differs from build to build is named.
 set -eu
+export SOURCE_DATE_EPOCH=0
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 first=$(realpath "$1")

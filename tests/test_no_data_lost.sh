@@ -1,13 +1,15 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# No command loses data: test_no_data_lost.sh PROGRAM [KILLS]
+# No command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
 # An output that is an input is refused, however it is named; outputs are tried before the work; full
 # disks, files that grow too large and signals leave the old file, and nothing else; KILLS times
 # (default 2) for each writer and signal it is ended at some moment.
 set -u
+export SOURCE_DATE_EPOCH=0 # a report that is made again is the same, also past midnight
 supine=$1
 kills=${2:-2}
+signals=${3:-KILL TERM INT}
 work=$(mktemp -d) || exit 1
 trap 'exit 1' INT TERM
 trap 'cd /; umount "$work/small" 2>/dev/null; rm -rf "$work"' EXIT
@@ -112,7 +114,7 @@ writer() {
     [ "$(ls -A small)" = filler ] || fail "$*: a full disk left $(ls -A small)"
   fi
 
-  for signal in KILL TERM INT; do
+  for signal in $signals; do
     done_whole=0
     for i in $(seq "$kills"); do
       moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
@@ -164,7 +166,7 @@ mkdir out && "$supine" breathe lungs.safetensors --posture prone -o out/frames.p
 took=$((($(date +%s%N) - began) / 1000000))
 count=$(ls out/frames | wc -l)
 rm -rf out
-for signal in KILL TERM INT HUP; do
+for signal in ${3:-KILL TERM INT HUP}; do
   done_whole=0
   for i in $(seq "$kills"); do
     moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')

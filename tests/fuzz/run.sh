@@ -19,6 +19,7 @@ for reader in $readers; do
 done
 cmake --build "$folder" --target $targets >> "$folder.log" 2>&1
 cd "$folder"
+export LSAN_OPTIONS="suppressions=$source/tests/lsan.supp:print_suppressions=0"
 failed=0
 for reader in $readers; do
   case $reader in ply | stl | off | obj) dictionary=mesh ;; nrrd | nii) dictionary=image ;; message) dictionary=text ;; *) dictionary=$reader ;; esac
