@@ -146,21 +146,32 @@ static void smooth(const supine_system *system, supine_stage *stage) {
   stage->work = swap;
 }
 
-void supine_physics_system_cycle(supine_system *system) {
-  for (size_t k = 0; k + 1 < system->stage_count; ++k) {
-    supine_stage *stage = &system->stage[k];
-    supine_stage *next = &system->stage[k + 1];
-    sweep(system, stage, 0.0F, stage->right, stage->solution, stage->work);
-    apply(system, stage->whole, 0.0F, stage->work, next->right);
-    row_pass pass = {next,        NULL,           system->lanes, SUPINE_DAMPING,
-                     next->right, next->solution, next->solution};
-    supine_physics_system_run(system->threads, next->links->count, begin_range, &pass);
-  }
-  for (size_t k = system->stage_count; k-- > 0;) {
-    supine_stage *stage = &system->stage[k];
+/* From here on stages are gone through twice a cycle: a twentieth of a cycle's work, since each
+ * stage has a seventh to a tenth of the last one's rows, for a tenth fewer steps on millions of
+ * rows. */
+static const size_t twice_from = 2;
+
+/* Improves the solution of stage k, where it stands at SUPINE_DAMPING inverse right. */
+static void improve(supine_system *system, size_t k) {
+  supine_stage *stage = &system->stage[k];
+  for (int turn = 0; turn < (k < twice_from ? 1 : 2); ++turn) {
+    if (turn > 0) {
+      smooth(system, stage);
+    }
     if (k + 1 < system->stage_count) {
-      apply(system, stage->part, 1.0F, system->stage[k + 1].solution, stage->solution);
+      supine_stage *next = &system->stage[k + 1];
+      sweep(system, stage, 0.0F, stage->right, stage->solution, stage->work);
+      apply(system, stage->whole, 0.0F, stage->work, next->right);
+      row_pass pass = {next,        NULL,           system->lanes, SUPINE_DAMPING,
+                       next->right, next->solution, next->solution};
+      supine_physics_system_run(system->threads, next->links->count, begin_range, &pass);
+      improve(system, k + 1);
+      apply(system, stage->part, 1.0F, next->solution, stage->solution);
     }
     smooth(system, stage);
   }
+}
+
+void supine_physics_system_cycle(supine_system *system) {
+  improve(system, 0);
 }

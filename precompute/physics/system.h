@@ -44,7 +44,8 @@ void supine_physics_system_set_masses(supine_system *system);
 #define SUPINE_DAMPING 0.9F
 
 /* Improves the first stage's solution for its right side, where the solution stands at
- * SUPINE_DAMPING inverse right: down to the last stage and back, one smoothing sweep on either way.
+ * SUPINE_DAMPING inverse right: down to the last stage and back, coarse stages twice, one smoothing
+ * sweep on either way.
  * Symmetric, so that conjugate gradients take it for a preconditioner. */
 void supine_physics_system_cycle(supine_system *system);
 

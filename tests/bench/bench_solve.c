@@ -246,6 +246,46 @@ static void measure_memory(size_t vertices) {
   (void)printf(", peak memory %.2f GB\n\n", 1.024e-6 * (double)usage.ru_maxrss);
 }
 
+/* Every size up to the largest, with and without a reach, by turns. */
+static void solve_sizes(const size_t *sizes, size_t count, size_t largest, int repeats) {
+  enum { SIZES_MAX = 8, PAIR = 1 };
+  supine_lungs lungs[SIZES_MAX];
+  double seconds[SIZES_MAX][2][2];
+  supine_solve_report report[SIZES_MAX][2];
+  size_t made = 0;
+  for (; made < count && sizes[made] <= largest; ++made) {
+    lungs[made] = make_lungs(sizes[made]);
+    for (int k = 0; k < 4; ++k) {
+      seconds[made][k / 2][k % 2] = INFINITY;
+    }
+  }
+  for (int turn = 0; turn < 2 * repeats; ++turn) {
+    for (size_t s = 0; s < made; ++s) {
+      const int k = turn % 2;
+      solve(&lungs[s], k == 0 ? 0.0 : reach, seconds[s][k], &report[s][k]);
+    }
+  }
+  (void)printf("the columns of the force, set up and solved to the default residual, %zu threads\n"
+               "processor time, the least of %d by turns; beside that of %zu vertices\n"
+               "                   setting up      solving\n"
+               "vertices  reach   us a vertex  us a vertex  beside   steps   residual\n",
+               supine_thread_count(), repeats, sizes[PAIR]);
+  for (size_t s = 0; s < made; ++s) {
+    for (int k = 0; k < 2; ++k) {
+      const double vertices = (double)lungs[s].mesh.vertex_count;
+      const size_t pair = made > PAIR ? PAIR : 0;
+      const double beside = seconds[pair][k][1] / (double)lungs[pair].mesh.vertex_count;
+      (void)printf("%8.0f %6.0f %13.3f %12.3f %7.2f %7zu %10.0e\n", vertices, k == 0 ? 0.0 : reach,
+                   1e6 * seconds[s][k][0] / vertices, 1e6 * seconds[s][k][1] / vertices,
+                   seconds[s][k][1] / vertices / beside, report[s][k].iterations,
+                   report[s][k].residual);
+    }
+  }
+  for (size_t s = 0; s < made; ++s) {
+    supine_lungs_free(&lungs[s]);
+  }
+}
+
 int main(int argc, char **argv) {
   static const size_t sizes[] = {10000, 40000, 508000, 2000000};
   enum { SIZES = sizeof sizes / sizeof *sizes, PAIR = 1, LARGE = 2 };
@@ -254,26 +294,7 @@ int main(int argc, char **argv) {
   if (sizes[LARGE] <= largest) { /* first: a child's peak counts what its parent holds */
     measure_memory(sizes[LARGE]);
   }
-  (void)printf("the columns of the force, set up and solved to the default residual, %zu threads\n"
-               "processor time, the least of %d\n"
-               "                   setting up      solving\n"
-               "vertices  reach   us a vertex  us a vertex   steps   residual\n",
-               supine_thread_count(), repeats);
-  for (size_t s = 0; s < SIZES && sizes[s] <= largest; ++s) {
-    supine_lungs lungs = make_lungs(sizes[s]);
-    double seconds[2][2] = {{INFINITY, INFINITY}, {INFINITY, INFINITY}};
-    supine_solve_report report[2];
-    for (int k = 0; k < 2 * repeats; ++k) { /* by turns */
-      solve(&lungs, k % 2 == 0 ? 0.0 : reach, seconds[k % 2], &report[k % 2]);
-    }
-    const double vertices = (double)lungs.mesh.vertex_count;
-    for (int k = 0; k < 2; ++k) {
-      (void)printf("%8.0f %6.0f %13.3f %12.3f %7zu %10.0e\n", vertices, k == 0 ? 0.0 : reach,
-                   1e6 * seconds[k][0] / vertices, 1e6 * seconds[k][1] / vertices,
-                   report[k].iterations, report[k].residual);
-    }
-    supine_lungs_free(&lungs);
-  }
+  solve_sizes(sizes, SIZES, largest, repeats);
   if (sizes[PAIR] <= largest) {
     supine_lungs lungs = make_lungs(sizes[PAIR]);
     (void)printf("\none direction at a time, in double, without coarser graphs, beside eight at a "
