@@ -278,27 +278,31 @@ static void call_end(call *made) {
   }
 }
 
-static bool call_begin(const handle *of, PyObject *arguments, call *made) {
-  PyObject *from[4] = {NULL, NULL, Py_None, Py_None};
-  Py_ssize_t begin = 0;
-  Py_ssize_t end = 0;
+/* Arguments: weights, scales, begin, end, xyz and, where there are six, normals. */
+static bool call_begin(const handle *of, PyObject *const *arguments, Py_ssize_t given, call *made) {
   made->xyz = made->normals = (Py_buffer){0};
-  if (!PyArg_ParseTuple(arguments, "OOnnO|O", &from[0], &from[1], &begin, &end, &from[2],
-                        &from[3]) ||
-      !supine_python_numbers(from[0], "weights", of->info->mode_count, made->weights) ||
-      !supine_python_scales(from[1], of->info->lung_count, made->scales) ||
+  if (given != 5 && given != 6) {
+    PyErr_Format(PyExc_TypeError, "%zd arguments, where 5 or 6 are taken", given);
+    return false;
+  }
+  const Py_ssize_t begin = PyNumber_AsSsize_t(arguments[2], PyExc_IndexError);
+  const Py_ssize_t end = PyNumber_AsSsize_t(arguments[3], PyExc_IndexError);
+  if (PyErr_Occurred() != NULL ||
+      !supine_python_numbers(arguments[0], "weights", of->info->mode_count, made->weights) ||
+      !supine_python_scales(arguments[1], of->info->lung_count, made->scales) ||
       !range_fits(of, begin, end)) {
     return false;
   }
   made->begin = (size_t)begin;
   made->end = (size_t)end;
   const size_t count = 3 * (made->end - made->begin);
-  if (from[2] != Py_None && !supine_python_array(from[2], "out", 'f', count, true, &made->xyz)) {
+  if (arguments[4] != Py_None &&
+      !supine_python_array(arguments[4], "out", 'f', count, true, &made->xyz)) {
     made->xyz.obj = NULL;
     return false;
   }
-  if (from[3] != Py_None &&
-      !supine_python_array(from[3], "normals", 'f', count, true, &made->normals)) {
+  if (given == 6 && arguments[5] != Py_None &&
+      !supine_python_array(arguments[5], "normals", 'f', count, true, &made->normals)) {
     made->normals.obj = NULL;
     call_end(made);
     return false;
@@ -309,10 +313,11 @@ static bool call_begin(const handle *of, PyObject *arguments, call *made) {
 typedef void range_function(const supine_basis *basis, const double *weights, const double *scales,
                             size_t begin, size_t end, float *xyz);
 
-static PyObject *run_range(PyObject *self, PyObject *arguments, range_function *run) {
+static PyObject *run_range(PyObject *self, PyObject *const *arguments, Py_ssize_t given,
+                           range_function *run) {
   const handle *of = (handle *)self;
   call made;
-  if (!call_begin(of, arguments, &made)) {
+  if (!call_begin(of, arguments, given, &made)) {
     return NULL;
   }
   if (made.xyz.obj == NULL) {
@@ -326,18 +331,18 @@ static PyObject *run_range(PyObject *self, PyObject *arguments, range_function *
   Py_RETURN_NONE;
 }
 
-static PyObject *handle_deform(PyObject *self, PyObject *arguments) {
-  return run_range(self, arguments, supine_deform_range);
+static PyObject *handle_deform(PyObject *self, PyObject *const *arguments, Py_ssize_t given) {
+  return run_range(self, arguments, given, supine_deform_range);
 }
 
-static PyObject *handle_displace(PyObject *self, PyObject *arguments) {
-  return run_range(self, arguments, supine_displace_range);
+static PyObject *handle_displace(PyObject *self, PyObject *const *arguments, Py_ssize_t given) {
+  return run_range(self, arguments, given, supine_displace_range);
 }
 
-static PyObject *handle_deform_lit(PyObject *self, PyObject *arguments) {
+static PyObject *handle_deform_lit(PyObject *self, PyObject *const *arguments, Py_ssize_t given) {
   const handle *of = (handle *)self;
   call made;
-  if (!call_begin(of, arguments, &made)) {
+  if (!call_begin(of, arguments, given, &made)) {
     return NULL;
   }
   if (made.normals.obj == NULL) {
@@ -411,6 +416,9 @@ static PyObject *handle_normals(PyObject *self, PyObject *arguments) {
   return fits ? Py_NewRef(Py_None) : NULL;
 }
 
+/* Calls that take no tuple have a type of their own. */
+#define FAST(function) ((PyCFunction)(void (*)(void))(function))
+
 PyObject *supine_python_basis_type(void) {
   static PyMethodDef methods[] = {
       {"info", handle_info, METH_NOARGS, "numbers of supine_basis_info"},
@@ -422,9 +430,9 @@ PyObject *supine_python_basis_type(void) {
       {"scale", handle_scale, METH_VARARGS, "supine_basis_scale, supine_basis_lung_scale"},
       {"volume", handle_volume, METH_VARARGS, "supine_basis_lung_volume"},
       {"error", handle_error, METH_VARARGS, "supine_basis_error"},
-      {"deform", handle_deform, METH_VARARGS, "supine_deform_range"},
-      {"displace", handle_displace, METH_VARARGS, "supine_displace_range"},
-      {"deform_lit", handle_deform_lit, METH_VARARGS, "supine_deform_lit_range"},
+      {"deform", FAST(handle_deform), METH_FASTCALL, "supine_deform_range"},
+      {"displace", FAST(handle_displace), METH_FASTCALL, "supine_displace_range"},
+      {"deform_lit", FAST(handle_deform_lit), METH_FASTCALL, "supine_deform_lit_range"},
       {"deform_batch", handle_deform_batch, METH_VARARGS, "supine_deform_batch"},
       {"normals", handle_normals, METH_VARARGS, "supine_normals"},
       {NULL, NULL, 0, NULL}};
