@@ -15,7 +15,7 @@ const { GLTFLoader } = await load('three/examples/jsm/loaders/GLTFLoader.js');
 
 const FLOAT_MM = 0.001;
 const QUANTISED_MM = 0.01;
-const BREATH = 700; // mL
+const BREATH = 1000; // mL
 
 /** Asserts that the validator finds neither error nor warning. */
 async function validate(path) {
@@ -120,7 +120,7 @@ async function check(basis, words, tolerance, targets, clamped) {
   assert.equal(mesh.morphTargetInfluences.length, targets);
   assert.deepEqual(Object.keys(mesh.morphTargetDictionary), mesh.userData.targetNames);
   const random = randomSource(77);
-  const pairs = randomDirections(10, 20241).map((g) => [g, BREATH * random()]);
+  const pairs = randomDirections(10, 20241).map((g, i) => [g, i % 2 ? BREATH * random() : BREATH]);
   const truth = evaluate(basis, [[[0, 1, 0], 0], ...pairs]);
   let worst = largestDistance(morphed(mesh), truth[0].xyz); // weights as stored: at rest
   const [angles, still] = [[], []];
@@ -130,13 +130,15 @@ async function check(basis, words, tolerance, targets, clamped) {
     assert.ok(Math.abs(s / truth[i + 1].scale - 1) < 1e-9 || extras.lossPercent > 0);
     if (clamped) assert.ok(weights.every((w) => w >= 0 && w <= 1), `weights ${weights}`);
     mesh.morphTargetInfluences.splice(0, targets, ...weights);
-    angles.push(...normalErrors(meshes, truth[i + 1].xyz));
-    still.push(...stillErrors(truth[0].xyz, truth[i + 1].xyz, meshes));
+    if (mL === BREATH) {
+      angles.push(...normalErrors(meshes, truth[i + 1].xyz));
+      still.push(...stillErrors(truth[0].xyz, truth[i + 1].xyz, meshes));
+    }
     worst = Math.max(worst, largestDistance(morphed(mesh), truth[i + 1].xyz));
   });
   const mean = (list) => list.reduce((sum, x) => sum + x, 0) / list.length;
   const at95 = (list) => list.sort((a, b) => a - b)[Math.floor(0.95 * list.length)];
-  console.log(`  normals: ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile; unmoved ${mean(still).toFixed(2)} and ${at95(still).toFixed(2)}`);
+  console.log(`  normals at ${BREATH} mL: ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile; unmoved ${mean(still).toFixed(2)} and ${at95(still).toFixed(2)}`);
   assert.ok(mean(angles) < 1 && at95(angles) < 3, 'normals are off');
   const least = largestDistance(truth[0].xyz, truth[1].xyz);
   assert.ok(least > 100 * tolerance, 'nothing moved, so nothing was tested');
