@@ -257,6 +257,8 @@ static void test_image_names_and_places_refused(void **state) {
   supine_image image = made(SUPINE_VOXEL_U8, 5);
   supine_error error;
   assert_true(supine_image_supports("x.NII.GZ") && supine_image_supports("x.nrrd"));
+  assert_true(supine_image_is_named("x.nii") && supine_image_is_named("x.MHA"));
+  assert_false(supine_image_is_named("x.ply") || supine_image_supports("x.mha"));
   assert_false(supine_image_supports("x.gz") || supine_image_supports(".nrrd"));
   check_refused("image.mha", SUPINE_ERROR_FORMAT, ".nrrd");
   check_refused("absent.nrrd", SUPINE_ERROR_READ, "absent");

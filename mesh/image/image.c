@@ -26,6 +26,15 @@ bool supine_image_supports(const char *path) {
   return ends_in(path, ".nrrd") || is_nifti(path);
 }
 
+bool supine_image_is_named(const char *path) {
+  static const char *const others[] = {".mha", ".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
+  bool is = supine_image_supports(path);
+  for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
+    is = is || ends_in(path, others[i]);
+  }
+  return is;
+}
+
 /* Finite, and three directions? A voxel's edges are no closer than a thousandth of a right angle.
  */
 static bool is_frame(const supine_image *image) {
@@ -52,7 +61,9 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   supine_image read = {.channels = 1};
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
+                            "%s: an image's name must end in .nrrd, .nii or .nii.gz; others are "
+                            "to be converted, as by 3D Slicer or 'plastimatch convert'",
+                            path);
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,

@@ -43,6 +43,10 @@ typedef struct supine_image {
 /** Does the name end in .nrrd, .nii or .nii.gz? */
 bool supine_image_supports(const char *path);
 
+/** Or as those of other formats do (.mha, .mhd, .nhdr, .mgz, .dcm, .hdr, .img), which are told that
+ * they are not read: of none is a C library at hand that is kept up. */
+bool supine_image_is_named(const char *path);
+
 /** Reads an image of one number a voxel. A NIfTI image's slope and intercept are applied, to F32.
  * @param image  zero-initialised; written on success alone
  * @retval SUPINE_ERROR_READ    missing or unreadable

@@ -142,12 +142,12 @@ static supine_status read_labelled(const request *wanted, const char *path,
 static supine_status read_content(const supine_inside_shells *shells, const request *wanted,
                                   char **paths, size_t count, supine_inside_content *content,
                                   supine_error *error) {
-  if (count == 0 || (!wanted->labels.given && supine_image_supports(paths[0]))) {
+  if (count == 0 || (!wanted->labels.given && supine_image_is_named(paths[0]))) {
     return read_grid(shells, wanted, count > 0 ? paths[0] : NULL, content, error);
   }
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = supine_image_supports(paths[i]) ? read_labelled(wanted, paths[i], content, error)
+    status = supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
              : ends_in(paths[i], ".csv")
                  ? supine_inside_content_points(paths[i], &wanted->load, content, error)
                  : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
@@ -234,7 +234,7 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_error error;
   bool image = false;
   for (size_t i = 1; i < given->count; ++i) {
-    image = image || supine_image_supports(given->operand[i]);
+    image = image || supine_image_is_named(given->operand[i]);
   }
   if (given->count == 1 && !wanted->has_grid) {
     return supine_options_usage(name, "which content? Name points (.csv), meshes or an image, or "

@@ -31,7 +31,7 @@ int supine_command_labels_check(const supine_label_options *options, const char 
                                 char **paths, size_t count, bool *maps) {
   size_t images = 0;
   for (size_t i = 0; i < count; ++i) {
-    images += supine_image_supports(paths[i]);
+    images += supine_image_is_named(paths[i]);
   }
   *maps = images == count;
   if (images > 0 && images < count) {
