@@ -20,12 +20,7 @@ void main() {
                 0.16 * lambert(n, vec3(0.9, -0.1, 0.5));
   light *= mix(0.72, 1.0, smoothstep(0.0, 0.45, facing)); // darker towards the outline
   vec3 lit = base * light;
-  if (line_step > 0.0) {
-    float steps = v_value / line_step;
-    float away = abs(fract(steps - 0.5) - 0.5) / max(fwidth(steps), 1e-6);
-    float line = (1.0 - smoothstep(0.5, 1.7, away)) * step(0.5, steps);
-    lit = mix(lit, lit * 0.45, 0.4 * line);
-  }
+  lit = lined(lit, v_value, line_step);
   float shine = pow(lambert(n, normalize(key) + eye), 48.0);
   lit += vec3(0.08 * shine);
   lit += dark * vec3(0.10, 0.14, 0.20) * pow(1.0 - facing, 3.0);

@@ -41,8 +41,9 @@ GLuint supine_render_gl_program(size_t lungs, size_t vectors, supine_error *erro
                  lungs, vectors);
   const GLuint vertex =
       compile(GL_VERTEX_SHADER, defines, source("supine.glsl"), source("lungs.vert.glsl"), error);
-  const GLuint fragment =
-      vertex != 0 ? compile(GL_FRAGMENT_SHADER, "", "", source("lungs.frag.glsl"), error) : 0;
+  const GLuint fragment = vertex != 0 ? compile(GL_FRAGMENT_SHADER, "", source("contour.glsl"),
+                                                source("lungs.frag.glsl"), error)
+                                      : 0;
   if (fragment != 0) {
     program = glCreateProgram();
     glAttachShader(program, vertex);

@@ -220,21 +220,23 @@ void supine_report_html(const supine_comparison *c, FILE *file) {
   json_t *pictures = supine_report_pictures(c, &error);
   (void)json_object_set_new(data, "postures", postures(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
+  (void)json_object_set_new(data, "surface",
+                            json_string(supine_report_knows_rest(c) ? "full inflation" : "rest"));
   (void)json_object_set_new(data, "map", supine_report_map(c));
   (void)json_object_set_new(data, "map_bar",
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,
-                                              "RMS distance from supine, mm"));
+                                              false, "RMS distance from supine, mm"));
   if (pictures != NULL) {
     (void)json_object_set_new(data, "pictures", pictures);
   } else {
     (void)json_object_set_new(data, "trouble", json_string(error.message));
   }
   if (c->postures.count > 1) {
-    (void)json_object_set_new(data, "matrix",
-                              json_pack("{s:o, s:o, s:o}", "parts", matrix(c), "pairs", pairs(c),
-                                        "between_bar",
-                                        supine_report_bar(SUPINE_COLOURS_DIFFERENCE,
-                                                          largest_pair(c), "RMS distance, mm")));
+    (void)json_object_set_new(
+        data, "matrix",
+        json_pack("{s:o, s:o, s:o}", "parts", matrix(c), "pairs", pairs(c), "between_bar",
+                  supine_report_bar(SUPINE_COLOURS_DIFFERENCE, largest_pair(c), false,
+                                    "RMS distance, mm")));
   }
   if (supine_basis_get_info(c->basis)->has_volume) {
     (void)json_object_set_new(data, "slabs", slabs(c));

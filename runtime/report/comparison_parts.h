@@ -24,8 +24,9 @@ enum { SUPINE_REPORT_COLUMNS = 6 }; /* of a table or a row of pictures, so that 
  * `rows`. */
 json_t *supine_report_parts(const supine_comparison *comparison, json_t *rows);
 
-/* A bar of colours up to `largest`: {{stops}}, {{ticks}} and {{words}}. */
-json_t *supine_report_bar(supine_colours map, double largest, const char *words);
+/* A bar of colours up to `largest`, its end pointed where values lie beyond: {{stops}}, {{ticks}},
+ * {{beyond}} and {{words}}. */
+json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words);
 
 /* A direction of gravity in words: a posture's name, or how far it is from the nearest and the
  * numbers that commands take. */

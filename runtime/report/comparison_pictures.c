@@ -141,6 +141,7 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   look looks[VIEWS_MAX];
   const size_t count = choose_looks(c, looks);
   double p95 = 0.0;
+  double most = 0.0;
   supine_renderer *renderer = NULL;
   json_t *rows = json_array();
   json_t *pictures = NULL;
@@ -152,6 +153,7 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   for (size_t i = 0; i < c->postures.count; ++i) {
     const double here = c->posture[i].displacement.p95;
     p95 = here > p95 ? here : p95;
+    most = c->posture[i].displacement.max > most ? c->posture[i].displacement.max : most;
   }
   const double largest = supine_render_bar_end(p95);
   for (size_t i = 0; i < count; ++i) {
@@ -159,10 +161,11 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
       goto cleanup;
     }
   }
-  pictures =
-      supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest,
-                        "displacement from rest, mm; lines at the ticks; the last colour also "
-                        "shows what lies beyond");
+  char words[128];
+  (void)snprintf(words, sizeof words, "displacement from %s, mm; lines at the ticks%s",
+                 supine_report_knows_rest(c) ? "full inflation" : "rest",
+                 most > largest ? "; the last colour also shows what lies beyond" : "");
+  pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));
   (void)json_object_set_new(pictures, "parts", supine_report_parts(c, json_incref(rows)));
 cleanup:

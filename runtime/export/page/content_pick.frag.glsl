@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Which part inside is under the pointer, as a number that is none, and where.
-precision highp float;
-precision highp int;
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

@@ -9,7 +9,7 @@ function linkOf(state) {
   const all = {
     posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
     colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '1' : '',
-    show: ['contours', 'ghost', 'arrows', 'wires', 'beside'].filter((name) => state[name]).join('.'),
+    show: ['contours', 'ghost', 'arrows', 'wires', 'beside'].filter((name) => state[name]).join('.') || 'nothing',
     lungs: state.opacity.every((x) => x === (state.basis.inside ? FADED : 1)) ? '' : state.opacity.join(':'),
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
@@ -33,7 +33,7 @@ function takeLink(text, state) {
   if (KINDS[link.get('colour')]) state.kind = link.get('colour');
   state.room = link.get('room') === '1';
   state.roomBlend = state.room ? 1 : 0;
-  const shown = (link.get('show') ?? '').split('.');
+  const shown = (link.get('show') ?? 'contours').split('.');
   for (const name of ['contours', 'ghost', 'arrows', 'wires', 'beside']) state[name] = shown.includes(name);
   const opacity = numbers('lungs');
   if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The value and the place under the pointer, bit by bit; the value's last four say which lung.
-precision highp float;
-precision highp int;
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

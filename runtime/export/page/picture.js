@@ -58,13 +58,13 @@ class Picture {
     const program = gl.createProgram();
     const attach = (type, text) => {
       const shader = gl.createShader(type);
-      gl.shaderSource(shader, `#version 300 es\n${text}`);
+      gl.shaderSource(shader, `#version 300 es\nprecision highp float;\nprecision highp int;\n${text}`);
       gl.compileShader(shader);
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${vertex}: ${gl.getShaderInfoLog(shader)}`);
       gl.attachShader(program, shader);
     };
     attach(gl.VERTEX_SHADER, text);
-    attach(gl.FRAGMENT_SHADER, fragment ? source(fragment) : 'precision highp float; void main() {}');
+    attach(gl.FRAGMENT_SHADER, fragment ? source(fragment) : 'void main() {}');
     if (outputs) gl.transformFeedbackVaryings(program, outputs, gl.SEPARATE_ATTRIBS);
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(`${vertex}: ${gl.getProgramInfoLog(program)}`);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-precision highp float;
 in vec3 facing;
 in vec3 body;
 uniform vec4 tint;

@@ -82,7 +82,7 @@ class State {
     this.playing = false;
     this.kind = 'displacement';
     this.pinnedQ = POSTURES[0].q;
-    this.contours = false;
+    this.contours = true;
     this.ghost = false;
     this.arrows = false;
     this.wires = false;

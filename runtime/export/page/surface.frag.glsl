@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Colour by value, shaded softly so that the colours stay readable.
-precision highp float;
 in vec3 eye;
 in vec3 facing;
 in vec3 body;
@@ -29,13 +28,7 @@ void main() {
   }
   float at = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
   vec3 base = texture(colours, vec2(at * (255.0 / 256.0) + 0.5 / 256.0, 0.5)).rgb;
-  if (spacing > 0.0) {
-    float lines = value / spacing;
-    float width = fwidth(lines);
-    float distance_to = abs(fract(lines - 0.5) - 0.5) / max(width, 1e-6);
-    float line = (1.0 - smoothstep(0.4, 1.4, distance_to)) * (1.0 - smoothstep(0.15, 0.5, width));
-    base = mix(base, base * 0.55, 0.55 * line);
-  }
+  base = lined(base, value, spacing);
   if (flatly > 0.5) {
     colour = vec4(mix(base, base * 0.7, 1.0 - dark), 1.0);
     return;
