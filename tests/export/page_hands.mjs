@@ -284,6 +284,82 @@ async function checkMotion() {
   await page.close();
 }
 
+/** What is said at the pointer lies within what the library computes around there, for each colour. */
+async function checkKinds(page) {
+  await page.keyboard.press('1');
+  await page.keyboard.press('n');
+  await page.keyboard.press('2');
+  await page.keyboard.press('a');
+  await settled(page);
+  const [now, pinned, rest, corners] = await page.evaluate(() => {
+    const { state: s, positions, basis: b } = window.supine;
+    return [positions(s.gravity, s.depth), positions([0, 1, 0], s.depth), positions([0, 1, 0], 0), b.corners].map((list) => Array.from(list));
+  });
+  const point = (list, v) => list.slice(3 * v, 3 * v + 3);
+  const apart = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+  const lowest = Math.max(...Array.from({ length: now.length / 3 }, (_, v) => -now[3 * v + 1])); // prone: along -y
+  const area = (list, t) => {
+    const [a, b, c] = [0, 1, 2].map((i) => point(list, corners[t + i]));
+    const [u, v] = [b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i])];
+    return Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+  };
+  const vertices = (place, far) => Array.from({ length: now.length / 3 }, (_, v) => v).filter((v) => apart(point(now, v), place) < far);
+  const kinds = {
+    displacement: (place) => vertices(place, 24).map((v) => apart(point(now, v), point(rest, v))),
+    difference: (place) => vertices(place, 24).map((v) => apart(point(now, v), point(pinned, v))),
+    height: (place) => vertices(place, 24).map((v) => lowest + now[3 * v + 1]),
+    expansion: (place) => Array.from({ length: corners.length / 3 }, (_, i) => 3 * i).filter((t) => apart(point(now, corners[t]), place) < 30).map((t) => 100 * (area(now, t) / area(rest, t) - 1)),
+  };
+  const box = await page.locator('#picture').boundingBox();
+  for (const [kind, around] of Object.entries(kinds)) {
+    await page.locator(`[name=kind][value=${kind}]`).check();
+    for (const [x, y] of [[0.4, 0.5], [0.6, 0.52]]) {
+      await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
+      await picture(page);
+      await page.waitForFunction(() => !window.supine.picture.picking);
+      await settled(page);
+      const text = (await page.locator('#pointed').textContent()).replace('\u2212', '-');
+      const [, value, ends, l, p, h] = /^(-?[\d.]+) (?:mm|%)(?:left|right) lung {3}(([LR] \d+) {2}([PA] \d+) {2}([HF] \d+)) mm$/.exec(text);
+      assert.ok(ends);
+      const place = [l, p, h].map((part) => ('LPH'.includes(part[0]) ? 1 : -1) * Number(part.slice(2)));
+      const values = around(place);
+      assert.ok(values.length >= 3, `nothing is near ${place}`);
+      const [low, high] = [Math.min(...values), Math.max(...values)];
+      assert.ok(Number(value) >= low - 0.2 && Number(value) <= high + 0.2, `${kind} at ${place}: ${value}, not within ${low} and ${high}`);
+    }
+  }
+  await page.locator('[name=kind][value=displacement]').check();
+  await page.mouse.move(5, 5);
+}
+
+/** Whatever is written over the lungs has a ground of its own, against which it can be read. */
+async function checkLegible(page) {
+  for (const theme of ['light', 'dark']) {
+    await page.evaluate((name) => { if (document.documentElement.dataset.theme !== name) document.getElementById('theme').click(); }, theme);
+    await settled(page);
+    const worst = await page.evaluate(() => {
+      const channels = (text) => (/[\d.]+/.test(text) ? text.match(/[\d.]+/g).map(Number) : [0, 0, 0, 0]);
+      const luminance = ([r, g, b]) => { const [x, y, z] = [r, g, b].map((c) => (c / 255 <= 0.04045 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4)); return 0.2126 * x + 0.7152 * y + 0.0722 * z; };
+      const texts = [...document.getElementById('stage').querySelectorAll('*')].filter((e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()) && e.checkVisibility());
+      return texts.map((element) => {
+        let ground = element;
+        while (ground && !((channels(getComputedStyle(ground).backgroundColor)[3] ?? 1) > 0.5)) ground = ground.parentElement;
+        if (!ground) return [element.id || element.className, 0];
+        const [r, g, b, alpha = 1] = channels(getComputedStyle(ground).backgroundColor);
+        const ink = luminance(channels(getComputedStyle(element).color));
+        const ratios = [0, 255].map((behind) => { // the darkest and the lightest that lungs can be
+          const paper = luminance([r, g, b].map((c) => alpha * c + (1 - alpha) * behind));
+          return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+        });
+        return [element.id || element.className || element.tagName, Math.min(...ratios)];
+      });
+    });
+    assert.ok(worst.length >= 8);
+    assert.deepEqual(worst.filter(([, ratio]) => ratio < 4.5), [], theme);
+  }
+  await page.evaluate(() => { if (document.documentElement.dataset.theme !== 'light') document.getElementById('theme').click(); });
+}
+
 /** Plain words first, the rest behind a button. */
 async function checkWords(page) {
   assert.match(await page.locator('#title p').textContent(), /not for diagnosis/);
@@ -296,7 +372,7 @@ async function checkWords(page) {
 }
 
 const { page, complaints } = await openLungs(html, { viewport: { width: 700, height: 420 } });
-for (const check of [checkKeys, checkButtons, checkTyped, checkProbes, checkLoss, checkArrow, checkNotation, checkWords]) {
+for (const check of [checkKeys, checkButtons, checkTyped, checkProbes, checkLoss, checkArrow, checkNotation, checkWords, checkKinds, checkLegible]) {
   await check(page);
   console.log(check.name);
 }

@@ -64,11 +64,12 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** How far the lungs reach along gravity, mm: some of their vertices, as they are. */
+  /** How far the lungs reach along gravity, mm: all of their vertices where heights are shown; some are
+   * enough to know where to draw gravity. */
   function lowest(moment) {
     const { rest, direction, coefficients, modes } = basis;
     const { weights, gravity: [x, y, z] } = moment;
-    const stride = Math.ceil(basis.vertices / 400);
+    const stride = state.kind === 'height' ? 1 : Math.ceil(basis.vertices / 400);
     let reach = -Infinity;
     for (let i = 0; i < basis.vertices; i += stride) {
       let amount = 0;
@@ -111,7 +112,8 @@ function start() {
 
   const depths = {}; // the lowest point of each state, kept while it does not move
   function pane_lowest(name, moment) {
-    if (depths[name]?.moment !== moment) depths[name] = { moment, value: lowest(moment) };
+    const { kind } = state;
+    if (depths[name]?.moment !== moment || depths[name].kind !== kind) depths[name] = { moment, kind, value: lowest(moment) };
     return depths[name].value;
   }
 
@@ -363,7 +365,10 @@ function start() {
     showState();
     stale = unseen = false;
     const gpu = Number.isNaN(picture.gpuTime) ? '' : `, drawing ${picture.gpuTime.toFixed(1)} ms`;
-    if (!Number.isNaN(frameTime)) write('frame-time', `frame ${frameTime.toFixed(1)} ms${gpu}`);
+    if (!Number.isNaN(frameTime)) {
+      $('frame-time').hidden = false;
+      write('frame-time', `frame ${frameTime.toFixed(1)} ms${gpu}`);
+    }
     clearTimeout(idle);
     idle = setTimeout(keepLink, 400);
   }
