@@ -22,6 +22,9 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
   cmake --build build/clang >>build/clang.log || { grep -E 'error|warning' build/clang.log; exit 1; }
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
-  git ls-files 'sh/*.c' 'mesh/*.c' 'precompute/*.c' 'runtime/*.c' supine.c |
-    xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang 2>/dev/null
+  # The file that defines what analyse.h redefines does without it.
+  git ls-files 'sh/*.c' 'mesh/*.c' 'precompute/*.c' 'runtime/*.c' supine.c | grep -v '^runtime/error.c$' |
+    xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang --extra-arg=-include \
+      --extra-arg="$PWD/tests/analyse.h" 2>/dev/null
+  clang-tidy --quiet -p build/clang runtime/error.c 2>/dev/null
 fi

@@ -255,8 +255,8 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   if (status != SUPINE_OK) {
     return status;
   }
-  for (uint8_t value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
-    list_labels(tally, side, value, list[value - 1], sizeof list[0]);
+  for (int value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
+    list_labels(tally, side, (uint8_t)value, list[value - 1], sizeof list[0]);
   }
   taken[0] = '\0';
   if (list[2][0] != '\0') {

@@ -91,7 +91,7 @@ typedef struct supine_option {
                    : SUPINE_OPTION_CHOICE, default                                                 \
                    : SUPINE_OPTION_OWN),                                                           \
   .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
-#define SUPINE_SAYS_GIVEN(type, member) .given = 1 + offsetof(type, member)
+#define SUPINE_SAYS_GIVEN(type, member) .given = (1 + offsetof(type, member))
 #define SUPINE_ABOVE_ZERO .range = {0.0, INFINITY}, .open = true
 
 /* What a command runs on, beside its request. */
