@@ -227,8 +227,9 @@ const supine_option supine_command_model_options[] = {
     {"law", 0, "LAW",
      "deep: how lungs go from full inflation to rest and back (default where the scan is full or "
      "some mL below); tidal: quiet breaths, mostly the diaphragm's (default for a scan at rest); "
-     "cohort: as deep, with more of it the diaphragm's, from full breaths of five people (of one "
-     "left out 4 % less is left than by deep); paper: Santhanam 2008 as published, breaths from "
+     "cohort: breaths of one posture, as deep but more by the diaphragm, from full breaths of five "
+     "people (of one left out 4 % less is left than by deep; at rest it leaves lungs flatter); "
+     "paper: Santhanam 2008 as published, breaths from "
      "the scan's own state (implies --scanned "
      "none). The options below change single constants of it",
      FILLS(law_choice), .choices = laws},
