@@ -13,7 +13,7 @@ const TOLERANCE_MM = 0.005; // of displacements in 16 bits
 const PRINTED_MM = 0.001;   // of a text file's numbers
 const WRITTEN_MM = 0.051;   // of a move as the table has it
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
-const files = Object.fromEntries(['lungs.ply', 'tumour.obj', 'points.csv', 'lungs.safetensors', 'inside.safetensors', 'lungs.html', 'moved.csv', 'moved.obj'].map((name) => [name, join(folder, name)]));
+const files = Object.fromEntries(['lungs.ply', 'tumour.obj', 'points.csv', 'lungs.safetensors', 'inside.safetensors', 'lungs.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
 /** Four named points, and an octahedron that is a mesh. */
 supine('phantom', '-o', files['lungs.ply'], '--vertices', '1500');
@@ -204,6 +204,25 @@ async function checkSizes() {
   }
 }
 
+/** Many names are searched; more than can be read are not all listed, and that is said. */
+async function checkMany() {
+  const count = 230;
+  writeFileSync(files['points.csv'], `name,x,y,z\n${Array.from({ length: count }, (_, i) => `node ${i},${60 + (i % 10)},${-150 + (i % 7)},${-110 + (i % 13)}\n`).join('')}`);
+  supine('embed', files['lungs.safetensors'], files['points.csv'], '-o', files['inside.safetensors']);
+  supine('export', files['lungs.safetensors'], '--inside', files['inside.safetensors'], '-o', files['many.html']);
+  const { page, complaints } = await openLungs(files['many.html'], { viewport: { width: 500, height: 320 } });
+  const rows = () => page.evaluate(() => [...document.querySelectorAll('#inside-rows button')].map((e) => e.textContent));
+  assert.equal((await rows()).length, 200);
+  assert.equal(await page.locator('#inside-count').textContent(), `200 of ${count} are listed`);
+  await page.locator('#inside-find').fill('NODE 22');
+  assert.deepEqual(await rows(), ['node 22', ...Array.from({ length: 10 }, (_, i) => `node ${220 + i}`)]);
+  await page.waitForFunction(() => [...document.querySelectorAll('#inside-rows td:last-child')].every((cell) => /^\d+\.\d$/.test(cell.textContent)));
+  await page.locator('#inside-rows button').last().click();
+  assert.deepEqual(await page.evaluate(() => window.supine.state.named.map((part) => window.supine.basis.inside.names[part])), ['node 229']);
+  assert.deepEqual(complaints, []);
+  await page.close();
+}
+
 const { page, complaints } = await openLungs(files['lungs.html'], { viewport: { width: 760, height: 480 } });
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
@@ -212,4 +231,5 @@ assert.deepEqual(complaints, []);
 await checkLoss(page);
 await page.close();
 await checkSizes();
+await checkMany();
 await browser.close();

@@ -140,7 +140,7 @@ class Picture {
     this.insideParts = this.buffer(inside.part);
     this.insideNormals = this.buffer(inside.normals);
     this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    const [rings, sides] = [9, 18];
+    const [rings, sides] = inside.points > 2000 ? [4, 6] : [9, 18]; // many are a cloud
     const at = (i, j) => {
       const [a, b] = [(Math.PI * i) / rings, (2 * Math.PI * j) / sides];
       return [Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), Math.cos(a)];
