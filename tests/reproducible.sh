@@ -3,8 +3,12 @@
 # Built twice, in folders of other names and at other times: is every installed byte the same?
 #
 #     tests/reproducible.sh
+#
+# The package's changelog has a date, which SOURCE_DATE_EPOCH gives, as in every reproducible build.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
+SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 for place in one/here another/place/altogether; do

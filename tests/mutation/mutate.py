@@ -147,7 +147,7 @@ def places():
             for number, line in enumerate(file.read_text().splitlines()):
                 starts = line.lstrip().startswith(("/*", "//", "*", "#", "static_assert", "case "))
                 comment = comment or line.lstrip().startswith("/*")
-                if not (comment or starts) and not re.search(r'"|_Alignas|for \(.*\+\+', line):
+                if not (comment or starts) and not re.search(r'"|_Alignas|memset|for \(.*\+\+', line):
                     code = line.split("/*")[0]
                     for pattern, instead in OPERATORS:
                         for match in re.finditer(pattern, code):
