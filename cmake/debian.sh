@@ -32,7 +32,7 @@ case "${1-}" in
 count)
   # shellcheck disable=SC2086
   install_missing $build $tests gcovr
-  exec timeout 600 sh tests/coverage.sh quick
+  exec timeout -k 10 400 sh tests/coverage.sh quick
   ;;
 demo)
   # shellcheck disable=SC2086
