@@ -47,11 +47,11 @@ static int read_labels(const char *command, const char *text, void *field) {
     const size_t length = strcspn(at, ",");
     const size_t digits = strspn(at, "0123456789");
     const bool named = at[digits] == '=' && digits < length;
-    char *called = list->name[list->count];
     if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
         length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
       return SUPINE_OPTION_MISFIT;
     }
+    char *called = list->name[list->count];
     list->label[list->count] = (unsigned)strtoul(at, NULL, 10);
     (void)snprintf(called, sizeof list->name[0], "%s%.*s", named ? "" : "label ",
                    (int)(named ? length - digits - 1 : digits), named ? at + digits + 1 : at);
