@@ -6,10 +6,14 @@
  *
  *     n(w) ~ n_0 + sum over j of w_j d_j          d: least squares over postures and the breath
  *
- * The base, where the weights themselves are 0, has n_0 less what the reference's weights add; as
- * only directions count, a vertex' base and additions are divided by the length of its base. */
+ * The base, where the weights themselves are 0, would have n_0 less what the reference's weights
+ * add. It has its surface's own instead, b, for engines that turn the base's normals with the
+ * surface (Blender): what is missing, delta, is added with the weights, delta (1 + sum over j of
+ * w_j c_j) being least over the same poses. As only directions count, a vertex' base and additions
+ * are divided by the length of its base. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cblas.h>
 #include <lapacke.h>
@@ -18,7 +22,7 @@
 
 #include "runtime/export/targets.h"
 
-enum { POSES = 96 };
+enum { POSES = 96, PARTS = 5 };
 static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
 
 /* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
@@ -42,26 +46,56 @@ static supine_status invert(size_t count, double *a) {
   return good ? SUPINE_OK : room ? SUPINE_ERROR_NUMERICAL : SUPINE_ERROR_MEMORY;
 }
 
-/* Divides base and additions by the base's length, once `base` is n_0. */
-static void settle(const export_targets *targets, size_t n, float *base, float *added) {
+/* c: w . c nearest to -1 over the poses' weights [POSES, J], at rest above all, which is what is
+ * seen first. */
+static supine_status find_turn(size_t count, const export_pose *pose, double *turn) {
+  static const double at_rest = 10.0;
+  double *a = malloc(POSES * count * sizeof *a);
+  double right[POSES];
+  double s[SUPINE_MODES_MAX];
+  lapack_int rank = 0;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (a != NULL) {
+    for (size_t p = 0; p < POSES; ++p) {
+      const double share = p % PARTS == 0 ? at_rest : 1.0;
+      right[p] = -share;
+      for (size_t j = 0; j < count; ++j) {
+        a[p * count + j] = share * pose[p].weights[j];
+      }
+    }
+    const lapack_int j = (lapack_int)count;
+    status = LAPACKE_dgelsd(LAPACK_ROW_MAJOR, POSES, j, 1, a, j, right, 1, s, singular, &rank) == 0
+                 ? SUPINE_OK
+                 : SUPINE_ERROR_NUMERICAL;
+    memcpy(turn, right, count * sizeof *turn);
+  }
+  free(a);
+  return status;
+}
+
+/* Puts the base's own normals into `base`, which is n_0, and divides by the length that the fit has
+ * along them. */
+static void settle(const export_targets *targets, size_t n, const double *turn, const float *own,
+                   float *base, float *added) {
   static const double least =
       0.2; /* a base that the fit makes shorter has no direction of its own */
   for (size_t i = 0; i < n; ++i) {
     double sum[3];
+    double length = 0.0;
     for (size_t axis = 0; axis < 3; ++axis) {
       sum[axis] = (double)base[3 * i + axis];
       for (size_t j = 0; j < targets->count; ++j) { /* the reference's weight is -offset / unit */
         sum[axis] += targets->offset[j] / targets->unit[j] * (double)added[(j * n + i) * 3 + axis];
       }
+      length += sum[axis] * (double)own[3 * i + axis];
     }
-    const double length = supine_length(sum);
-    if (length < least) {
-      continue; /* n_0 stays: what is added is off by a constant */
-    }
+    length = fmax(length, least);
     for (size_t axis = 0; axis < 3; ++axis) {
-      base[3 * i + axis] = (float)(sum[axis] / length);
+      const double delta = sum[axis] - length * (double)own[3 * i + axis];
+      base[3 * i + axis] = own[3 * i + axis];
       for (size_t j = 0; j < targets->count; ++j) {
-        added[(j * n + i) * 3 + axis] = (float)((double)added[(j * n + i) * 3 + axis] / length);
+        float *to = &added[(j * n + i) * 3 + axis];
+        *to = (float)(((double)*to - turn[j] * delta) / length);
       }
     }
   }
@@ -89,6 +123,7 @@ supine_status supine_export_targets_normals(const export_source *source,
   float *xyz = malloc(3 * n * sizeof *xyz);
   float *normals = malloc(3 * n * sizeof *normals);
   double *a = malloc(POSES * targets->count * sizeof *a);
+  double turn[SUPINE_MODES_MAX];
   if (pose == NULL || xyz == NULL || normals == NULL || a == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
@@ -96,10 +131,11 @@ supine_status supine_export_targets_normals(const export_source *source,
   for (size_t p = 0; p < POSES; ++p) {
     double g[3];
     supine_spiral((double)p, POSES, 0, g);
-    status = SUPINE_ERROR_NUMERICAL; /* a breath that folds is no pose: one less deep is */
-    for (double part = (double)(p % 4 + 1) / 4; status != SUPINE_OK && part > 1e-3; part /= 2) {
+    double part = (double)(p % PARTS) / (PARTS - 1);
+    do { /* a breath that folds is no pose: one less deep is */
       status = supine_export_targets_at(source, breath, targets, g, part, &pose[p], error);
-    }
+      part /= 2;
+    } while (status == SUPINE_ERROR_NUMERICAL && part > 1e-3);
     if (status != SUPINE_OK && status != SUPINE_ERROR_NUMERICAL) {
       goto cleanup;
     }
@@ -109,6 +145,9 @@ supine_status supine_export_targets_normals(const export_source *source,
     }
   }
   status = invert(targets->count, a);
+  if (status == SUPINE_OK) {
+    status = find_turn(targets->count, pose, turn);
+  }
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "the targets' normals were not found: %s",
                            supine_status_string(status));
@@ -123,7 +162,9 @@ supine_status supine_export_targets_normals(const export_source *source,
     supine_normals(source->basis, xyz, normals);
     add_pose(targets, a, p, n, base, normals, added);
   }
-  settle(targets, n, base, added);
+  supine_export_targets_base(source, targets, xyz);
+  supine_normals(source->basis, xyz, normals);
+  settle(targets, n, turn, normals, base, added);
 cleanup:
   free(pose);
   free(xyz);
