@@ -57,7 +57,7 @@ static void fill_save(breath_output *made) {
   made->fields[1] = (supine_mesh_field){"volume_mL", content->course->lungs, content->volumes};
   made->fields[2] = (supine_mesh_field){"TimeValue", 1, content->course->time};
   made->save = *content->frame;
-  made->save.rest = content->rest->vertices;
+  made->save.rest = content->origin;
   made->save.comment = content->made_by;
   made->save.normals = made->normals;
   made->save.lung = lung == NULL ? NULL : lung->data;

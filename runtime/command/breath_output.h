@@ -13,6 +13,7 @@ typedef struct breath_output breath_output;
 typedef struct breath_content {
   const supine_basis *basis;
   const supine_mesh *rest;               /* the basis' surface */
+  const double *origin;                  /* [N, 3] where displacement counts from */
   const supine_mesh_save_options *frame; /* axes and units of VTP files */
   const breath_course *course;
   const double *volumes; /* [T, G] mL beyond the basis' surface */

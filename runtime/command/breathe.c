@@ -219,6 +219,43 @@ static void warn_of_size(const request *wanted, const breath_content *content) {
   }
 }
 
+/* Where displacement counts from: the basis' surface or, where the first frame is as good as that
+ * and would show none, the fullest frame. Viewers take their colours' range from the first. NULL:
+ * no memory. */
+static double *find_origin(const supine_basis *basis, const breath_course *course,
+                           const supine_mesh *rest) {
+  static const double unseen = 1.0; /* mL */
+  const size_t count = 3 * rest->vertex_count;
+  double *origin = malloc(count * sizeof *origin);
+  float *xyz = malloc(count * sizeof *xyz);
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  size_t fullest = 0;
+  for (size_t t = 1; t < course->count; ++t) {
+    fullest = course->volume[t] > course->volume[fullest] ? t : fullest;
+  }
+  if (origin != NULL && xyz != NULL) {
+    memcpy(origin, rest->vertices, count * sizeof *origin);
+    if (fabs(course->volume[0]) < unseen &&
+        supine_basis_weights(basis, course->gravity + 3 * fullest, weights) == SUPINE_OK &&
+        supine_basis_scale(basis, weights, course->volume[fullest], &scales[0], NULL) ==
+            SUPINE_OK) {
+      for (size_t lung = 1; lung < SUPINE_LUNGS_MAX; ++lung) {
+        scales[lung] = scales[0];
+      }
+      supine_deform(basis, weights, scales, xyz);
+      for (size_t i = 0; i < count; ++i) {
+        origin[i] = (double)xyz[i];
+      }
+    }
+  } else {
+    free(origin);
+    origin = NULL;
+  }
+  free(xyz);
+  return origin;
+}
+
 /* Over 60 lines: what a breath needs is made in one place and freed in one. */
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
@@ -232,6 +269,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   gauge measured = {0};
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
+  double *origin = NULL;
   supine_status status = SUPINE_OK;
   if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
       gauge_begin(&rest, &measured) != SUPINE_OK) {
@@ -257,10 +295,16 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   if (status == SUPINE_OK) {
     status = check_ends(basis, wanted, &course, error);
   }
+  if (status == SUPINE_OK) {
+    origin = find_origin(basis, &course, &rest);
+    status =
+        origin != NULL ? SUPINE_OK : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
     const breath_content content = {.basis = basis,
                                     .rest = &rest,
+                                    .origin = origin,
                                     .frame = frame,
                                     .course = &course,
                                     .volumes = supine_breath_frames_volumes(frames),
@@ -284,6 +328,7 @@ cleanup:
   supine_breath_course_free(&course);
   supine_mesh_free(&rest);
   free(measured.mesh.vertices);
+  free(origin);
   free(xyz);
   free(seconds);
   return status;
