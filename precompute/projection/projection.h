@@ -49,7 +49,8 @@ supine_status supine_projection_linear_rule(const supine_lungs *lungs, const sup
 
 /** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
  * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
- * coefficients themselves; memory is one ring of fields and those.
+ * coefficients themselves; memory is one ring of fields and those, and solves side by side within
+ * 600 MB, or eight directions where these alone take more.
  * @param progress  optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
@@ -61,7 +62,7 @@ supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_
 /** The smooth route: a full solve for each of some 100 directions, and a polynomial through them in
  * gravity over the lungs' extent along it, in which the field is analytic while over the sphere it
  * has kinks (smooth.c). Columns and functions as from the linear route, without what a grid folds
- * back; memory is the columns and the fields of 32 directions.
+ * back; memory is the columns, the fields of 32 directions, and solves within the same 600 MB.
  * @param progress  optional
  * @retval SUPINE_ERROR_ARGUMENT  soften is too large for a polynomial (above some 2.5), a bad band
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false

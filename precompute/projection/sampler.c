@@ -16,7 +16,7 @@ enum {
   AT_ONCE_MAX = 8      /* solves: a ring of directions has no more */
 };
 
-static const double bytes_max = 600e6;
+static const double bytes_max = 600e6; /* of all solves at once (projection.h) */
 
 /* A solve of some lanes and what it works with, one a thread. */
 typedef struct group {
