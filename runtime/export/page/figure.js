@@ -19,6 +19,7 @@ const BODY = [
   { at: [-0.105, -0.09, -0.87], size: [0.055, 0.12, 0.04], tone: 'body' },
 ];
 
+const AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 for (const part of BODY) part.squares = part.size.map((x) => x * x);
 
 /** The ends of the patient's axes. */
@@ -41,7 +42,7 @@ function lightsOf(context, tones) {
 
 /** Draws the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
-  const [ex, ey, ez] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
+  const [ex, ey, ez] = AXES.map((axis) => rotate(q, axis));
   const light = lightsOf(context, tones);
   const parts = BODY.map(({ at, squares: [a, b, c], tone }) => ({
     tone,
@@ -171,14 +172,16 @@ function drawBall(canvas, toEye, gravity) {
     context.lineWidth = 1;
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
-    for (const axis of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
+    context.beginPath(); // one stroke for all three
+    for (const axis of AXES) {
       // A circle about n is seen as an ellipse, the near half of which lies away from n.
       const n = rotate(toEye, axis);
-      const from = n[2] > 0 === front ? Math.PI : 0;
-      context.beginPath();
-      context.ellipse(centre, centre, radius, radius * Math.abs(n[2]), Math.atan2(-n[0], -n[1]), from, from + Math.PI);
-      context.stroke();
+      const begin = n[2] > 0 === front ? -radius : radius;
+      const angle = Math.atan2(-n[0], -n[1]);
+      context.moveTo(centre + begin * Math.cos(angle), centre + begin * Math.sin(angle));
+      context.ellipse(centre, centre, radius, radius * Math.abs(n[2]), angle, begin < 0 ? Math.PI : 0, begin < 0 ? 2 * Math.PI : Math.PI);
     }
+    context.stroke();
     context.globalAlpha = 1;
   };
   const letters = (front) => {

@@ -269,13 +269,14 @@ function start() {
 
   const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
 
+  let named = null; // the posture whose button is pressed
   function showState() {
     const gravity = state.gravity;
     const name = postureText(gravityOf(state.goal));
     if (document.activeElement !== $('posture-name') && $('posture-name').value !== name) $('posture-name').value = name;
-    for (const { button, posture } of buttons) {
-      const pressed = String(posture.name === name);
-      if (button.getAttribute('aria-pressed') !== pressed) button.setAttribute('aria-pressed', pressed);
+    if (named !== name) {
+      named = name;
+      for (const { button, posture } of buttons) button.setAttribute('aria-pressed', String(posture.name === name));
     }
     write('gravity', `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '\u2212').replaceAll('\u22120.00', '0.00'));
     const digits = basis.hasVolume ? 0 : 1;
@@ -292,9 +293,12 @@ function start() {
     const rest = restFor(basis, gravity) - state.firstRest;
     write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
-    for (const [id, place] of [['left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`], ['right-name', name]]) {
+    for (const id of ['left-name', 'right-name']) {
       if ($(id).hidden === state.beside) $(id).hidden = !state.beside;
-      write(id, place);
+    }
+    if (state.beside) {
+      write('left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
+      write('right-name', name);
     }
   }
 
