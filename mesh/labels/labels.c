@@ -12,8 +12,6 @@ static const double most_closing = 20.0;
 static const double least_lung = 1.0;      /* mL: anything less is no lung */
 static const double longest_lung = 1000.0; /* mm: its cubes would fill any memory */
 
-enum { MARGIN = 2 };
-
 typedef struct work {
   const char *path; /* the first, for messages */
   const supine_labels_options *options;
@@ -90,8 +88,6 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
 /* The voxels of lungs, with a margin, as LABELS_LEFT, _RIGHT or _EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
-  labels_mask *both = &w->both;
-  const supine_image *image = &w->image;
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
   size_t high[3] = {0, 0, 0};
   for (size_t label = 1; label < LABELS_MAX; ++label) {
@@ -100,36 +96,9 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
       high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
     }
   }
-  for (int a = 0; a < 3; ++a) {
-    const double *s = image->step[a];
-    both->size[a] = high[a] - low[a] + 1 + (size_t)2 * MARGIN;
-    both->spacing[a] = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
-    memcpy(both->step[a], s, sizeof both->step[a]);
-  }
-  for (int k = 0; k < 3; ++k) {
-    both->origin[k] = image->origin[k];
-    for (int a = 0; a < 3; ++a) {
-      both->origin[k] += ((double)low[a] - MARGIN) * image->step[a][k];
-    }
-  }
-  both->at = calloc(supine_labels_mask_count(both), 1);
-  uint16_t *row = malloc(image->size[0] * sizeof *row);
-  if (both->at == NULL || row == NULL) {
-    free(row);
+  if (supine_labels_mask_cut(&w->image, low, high, side, &w->both) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
   }
-  for (size_t k = low[2]; k <= high[2]; ++k) {
-    for (size_t j = low[1]; j <= high[1]; ++j) {
-      double bad;
-      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* it went well before */
-      uint8_t *out = both->at + MARGIN +
-                     both->size[0] * (j - low[1] + MARGIN + both->size[1] * (k - low[2] + MARGIN));
-      for (size_t i = low[0]; i <= high[0]; ++i) {
-        out[i - low[0]] = side[row[i]];
-      }
-    }
-  }
-  free(row);
   memcpy(w->from, low, sizeof low);
   return SUPINE_OK;
 }
@@ -137,11 +106,11 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
 /* Voxels of each side in the image's first and last layers: there the lung goes on. */
 static void count_cut(work *w, const size_t image_size[3]) {
   const labels_mask *both = &w->both;
-  for (size_t k = MARGIN; k < both->size[2] - MARGIN; ++k) {
-    for (size_t j = MARGIN; j < both->size[1] - MARGIN; ++j) {
-      for (size_t i = MARGIN; i < both->size[0] - MARGIN; ++i) {
-        const size_t at[3] = {i - MARGIN + w->from[0], j - MARGIN + w->from[1],
-                              k - MARGIN + w->from[2]};
+  for (size_t k = LABELS_MARGIN; k < both->size[2] - LABELS_MARGIN; ++k) {
+    for (size_t j = LABELS_MARGIN; j < both->size[1] - LABELS_MARGIN; ++j) {
+      for (size_t i = LABELS_MARGIN; i < both->size[0] - LABELS_MARGIN; ++i) {
+        const size_t at[3] = {i - LABELS_MARGIN + w->from[0], j - LABELS_MARGIN + w->from[1],
+                              k - LABELS_MARGIN + w->from[2]};
         bool border = false;
         for (int a = 0; a < 3; ++a) {
           border = border || (image_size[a] > 1 && (at[a] == 0 || at[a] + 1 == image_size[a]));
@@ -255,7 +224,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                supine_error *error) {
   labels_mask mask;
   const double least = fmin(w->both.spacing[0], fmin(w->both.spacing[1], w->both.spacing[2]));
-  const size_t margin = MARGIN + (size_t)ceil(w->options->close / least);
+  const size_t margin = LABELS_MARGIN + (size_t)ceil(w->options->close / least);
   supine_status status = supine_labels_mask_extract(&w->both, value, margin, &mask);
   if (status == SUPINE_OK && mask.at == NULL) {
     return SUPINE_OK;

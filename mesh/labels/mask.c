@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/labels/mask.h"
 
 size_t supine_labels_mask_count(const labels_mask *mask) {
@@ -87,6 +89,44 @@ void supine_labels_mask_offset(const labels_mask *mask, const labels_mask *other
   for (int a = 0; a < 3; ++a) {
     offset[a] = lround(voxel[a]);
   }
+}
+
+supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
+                                     const size_t high[3], const uint8_t *value,
+                                     labels_mask *mask) {
+  uint16_t *row = malloc(image->size[0] * sizeof *row);
+  *mask = (labels_mask){.at = NULL};
+  for (int k = 0; k < 3; ++k) {
+    mask->origin[k] = image->origin[k];
+    for (int a = 0; a < 3; ++a) {
+      mask->origin[k] += ((double)low[a] - LABELS_MARGIN) * image->step[a][k];
+    }
+  }
+  for (int a = 0; a < 3; ++a) {
+    mask->size[a] = high[a] - low[a] + 1 + (size_t)2 * LABELS_MARGIN;
+    mask->spacing[a] = supine_length(image->step[a]);
+    memcpy(mask->step[a], image->step[a], sizeof mask->step[a]);
+  }
+  mask->at = calloc(supine_labels_mask_count(mask), 1);
+  if (row == NULL || mask->at == NULL) {
+    free(row);
+    supine_labels_mask_free(mask);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t k = low[2]; k <= high[2]; ++k) {
+    for (size_t j = low[1]; j <= high[1]; ++j) {
+      double bad;
+      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* it went well before */
+      uint8_t *out = mask->at + LABELS_MARGIN +
+                     mask->size[0] * (j - low[1] + LABELS_MARGIN +
+                                      mask->size[1] * (k - low[2] + LABELS_MARGIN));
+      for (size_t i = low[0]; i <= high[0]; ++i) {
+        out[i - low[0]] = value[row[i]];
+      }
+    }
+  }
+  free(row);
+  return SUPINE_OK;
 }
 
 void supine_labels_mask_free(labels_mask *mask) {

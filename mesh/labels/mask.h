@@ -34,7 +34,7 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
 
 /* ---- count.c, convention.c: which label is whose ---- */
 
-enum { LABELS_MAX = 65536 };
+enum { LABELS_MAX = 65536, LABELS_MARGIN = 2 };
 
 /** The voxels of one label. */
 typedef struct labels_tally {
@@ -52,6 +52,12 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    char taken[256], supine_error *error);
+
+/** The box of voxels low to high of an image that was counted, with LABELS_MARGIN around it; at
+ * NULL and SUPINE_ERROR_MEMORY where there is no memory.
+ * @param value  [LABELS_MAX] of each label in the mask */
+supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
+                                     const size_t high[3], const uint8_t *value, labels_mask *mask);
 
 /* ---- pieces.c: pieces of equal voxels that share faces ---- */
 
