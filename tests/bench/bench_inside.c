@@ -5,37 +5,15 @@
  *     bench_inside path/to/supine [FOLDER] */
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "precompute/phantom/phantom.h"
-#include "sh/base/clock.h"
 
 #include "../labels_helpers.h"
+#include "program.h"
 
-/* Runs the program, its output left out, and prints what it took. */
 static void take(const char *what, char *const *arguments) {
-  struct rusage used = {0};
-  int status = 0;
-  const double start = supine_clock_seconds();
-  const pid_t child = fork();
-  if (child == 0) {
-    if (freopen("/dev/null", "w", stdout) == NULL) {
-      _exit(1);
-    }
-    (void)execv(arguments[0], arguments);
-    _exit(127);
-  }
-  if (child < 0 || wait4(child, &status, 0, &used) != child || status != 0) {
-    (void)fprintf(stderr, "%s: failed\n", what);
-    exit(1);
-  }
-  const double user = (double)used.ru_utime.tv_sec + 1e-6 * (double)used.ru_utime.tv_usec;
-  const double kernel = (double)used.ru_stime.tv_sec + 1e-6 * (double)used.ru_stime.tv_usec;
-  (void)printf("%-46s %6.1f s  %6.1f s of processors  %6.2f GB\n", what,
-               supine_clock_seconds() - start, user + kernel, 1e-6 * (double)used.ru_maxrss);
-  (void)fflush(stdout);
+  bench_program_print(what, bench_program_run(what, arguments));
 }
 
 /* 512 x 512 x 300 voxels of 0.7 x 0.7 x 1 mm around the phantom, lungmask's labels or one. */
