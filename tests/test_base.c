@@ -22,6 +22,7 @@
 #include "sh/base/folder.h"
 #include "sh/base/output.h"
 #include "sh/base/parallel.h"
+#include "sh/base/text.h"
 #include <supine/status.h>
 
 static void test_status_string_every_code_distinct(void **state) {
@@ -51,6 +52,18 @@ static void test_error_set_long_message_cut(void **state) {
   assert_int_equal(error.status, SUPINE_ERROR_MESH);
   assert_int_equal(strlen(error.message), sizeof error.message - 1);
   assert_int_equal(supine_error_set(NULL, SUPINE_ERROR_READ, "none"), SUPINE_ERROR_READ);
+}
+
+static void test_text_ends_in_with_something_before(void **state) {
+  (void)state;
+  assert_true(supine_text_ends_in("pairs.csv", ".csv"));
+  assert_false(supine_text_ends_in("pairs.CSV", ".csv"));
+  assert_false(supine_text_ends_in("pairs.csv.gz", ".csv"));
+  assert_false(supine_text_ends_in(".csv", ".csv"));
+  assert_false(supine_text_ends_in("v", ".csv"));
+  assert_true(supine_text_ends_in_any_case("a.NII.gz", ".nii.gz"));
+  assert_false(supine_text_ends_in_any_case("a.nii", ".nii.gz"));
+  assert_false(supine_text_ends_in_any_case(".NII", ".nii"));
 }
 
 static void read_text(const char *path, char *text, size_t size) {
@@ -392,6 +405,7 @@ int main(void) {
       cmocka_unit_test(test_output_keeps_modes_links_and_old_files),
       cmocka_unit_test(test_output_abandon_all_removes_temporary_names),
       cmocka_unit_test(test_folder_appears_whole_or_not_at_all),
+      cmocka_unit_test(test_text_ends_in_with_something_before),
       cmocka_unit_test(test_thread_count_bounded_and_nonsense_ignored),
       cmocka_unit_test(test_parallel_for_any_split_covers_each_item_once),
   };

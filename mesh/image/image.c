@@ -8,29 +8,25 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
 #include "mesh/image/formats.h"
 
-static bool ends_in(const char *path, const char *ending) {
-  const size_t length = strlen(path);
-  const size_t tail = strlen(ending);
-  return length > tail && strcasecmp(path + length - tail, ending) == 0;
-}
-
 static bool is_nifti(const char *path) {
-  return ends_in(path, ".nii") || ends_in(path, ".nii.gz");
+  return supine_text_ends_in_any_case(path, ".nii") ||
+         supine_text_ends_in_any_case(path, ".nii.gz");
 }
 
 bool supine_image_supports(const char *path) {
-  return ends_in(path, ".nrrd") || is_nifti(path);
+  return supine_text_ends_in_any_case(path, ".nrrd") || is_nifti(path);
 }
 
 bool supine_image_is_named(const char *path) {
   static const char *const others[] = {".mha", ".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
   bool is = supine_image_supports(path);
   for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
-    is = is || ends_in(path, others[i]);
+    is = is || supine_text_ends_in_any_case(path, others[i]);
   }
   return is;
 }
@@ -95,7 +91,8 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
   }
-  return is_nifti(path) ? supine_image_write_nifti(path, ends_in(path, ".gz"), image, note, error)
+  return is_nifti(path) ? supine_image_write_nifti(path, supine_text_ends_in_any_case(path, ".gz"),
+                                                   image, note, error)
                         : supine_image_write_nrrd(path, image, note, error);
 }
 

@@ -4,6 +4,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "sh/base/text.h"
+
 #include "mesh/image/image.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/embed.h"
@@ -85,12 +87,6 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, load.axes), .choices = axes, .wants = "LPS or RAS"},
     {.name = NULL}};
 
-static bool ends_in(const char *path, const char *ending) {
-  const size_t length = strlen(path);
-  const size_t tail = strlen(ending);
-  return length > tail && strcasecmp(path + length - tail, ending) == 0;
-}
-
 /* The nodes of a grid: of its own, or of an image's voxels. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
@@ -148,7 +144,7 @@ static supine_status read_content(const supine_inside_shells *shells, const requ
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     status = supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-             : ends_in(paths[i], ".csv")
+             : supine_text_ends_in_any_case(paths[i], ".csv")
                  ? supine_inside_content_points(paths[i], &wanted->load, content, error)
                  : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
   }

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/text.h"
+
 #include "precompute/patient/gain.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
@@ -66,8 +68,7 @@ static int read_state(const char *command, const char *text, void *field) {
 }
 
 static bool is_landmarks(const char *path) {
-  const size_t length = strlen(path);
-  return length > 4 && strcmp(path + length - 4, ".csv") == 0;
+  return supine_text_ends_in(path, ".csv");
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)

@@ -6,6 +6,8 @@
 
 #include <jansson.h>
 
+#include "sh/base/text.h"
+
 #include "precompute/command/validation.h"
 
 static const char name[] = "validate";
@@ -107,8 +109,7 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 static bool draws(const char *path) {
-  const size_t length = strlen(path);
-  return length > 4 && strcmp(path + length - 4, ".png") == 0;
+  return supine_text_ends_in(path, ".png");
 }
 
 /* --- what is printed ------------------------------------------------------------------------- */

@@ -11,6 +11,7 @@
 #include "precompute/inside/surface.h"
 #include "runtime/options/basis_input.h"
 #include "sh/base/parallel.h"
+#include "sh/base/text.h"
 
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24, GRAIN = 64 };
 
@@ -27,15 +28,10 @@ void supine_command_subject_free(supine_command_subject *subject) {
   }
 }
 
-static bool ends_with(const char *text, const char *ending) {
-  const size_t length = strlen(text);
-  return length >= strlen(ending) && strcmp(text + length - strlen(ending), ending) == 0;
-}
-
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error) {
   supine_command_subject *s = subject;
-  if (ends_with(path, ".json")) {
+  if (supine_text_ends_in(path, ".json")) {
     s->has_patient = true;
     return supine_patient_read(path, &s->record, error);
   }

@@ -10,6 +10,7 @@
 
 #include "sh/base/csv.h"
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
 /* Directions closer than this are the same, radians. */
@@ -275,18 +276,12 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   return status;
 }
 
-static bool ends_with(const char *text, const char *ending) {
-  const size_t length = strlen(text);
-  const size_t tail = strlen(ending);
-  return length >= tail && strcmp(text + length - tail, ending) == 0;
-}
-
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_mesh_load_options *options, supine_fields *fields,
                                  supine_error *error) {
   supine_fields made = {.vertex_count = lungs->mesh.vertex_count};
   supine_status status = SUPINE_OK;
-  if (ends_with(path, ".safetensors")) {
+  if (supine_text_ends_in(path, ".safetensors")) {
     supine_safetensors *file = NULL;
     status = supine_safetensors_open(path, &file, error);
     if (status == SUPINE_OK) {

@@ -6,6 +6,7 @@
 
 #include "sh/base/folder.h"
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 #include <supine/safetensors.h>
 
 #include "precompute/writer/safetensors_write.h"
@@ -30,12 +31,6 @@ struct breath_output {
   float *positions;     /* [T, N, 3] */
   size_t next;
 };
-
-static bool ends_in(const char *text, const char *suffix) {
-  const size_t length = strlen(text);
-  const size_t end = strlen(suffix);
-  return length > end && strcmp(text + length - end, suffix) == 0;
-}
 
 static char *join(const char *first, const char *second) {
   char *text = malloc(strlen(first) + strlen(second) + 1);
@@ -77,12 +72,12 @@ static supine_status open_series(breath_output *made, supine_error *error) {
   }
   memcpy(made->mesh.vertices, made->content.rest->vertices, count * sizeof *made->mesh.vertices);
   fill_save(made);
-  if (ends_in(made->path, ".vtp")) {
+  if (supine_text_ends_in(made->path, ".vtp")) {
     made->save.field_count = FIELDS - 1; /* it has the time of its own */
     return supine_mesh_series_open(made->path, &made->mesh, &made->save, course->count,
                                    course->time, &made->series, error);
   }
-  if (!ends_in(made->path, ".pvd")) {
+  if (!supine_text_ends_in(made->path, ".pvd")) {
     return supine_folder_open(made->path, NULL, &made->folder, error);
   }
   char *stem = strndup(made->path, strlen(made->path) - strlen(".pvd"));
@@ -123,7 +118,8 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
   if (made->path == NULL) {
     status = no_memory(path, error);
   } else {
-    status = ends_in(path, ".safetensors") ? open_tensors(made, error) : open_series(made, error);
+    status = supine_text_ends_in(path, ".safetensors") ? open_tensors(made, error)
+                                                       : open_series(made, error);
   }
   if (status != SUPINE_OK) {
     supine_command_breath_output_close(made);
@@ -136,7 +132,9 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
 /* Bytes a vertex as measured on made lungs of 40,000 vertices, which tests/bench/bench_breath.py
  * prints; the triangles' are among them where each frame has them. */
 double supine_command_breath_output_size(const char *path, const breath_content *content) {
-  const double each = ends_in(path, ".safetensors") ? 12.0 : ends_in(path, ".vtp") ? 20.0 : 29.0;
+  const double each = supine_text_ends_in(path, ".safetensors") ? 12.0
+                      : supine_text_ends_in(path, ".vtp")       ? 20.0
+                                                                : 29.0;
   return each * (double)content->rest->vertex_count * (double)content->course->count;
 }
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Sentences put together from parts. */
+ * Sentences put together from parts, and how names end. */
 #ifndef SUPINE_TEXT_H
 #define SUPINE_TEXT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include <supine/status.h>
@@ -16,6 +17,11 @@ extern "C" {
  * is left out. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
+
+/** Does a name end in `ending` (".csv"), with something before it? */
+bool supine_text_ends_in(const char *name, const char *ending);
+/** The same, capitals or not. */
+bool supine_text_ends_in_any_case(const char *name, const char *ending);
 
 #ifdef __cplusplus
 }
