@@ -151,7 +151,7 @@ def places():
                     code = line.split("/*")[0]
                     for pattern, instead in OPERATORS:
                         for match in re.finditer(pattern, code):
-                            found.append((file, number, match.span(), pattern, instead))
+                            found.append((file, number, match, instead))
                 comment = comment and "*/" not in line
     return found
 
@@ -163,13 +163,12 @@ def random_ones(count, seed):
     print(f"{len(every)} places in {len({p[0] for p in every})} files; seed {seed}")
     chosen.shuffle(every)
     killed = survived = 0
-    for file, number, (begin, end), pattern, instead in every:
+    for file, number, match, instead in every:
         if killed + survived == count:
             break
         lines = file.read_text().splitlines(keepends=True)
         line = lines[number]
-        new = re.sub(pattern, chosen.choice(instead), line[begin:end]) if end > begin else instead[0]
-        lines[number] = line[:begin] + new + line[end:]
+        lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
         room = max((r for r in NEAR if path.startswith(r)), key=len)
         near = [n for n in quick + slower if re.fullmatch(NEAR[room], n)]
