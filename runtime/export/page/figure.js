@@ -152,6 +152,7 @@ function drawBall(canvas, toEye, gravity) {
   context.lineWidth = 1;
   context.stroke();
   const down = rotate(toEye, gravity);
+  const ends = Object.values(ENDS).map((end) => rotate(toEye, end));
   const tip = [centre + radius * 0.97 * down[0], centre - radius * 0.97 * down[1]];
   const arrow = () => {
     const start = [centre + radius * 0.5 * down[0], centre - radius * 0.5 * down[1]];
@@ -173,9 +174,8 @@ function drawBall(canvas, toEye, gravity) {
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
     context.beginPath(); // one stroke for all three
-    for (const axis of AXES) {
+    for (const n of [ends[0], ends[3], ends[4]]) {
       // A circle about n is seen as an ellipse, the near half of which lies away from n.
-      const n = rotate(toEye, axis);
       const begin = n[2] > 0 === front ? -radius : radius;
       const angle = Math.atan2(-n[0], -n[1]);
       context.moveTo(centre + begin * Math.cos(angle), centre + begin * Math.sin(angle));
@@ -184,13 +184,12 @@ function drawBall(canvas, toEye, gravity) {
     context.stroke();
     context.globalAlpha = 1;
   };
+  const { glyphs, ratio } = glyphsOf();
+  const box = GLYPH * ratio;
   const letters = (front) => {
-    const { glyphs, ratio } = glyphsOf();
-    Object.values(ENDS).forEach((end, i) => {
-      const at = rotate(toEye, end);
+    ends.forEach((at, i) => {
       if (at[2] >= 0 !== front) return;
       const [x, y] = [centre + (radius - 9) * at[0], centre - (radius - 9) * at[1]];
-      const box = GLYPH * ratio;
       context.drawImage(glyphs, i * box, front ? 0 : box, box, box, x - GLYPH / 2, y - GLYPH / 2, GLYPH, GLYPH);
     });
   };

@@ -269,15 +269,23 @@ function start() {
 
   const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
 
-  let named = null; // the posture whose button is pressed
+  const last = {};
+  /** Acts where a value is another than the last time: asking the page takes longer than remembering. */
+  const changed = (what, value, act) => {
+    if (last[what] === value) return;
+    last[what] = value;
+    act(value);
+  };
+
   function showState() {
     const gravity = state.gravity;
     const name = postureText(gravityOf(state.goal));
-    if (document.activeElement !== $('posture-name') && $('posture-name').value !== name) $('posture-name').value = name;
-    if (named !== name) {
-      named = name;
-      for (const { button, posture } of buttons) button.setAttribute('aria-pressed', String(posture.name === name));
-    }
+    changed('posture', name, () => {
+      if (document.activeElement !== $('posture-name')) $('posture-name').value = name;
+    });
+    changed('pressed', buttons.findIndex(({ posture }) => posture.name === name), (pressed) => {
+      buttons.forEach(({ button }, i) => button.setAttribute('aria-pressed', String(i === pressed)));
+    });
     write('gravity', `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '\u2212').replaceAll('\u22120.00', '0.00'));
     const digits = basis.hasVolume ? 0 : 1;
     setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
@@ -285,17 +293,15 @@ function start() {
     write('depth-value', basis.hasVolume ? `rest + ${amount(state.depth)}` : amount(state.depth));
     setSlider('tidal', state.tidal, amount(state.tidal), digits);
     setSlider('rate', state.rate, `${state.rate} per minute`);
-    if ($('play').getAttribute('aria-pressed') !== String(state.playing)) {
+    changed('playing', state.playing, () => {
       $('play').setAttribute('aria-pressed', String(state.playing));
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
-    }
+    });
     const gains = state.moment?.gains?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
     const rest = restFor(basis, gravity) - state.firstRest;
     write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
-    for (const id of ['left-name', 'right-name']) {
-      if ($(id).hidden === state.beside) $(id).hidden = !state.beside;
-    }
+    changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
     if (state.beside) {
       write('left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
       write('right-name', name);
@@ -533,6 +539,7 @@ function start() {
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
+  $('posture-name').addEventListener('blur', () => { last.posture = null; look(); }); // what was typed may be none
   const play = () => {
     state.playing = !state.playing;
     const part = Math.min(1, state.depth / state.tidal);

@@ -4,7 +4,7 @@
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => {
-  const length = Math.hypot(...a);
+  const length = Math.sqrt(a.reduce((sum, x) => sum + x * x, 0));
   return a.map((x) => x / length);
 };
 
@@ -26,9 +26,9 @@ const compose = (a, b) => unit([
 const inverse = (q) => [-q[0], -q[1], -q[2], q[3]];
 
 const rotate = (q, v) => {
-  const t = cross(q, v).map((x) => 2 * x);
+  const t = cross(q, v);
   const u = cross(q, t);
-  return v.map((x, i) => x + q[3] * t[i] + u[i]);
+  return [v[0] + 2 * (q[3] * t[0] + u[0]), v[1] + 2 * (q[3] * t[1] + u[1]), v[2] + 2 * (q[3] * t[2] + u[2])];
 };
 
 function slerp(a, b, t) {

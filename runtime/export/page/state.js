@@ -20,11 +20,12 @@ const DICOM = { HFS: 0, FFS: 0, HFP: 1, FFP: 1, HFDL: 2, FFDL: 2, HFDR: 3, FFDR:
 
 const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
 const near = (a, b) => dot(a, b) > Math.cos(0.004);
+const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
 /** A direction of gravity in the notation that the program reads: a name, a name and the degrees of
  * its tilt, or three numbers. */
 function postureText(gravity) {
-  const named = [...POSTURES.slice(0, 5), INVERTED].find((p) => near(gravityOf(p.q), gravity));
+  const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
   if (Math.abs(gravity[0]) < 0.004) {
     const degrees = Math.round((Math.atan2(gravity[2], gravity[1]) * 180) / Math.PI);
