@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <lapacke.h>
 
 #include "precompute/patient/gain.h"
 
@@ -79,11 +79,9 @@ static double squares_of(const problem *problem_, size_t which, double gain, dou
   }
   double solved[UNKNOWNS];
   memcpy(solved, right, sizeof solved);
-  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, n, n);
-  gsl_vector_view solved_view = gsl_vector_view_array(solved, n);
   memset(unknowns, 0, UNKNOWNS * sizeof *unknowns);
-  if (gsl_linalg_cholesky_decomp1(&matrix_view.matrix) == GSL_SUCCESS &&
-      gsl_linalg_cholesky_svx(&matrix_view.matrix, &solved_view.vector) == GSL_SUCCESS) {
+  const lapack_int size = (lapack_int)n;
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, size, solved, size) == 0) {
     memcpy(unknowns, solved, n * sizeof *unknowns);
     for (size_t a = 0; a < n; ++a) {
       squares -= solved[a] * right[a];

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <lapacke.h>
 
 #include "precompute/patient/rows.h"
 
@@ -127,10 +127,7 @@ supine_status supine_patient_polynomial_fit(const supine_patient_normals *normal
       matrix[i * N + i] += penalty[i] + slightest_ridge * trace;
     }
   }
-  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, N, N);
-  gsl_vector_view right = gsl_vector_view_array(coefficients, N);
-  return gsl_linalg_cholesky_decomp1(&matrix_view.matrix) == GSL_SUCCESS &&
-                 gsl_linalg_cholesky_svx(&matrix_view.matrix, &right.vector) == GSL_SUCCESS
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', N, 1, matrix, N, coefficients, N) == 0
              ? SUPINE_OK
              : SUPINE_ERROR_NUMERICAL;
 }

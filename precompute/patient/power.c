@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
 #include <gsl/gsl_multifit_nlinear.h>
+#include <lapacke.h>
 
 #include "precompute/patient/rows.h"
 
@@ -120,10 +120,8 @@ static bool solve_linear(problem *p, const double powers[P]) {
     matrix[a * m + a] += 1e-10;
     p->linear[a] *= scale[a];
   }
-  gsl_matrix_view matrix_view = gsl_matrix_view_array(matrix, m, m);
-  gsl_vector_view linear_view = gsl_vector_view_array(p->linear, m);
-  if (gsl_linalg_cholesky_decomp1(&matrix_view.matrix) != GSL_SUCCESS ||
-      gsl_linalg_cholesky_svx(&matrix_view.matrix, &linear_view.vector) != GSL_SUCCESS) {
+  const lapack_int size = (lapack_int)m;
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, size, p->linear, size) != 0) {
     return false;
   }
   for (size_t a = 0; a < m; ++a) {
@@ -192,16 +190,13 @@ static int derivatives(const gsl_vector *q, void *context, gsl_matrix *jacobian)
                                            : 0.0;
       gsl_matrix_set(jacobian, i, k, root * change * by_q[k]);
       for (size_t a = 0; a < m; ++a) {
-        projected[a * P + k] += row->weight * design[a] * p->scale[a] * change * by_q[k];
+        projected[k * m + a] += row->weight * design[a] * p->scale[a] * change * by_q[k];
       }
     }
   }
-  gsl_matrix_const_view factor_view = gsl_matrix_const_view_array(p->factor, m, m);
-  for (size_t k = 0; k < P; ++k) {
-    gsl_vector_view column = gsl_vector_view_array_with_stride(projected + k, P, m);
-    if (gsl_linalg_cholesky_svx(&factor_view.matrix, &column.vector) != GSL_SUCCESS) {
-      return GSL_EDOM;
-    }
+  const lapack_int size = (lapack_int)m;
+  if (LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', size, P, p->factor, size, projected, size) != 0) {
+    return GSL_EDOM;
   }
   for (size_t i = 0; i < p->count; ++i) {
     const double *design = p->design + LINEAR_MAX * i;
@@ -209,7 +204,7 @@ static int derivatives(const gsl_vector *q, void *context, gsl_matrix *jacobian)
     double *row = gsl_matrix_ptr(jacobian, i, 0);
     for (size_t a = 0; a < m; ++a) {
       for (size_t k = 0; k < P && design[a] != 0.0; ++k) {
-        row[k] -= root * design[a] * p->scale[a] * projected[a * P + k];
+        row[k] -= root * design[a] * p->scale[a] * projected[k * m + a];
       }
     }
   }
