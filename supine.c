@@ -47,7 +47,7 @@ static int unknown_command(const char *name) {
   enum { NAMES_MAX = 64 };
   const char *names[NAMES_MAX];
   size_t count = 0;
-  for (; supine_command_list[count] != NULL && count < NAMES_MAX; ++count) {
+  for (; count < NAMES_MAX && supine_command_list[count] != NULL; ++count) {
     names[count] = supine_command_list[count]->name;
   }
   const char *nearest = supine_options_suggest(name, names, count);

@@ -16,7 +16,7 @@ static void sum_degrees(const supine_sh_transform *plan, const supine_sh_workspa
   for (size_t m = 0; m <= plan->band; ++m) {
     for (size_t parity = 0; parity < 2; ++parity) {
       const size_t degrees = supine_sh_degrees(plan->band, m, parity);
-      for (size_t sine = 0; sine <= (m > 0); ++sine) {
+      for (size_t sine = 0; sine < (m > 0 ? 2 : 1); ++sine) {
         supine_sh_product(plan->pairs, degrees, plan->width, t, degrees, x, y);
         x += degrees * plan->width;
         y += plan->pairs * plan->width;

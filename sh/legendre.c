@@ -14,7 +14,7 @@ static void fill_positions(supine_sh_transform *plan) {
   size_t row = 0;
   for (size_t m = 0; m <= plan->band; ++m) {
     for (size_t parity = 0; parity < 2; ++parity) {
-      for (int sine = 0; sine <= (m > 0); ++sine) {
+      for (int sine = 0; sine < (m > 0 ? 2 : 1); ++sine) {
         for (size_t l = m + parity; l <= plan->band; l += 2) {
           plan->position[row++] = supine_sh_index(l, sine ? -(int)m : (int)m);
         }

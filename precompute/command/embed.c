@@ -48,7 +48,7 @@ static int read_labels(const char *command, const char *text, void *field) {
   for (const char *at = text; strcmp(text, "all") != 0;) {
     const size_t length = strcspn(at, ",");
     const size_t digits = strspn(at, "0123456789");
-    const bool named = at[digits] == '=' && digits < length;
+    const bool named = digits < length && at[digits] == '=';
     if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
         length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
       return SUPINE_OPTION_MISFIT;
