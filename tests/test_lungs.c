@@ -278,6 +278,27 @@ static void test_phantom_pair_is_closed_and_has_its_volume(void **state) {
   assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
+/* Every harmonic of either lung, and the place of both: a sum over the vertices in which none of
+ * them cancels. The sums are what the shape gave when it was made. */
+static void test_phantom_keeps_its_shape(void **state) {
+  (void)state;
+  static const double made[2] = {-542.627977, 212.207209};
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_phantom_create(1000, 6000.0, &mesh, NULL), SUPINE_OK);
+  const size_t half = mesh.vertex_count / 2;
+  for (size_t lung = 0; lung < 2; ++lung) {
+    double sum = 0.0;
+    for (size_t v = lung * half; v < (lung + 1) * half; ++v) {
+      for (size_t a = 0; a < 3; ++a) {
+        sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
+      }
+    }
+    assert_true(fabs(sum - made[lung]) <
+                1e-4); /* mm; a hundredth of the least coefficient's part */
+  }
+  supine_mesh_free(&mesh);
+}
+
 /* Volume gained by one lung of a pair, by measuring the deformed surface itself. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
                      size_t count, const double *weights, double scale) {
@@ -402,6 +423,7 @@ int main(void) {
       cmocka_unit_test(test_lungs_debris_does_not_make_a_lung),
       cmocka_unit_test(test_lungs_flat_or_empty_surface_refused),
       cmocka_unit_test(test_phantom_pair_is_closed_and_has_its_volume),
+      cmocka_unit_test(test_phantom_keeps_its_shape),
       cmocka_unit_test(test_volume_forms_equal_measured_volume_also_mixed),
       cmocka_unit_test(test_volume_forms_open_surface_refused),
   };
