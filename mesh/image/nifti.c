@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define ZLIB_CONST /* it does not write where it reads */
 #include <nifti2_io.h>
 #include <zlib.h>
 
@@ -163,7 +164,7 @@ static bool deflate_bytes(z_stream *z, const unsigned char *values, size_t bytes
   unsigned char space[SPACE];
   do {
     const size_t piece = bytes < PIECE ? bytes : PIECE;
-    z->next_in = (unsigned char *)(uintptr_t)values; /* zlib does not write there */
+    z->next_in = values;
     z->avail_in = (unsigned)piece;
     values += piece;
     bytes -= piece;

@@ -161,9 +161,9 @@ supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, b
     made.origin[a] = made.ratio[a] * (0.5 - LAYERS) - 0.5;
   }
   const size_t *m = made.size;
-  float *rows = malloc(m[0] * n[1] * n[2] * sizeof *rows);
-  float *planes = malloc(m[0] * m[1] * n[2] * sizeof *planes);
-  made.share = malloc(m[0] * m[1] * m[2] * sizeof *made.share);
+  float *rows = calloc(m[0] * n[1] * n[2], sizeof *rows);
+  float *planes = calloc(m[0] * m[1] * n[2], sizeof *planes);
+  made.share = calloc(m[0] * m[1] * m[2], sizeof *made.share);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (rows != NULL && planes != NULL && made.share != NULL) {
     average_rows(mask, m[0], made.ratio[0], rows);
