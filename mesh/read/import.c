@@ -44,7 +44,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
   for (; *words != '\0' && length < sizeof line - 1; ++words) {
     const bool blank = (unsigned char)*words <= ' ';
     if (!blank || (length > 0 && line[length - 1] != ' ')) {
-      line[length++] = blank ? ' ' : *words;
+      line[length++] = (char)(blank ? ' ' : *words);
     }
   }
   line[length] = '\0';

@@ -256,7 +256,7 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
   for (int i = 0; i < SEARCH_STEPS && status == SUPINE_OK; ++i) {
     const double a = high - golden * (high - low);
     const double b = low + golden * (high - low);
-    double left[2];
+    double left[2] = {0};
     status = distance_at(s, outcome, a, &look, positions, &left[0], error);
     if (status == SUPINE_OK) {
       status = distance_at(s, outcome, b, &look, positions, &left[1], error);

@@ -190,7 +190,7 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     double weights[SUPINE_MODES_MAX];
-    double scales[SUPINE_LUNGS_MAX];
+    double scales[SUPINE_LUNGS_MAX] = {0};
     status = supine_basis_weights(basis, course->gravity + 3 * ends[i], weights);
     if (status == SUPINE_OK) {
       status = supine_basis_scale(basis, weights, course->volume[ends[i]], &scales[0], error);

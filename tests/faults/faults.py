@@ -44,6 +44,7 @@ precompute lungs.ply --band 2 -o out/a.safetensors
 precompute lungs.stl --band 2 --law paper --modes harmonics -o out/a.safetensors
 precompute lungs.obj --band 2 --law paper --soften 1 -o out/a.safetensors
 precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned supine:-500 -o out/a.safetensors
+precompute mask.nrrd --labels left=1,right=2 --edge 20 --band 2 -o out/a.safetensors
 precompute lungs.ply --fields fields.csv -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
 solve lungs.ply --posture prone -o out/a.vtp
@@ -55,6 +56,7 @@ validate patient.json --landmarks pairs.csv --json
 embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors
 embed lungs.safetensors image.nrrd -o out/a.safetensors
 embed lungs.safetensors --grid 60 -o out/a.safetensors
+embed lungs.safetensors mask.nrrd --labels all -o out/a.safetensors
 info lungs.safetensors
 info lungs.safetensors --json
 deform lungs.safetensors --posture prone -o out/a.ply
@@ -68,9 +70,12 @@ compare lungs.safetensors --postures supine,prone --csv out/a.csv
 compare lungs.safetensors --postures supine,prone -o out/a.html
 compare points.safetensors --postures supine,prone
 breathe lungs.safetensors --posture prone --fps 1 -o out/a.pvd
+breathe lungs.safetensors --posture prone --fps 1 -o out/a.vtp
 breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.csv -o out/a.safetensors
 render lungs.safetensors --posture supine --size 300x200 -o out/a.png
+render lungs.safetensors --turn supine:left:0.1s --size 300x200 -o out/a.webp
 export lungs.safetensors -o out/a.html
+export lungs.safetensors --inside points.safetensors -o out/a.html
 export lungs.safetensors -o out/a.glb
 export lungs.safetensors -o out/a.glb --profile 8,clamp-safe --quantise --animate
 pv show patient.pv.csv
@@ -171,6 +176,11 @@ def samples(folder):
         "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 6 6 5\nspace directions: "
         "(60,0,0) (0,60,0) (0,0,60)\nspace origin: (-150,-340,-260)\nencoding: ascii\n\n"
         + " ".join(str(i % 7) for i in range(180)) + "\n")
+    (folder / "mask.nrrd").write_text(
+        "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 20 10 10\nspace directions: "
+        "(20,0,0) (0,20,0) (0,0,20)\nspace origin: (-190,-290,-190)\nencoding: ascii\n\n"
+        + " ".join(str(2 - i // 10 if (i % 10 - 4.5) ** 2 + (j - 4.5) ** 2 + (k - 4.5) ** 2 < 14 else 0)
+                   for k in range(10) for j in range(10) for i in range(20)) + "\n")
     made = random.Random(7)
     rows = []
     for _ in range(30):
