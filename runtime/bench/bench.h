@@ -43,7 +43,7 @@ typedef struct supine_bench_entry {
 void supine_bench_measure(supine_bench_entry *entries, size_t count, size_t repeats);
 
 /** A made basis of any size as a file in memory, for want of a file: the fields and triangles of
- * `like` over and over, or random fields of `modes` modes, and no triangles, where it is NULL. The
+ * `basis` over and over, or random fields of `modes` modes, and no triangles, where it is NULL. The
  * arrays point into the bytes; free the bytes after the bases that were opened on them. */
 typedef struct supine_bench_image {
   unsigned char *bytes;
@@ -57,8 +57,8 @@ typedef struct supine_bench_image {
 } supine_bench_image;
 
 /** @retval SUPINE_ERROR_MEMORY
- * @retval SUPINE_ERROR_UNSUPPORTED  `like` has a vector field */
-supine_status supine_bench_image_create(size_t vertices, size_t modes, const supine_basis *like,
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has a vector field */
+supine_status supine_bench_image_create(size_t vertices, size_t modes, const supine_basis *basis,
                                         supine_bench_image *image, supine_error *error);
 void supine_bench_image_destroy(supine_bench_image *image);
 

@@ -99,7 +99,7 @@ static int find_scales(const supine_basis *basis, const request *wanted, const d
 static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
+  double scales[SUPINE_LUNGS_MAX] = {0};
   supine_mesh rest = {0};
   supine_mesh mesh = {0};
   float *normals = NULL;

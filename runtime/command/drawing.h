@@ -70,6 +70,6 @@ int supine_command_drawing_turn(const supine_basis *basis, const supine_command_
 
 /* "supine:left:10s" into a breath_turn, as --turn takes it; an exit code or SUPINE_OPTION_MISFIT.
  */
-int supine_command_read_turn(const char *command, const char *text, breath_turn *turn);
+int supine_command_read_turn(const char *command, const char *value, breath_turn *turn);
 
 #endif

@@ -208,7 +208,8 @@ static supine_status set_volume(const request *wanted, supine_stream_volume *vol
 }
 
 static supine_status stream(const supine_basis *basis, const char *path, const request *wanted,
-                            supine_stream_options *options, supine_error *error) {
+                            const supine_stream_options *given, supine_error *error) {
+  supine_stream_options options = *given;
   supine_stream_volume *volume = calloc(1, sizeof *volume);
   supine_stream_poses poses = {0};
   supine_output record = {0};
@@ -216,23 +217,23 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   char *page = NULL;
   supine_status status = volume != NULL ? set_volume(wanted, volume, error)
                                         : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory");
-  options->volume = volume;
+  options.volume = volume;
   if (status == SUPINE_OK && wanted->replay != NULL) {
     status = supine_stream_poses_load(wanted->replay, &poses, error);
-    options->replay = &poses;
+    options.replay = &poses;
   }
   if (status == SUPINE_OK && wanted->record != NULL) {
     status = supine_output_open(wanted->record, &record, error);
-    options->record = record.file;
+    options.record = record.file;
     if (status == SUPINE_OK) {
       supine_stream_poses_begin(record.file);
     }
   }
   if (status == SUPINE_OK) {
-    status = open_page(wanted, path, &page, &options->web, error);
+    status = open_page(wanted, path, &page, &options.web, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_stream_server_create(basis, options, &server, error);
+    status = supine_stream_server_create(basis, &options, &server, error);
   }
   if (status == SUPINE_OK) {
     if (supine_stream_server_port(server) != 0) {
@@ -241,7 +242,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     (void)fflush(stdout);
     supine_options_signals_catch(true);
     status = supine_stream_server_run(server, error);
-    (void)fputs(options->shown != NULL ? "\n" : "", stderr);
+    (void)fputs(options.shown != NULL ? "\n" : "", stderr);
     report(server, wanted);
   }
   if (status == SUPINE_OK && wanted->record != NULL) {
@@ -249,7 +250,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   }
   supine_output_abandon(&record);
   supine_stream_server_destroy(server);
-  supine_stream_web_destroy(options->web);
+  supine_stream_web_destroy(options.web);
   supine_stream_poses_free(&poses);
   free(volume);
   free(page);
