@@ -150,6 +150,8 @@ writer lung.png render lungs.safetensors --posture supine
 writer page.html export lungs.safetensors
 writer lungs.glb export lungs.safetensors --animate
 writer frames.safetensors breathe lungs.safetensors --posture prone
+writer frames.vtp breathe lungs.safetensors --posture prone
+writer turn.webp render lungs.safetensors --turn supine:left:0.1s
 writer inside.safetensors embed lungs.safetensors lungs.ply
 writer moved.csv deform points.safetensors --posture prone
 writer errors.png validate lungs.safetensors --state prone:lungs.ply

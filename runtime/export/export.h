@@ -120,12 +120,12 @@ typedef struct export_page {
  * displacement of 100 mm. Write errors stay in the stream.
  * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, or more than EXPORT_PAGE_MODES_MAX modes */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
-                                       const export_page *page, supine_error *error);
+                                       const export_page *shown, supine_error *error);
 
 /** Writes that page to a file.
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_export_html_print
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_write(const char *path, const export_source *source,
-                                       const export_page *page, supine_error *error);
+                                       const export_page *shown, supine_error *error);
 
 #endif

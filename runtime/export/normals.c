@@ -138,8 +138,7 @@ supine_status supine_export_targets_normals(const export_source *source,
     } while (status == SUPINE_ERROR_NUMERICAL && part > 1e-3);
     if (status != SUPINE_OK && status != SUPINE_ERROR_NUMERICAL) {
       goto cleanup;
-    }
-    status = SUPINE_OK; /* without any breath: the reference surface, which tells nothing new */
+    } /* without any breath: the reference surface, which tells nothing new */
     for (size_t j = 0; j < targets->count; ++j) {
       a[p * targets->count + j] = pose[p].weights[j] + targets->offset[j] / targets->unit[j];
     }
