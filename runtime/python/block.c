@@ -23,7 +23,7 @@ char supine_python_type_of(int dtype) {
                                                  [SUPINE_F32] = 'f',
                                                  [SUPINE_F64] = 'd',
                                                  [SUPINE_I16] = 'h'};
-  return dtype >= 0 && dtype < SUPINE_DTYPE_COUNT ? types[dtype] : '\0';
+  return (char)(dtype >= 0 && dtype < SUPINE_DTYPE_COUNT ? types[dtype] : '\0');
 }
 
 static Py_ssize_t item_size(char type) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Frames as messages. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -176,7 +177,7 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
                                  .stamp = frame->moment.stamp,
                                  .size = parcel->size - SUPINE_STREAM_HEADER,
                                  .crc = crc};
-  strcpy(header.type, weights ? "NDARRAY" : "POLYDATA");
+  (void)snprintf(header.type, sizeof header.type, "%s", weights ? "NDARRAY" : "POLYDATA");
   memcpy(header.device, frames->device, sizeof header.device);
   supine_stream_header_write(&header, parcel->front);
   return true;

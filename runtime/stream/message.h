@@ -85,7 +85,7 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, unsigned char *bytes);
 
 /** The extension of a message of version 2 without metadata. */
-void supine_stream_extension(uint32_t number, unsigned char bytes[SUPINE_STREAM_EXTENSION]);
+void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM_EXTENSION]);
 
 /** Floats in the byte order of the wire, negative where `flip` says so: x and y of LPS as RAS. */
 void supine_stream_put_points(size_t count, const float *xyz, int flip, unsigned char *bytes);

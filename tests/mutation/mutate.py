@@ -73,7 +73,8 @@ def build(targets=()):
 
 def failed_tests(regex, limit=3600):
     """Names of the tests among those of the pattern that fail, at most a few; none may take limit seconds."""
-    code, said = run("timeout", "-k", "9", str(limit), "ctest", "-R", regex, "-j", JOBS, "--stop-on-failure")
+    code, said = run("timeout", "-k", "9", str(limit), "ctest", "-R", regex, "-j", JOBS, "--stop-on-failure",
+                     "--timeout", str(8 * SLOW))
     if code == 124:
         return [f"longer than {limit} s"]
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
