@@ -92,6 +92,24 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
+# Points that a basis of no patient's law turns go by its surface's displacement.
+vertices() { # FILE: x y z of its vertices
+  awk '/^v / { print $2 "," $3 "," $4 }' "$1"
+}
+for posture in supine prone; do
+  "$supine" deform scanned.safetensors --posture $posture --volume rest -o $posture.obj >/dev/null ||
+    fail "deform to OBJ"
+done
+{
+  echo x,y,z,to_x,to_y,to_z
+  vertices supine.obj >from.csv
+  vertices prone.obj | paste -d, from.csv - | awk 'NR % 5 == 1'
+} >turned.csv
+"$supine" validate scanned.safetensors --landmarks turned.csv --posture prone --volume rest --json \
+  >valid.json || fail "validate points that were turned"
+near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm valid.json) mm off"
+near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
+
 # Other postures tell the gain: by surfaces, by landmarks, or both; one posture does not.
 "$supine" precompute rest.ply --scanned none --law deep --constants 5,2.2,9,1.1,20,1.4 --base 0.9 \
   --gain 0.4 --box-force 0,-0.2,0 --band 15 -o known.safetensors >/dev/null || fail "a known law"
@@ -107,9 +125,6 @@ grep -q 'supine: breath scale 0.5' fit.txt || fail "half a breath: $(grep scale 
 grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"
 
 # Landmarks: vertices of the two, every second, with half a millimetre of noise.
-vertices() { # FILE: x y z of its vertices
-  awk '/^v / { print $2 "," $3 "," $4 }' "$1"
-}
 "$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
   --constants 5,2.2,9,1.1,20,1.4 --scale 30 -o state.obj >/dev/null || fail "solve to OBJ"
 "$supine" solve rest.ply --posture supine --reach 10 --scale 0.000001 -o rest.obj >/dev/null ||
