@@ -188,6 +188,33 @@ static void test_quadratic_field_is_recovered(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
+/* The ridges follow what the points say: weak where each lung curves in its own way, strong where
+ * one affine map of both is all there is under the noise. */
+static void test_ridges_follow_the_points(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(120, 41);
+  supine_patient truth = known(&pairs);
+  supine_patient found;
+  supine_patient_fit_report curved;
+  supine_patient_fit_report straight;
+  uint64_t seed = 9;
+  truth.law = SUPINE_PATIENT_QUADRATIC;
+  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
+    truth.polynomial[k] = 8.0 * random_signed(&seed);
+  }
+  move(&pairs, &truth, 0.1, 3);
+  fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &curved);
+  memset(truth.polynomial, 0, sizeof truth.polynomial);
+  for (size_t a = 0; a < 3; ++a) {
+    truth.polynomial[2 * a * SUPINE_PATIENT_TERMS + 1 + a] = 6.0; /* along x by x, ... */
+  }
+  move(&pairs, &truth, 6.0, 3);
+  fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &straight);
+  assert_true(curved.ridge_quadratic <= 1.0 && curved.ridge_lung <= 3.0);
+  assert_true(straight.ridge_quadratic >= 10.0 && straight.ridge_lung >= 30.0);
+  supine_patient_pairs_free(&pairs);
+}
+
 static void test_motion_between_scans_is_told_from_the_law(void **state) {
   (void)state;
   supine_patient_pairs pairs = scatter(250, 5);
@@ -556,6 +583,7 @@ int main(void) {
       cmocka_unit_test(test_public_pairs_hold_out_as_measured),
       cmocka_unit_test(test_noisy_landmarks_return_the_constants),
       cmocka_unit_test(test_quadratic_field_is_recovered),
+      cmocka_unit_test(test_ridges_follow_the_points),
       cmocka_unit_test(test_motion_between_scans_is_told_from_the_law),
       cmocka_unit_test(test_derivatives_continue_beyond_the_frame),
       cmocka_unit_test(test_impossible_pairs_are_refused),
