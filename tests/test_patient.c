@@ -576,6 +576,20 @@ static void test_maps_explain_what_they_can(void **state) {
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
   supine_patient_pairs_free(&pairs);
+
+  /* No similarity mirrors. Of points 30, 20 and 10 from the middle along the axes, with x mirrored,
+   * the best leaves 2800 - (1800 + 800 - 200)^2 / 2800 of their squares. */
+  double axes[18] = {0.0};
+  double mirrored[18] = {0.0};
+  supine_patient_pairs six = {.count = 6, .from = axes, .to = mirrored};
+  for (size_t i = 0; i < 6; ++i) {
+    const double sign = i % 2 == 0 ? 1.0 : -1.0;
+    axes[3 * i + i / 2] = sign * (30.0 - 10.0 * (double)(i / 2));
+    mirrored[3 * i + i / 2] = (i / 2 == 0 ? -1.0 : 1.0) * axes[3 * i + i / 2];
+  }
+  assert_int_equal(supine_patient_validate_points(&six, axes, distance, &error), SUPINE_OK);
+  assert_true(fabs(distance[SUPINE_PATIENT_MAP_SIMILARITY].rms -
+                   sqrt((2800.0 - 2400.0 * 2400.0 / 2800.0) / 6.0)) < 1e-9);
 }
 
 int main(void) {
