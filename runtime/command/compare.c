@@ -11,20 +11,21 @@
 
 static const char name[] = "compare";
 
-typedef void writer(const supine_comparison *comparison, FILE *file);
-
 /* Writes one form to a file, whole or not at all. */
-static int write_file(const char *path, const supine_comparison *comparison, writer *form) {
+static int write_file(const char *path, const supine_comparison *comparison, bool html) {
   supine_output output = {0};
   supine_error error;
-  if (supine_output_open(path, &output, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  supine_status status = supine_output_open(path, &output, &error);
+  if (status == SUPINE_OK && html) {
+    status = supine_report_html(comparison, output.file, &error);
+  } else if (status == SUPINE_OK) {
+    supine_report_csv(comparison, output.file);
   }
-  form(comparison, output.file);
-  if (supine_output_commit(&output, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    status = supine_output_commit(&output, &error);
   }
-  return SUPINE_EXIT_OK;
+  supine_output_abandon(&output);
+  return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(name, &error);
 }
 
 typedef struct request {
@@ -73,10 +74,10 @@ static int tell(const supine_comparison *comparison, const request *wanted) {
   }
   int result = supine_options_finish(name);
   if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
-    result = write_file(wanted->csv, comparison, supine_report_csv);
+    result = write_file(wanted->csv, comparison, false);
   }
   if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
-    result = write_file(wanted->html, comparison, supine_report_html);
+    result = write_file(wanted->html, comparison, true);
   }
   return result;
 }

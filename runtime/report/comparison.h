@@ -53,6 +53,9 @@ double supine_report_gain(const supine_comparison *comparison, size_t posture);
 void supine_report_text(const supine_comparison *comparison, FILE *file);
 bool supine_report_json(const supine_comparison *comparison, FILE *file);
 void supine_report_csv(const supine_comparison *comparison, FILE *file);
-void supine_report_html(const supine_comparison *comparison, FILE *file);
+
+/* Without pictures, and why, where nothing can draw. */
+supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
+                                 supine_error *error);
 
 #endif

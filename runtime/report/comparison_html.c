@@ -214,10 +214,12 @@ static json_t *facts(const supine_comparison *c) {
       "constant", percent(c->constant), "odd", percent(c->odd), "even", percent(c->even));
 }
 
-void supine_report_html(const supine_comparison *c, FILE *file) {
-  supine_error error;
+supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
+  json_t *pictures = supine_report_pictures(c, error);
+  if (pictures == NULL && error->status == SUPINE_ERROR_MEMORY) {
+    return error->status;
+  }
   json_t *data = facts(c);
-  json_t *pictures = supine_report_pictures(c, &error);
   (void)json_object_set_new(data, "postures", postures(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
   (void)json_object_set_new(data, "surface",
@@ -229,7 +231,7 @@ void supine_report_html(const supine_comparison *c, FILE *file) {
   if (pictures != NULL) {
     (void)json_object_set_new(data, "pictures", pictures);
   } else {
-    (void)json_object_set_new(data, "trouble", json_string(error.message));
+    (void)json_object_set_new(data, "trouble", json_string(error->message));
   }
   if (c->postures.count > 1) {
     (void)json_object_set_new(
@@ -244,4 +246,5 @@ void supine_report_html(const supine_comparison *c, FILE *file) {
   const supine_template report = {.assets = supine_report_assets, .data = data};
   supine_template_fill(&report, "report.html", file);
   json_decref(data);
+  return SUPINE_OK;
 }
