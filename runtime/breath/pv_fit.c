@@ -107,7 +107,6 @@ static void problem_fill(problem *limb, const double *pressures, const double *v
 static supine_status fit_curve(problem *limb, double span, double confidence,
                                supine_pv_curve *curve, supine_pv_report *report, double *sigma) {
   gsl_multifit_nlinear_parameters options = gsl_multifit_nlinear_default_parameters();
-  options.solver = gsl_multifit_nlinear_solver_qr;
   gsl_multifit_nlinear_workspace *work = gsl_multifit_nlinear_alloc(
       gsl_multifit_nlinear_trust, &options, limb->count, SUPINE_PV_UNKNOWNS);
   if (work == NULL) {
