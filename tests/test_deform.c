@@ -223,6 +223,14 @@ static void test_storage_largest_numbers_have_finite_bounds(void **state) {
   drop(&o);
 }
 
+/* Packed again or at once, what is stated is that storage's own error. */
+static void check_stated_error(const opened *o, const supine_basis *chosen) {
+  const supine_basis_info *info = supine_basis_get_info(chosen);
+  supine_basis *basis = open_as(o, info->storage, SUPINE_SIMD_AUTO);
+  assert_true(supine_basis_get_info(basis)->storage_error == info->storage_error);
+  supine_basis_close(basis);
+}
+
 static void test_storage_auto_exact_where_int16_errs(void **state) {
   (void)state;
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
@@ -230,12 +238,14 @@ static void test_storage_auto_exact_where_int16_errs(void **state) {
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_INT16);
   assert_true(supine_basis_get_info(basis)->storage_error <= 0.005);
+  check_stated_error(&o, basis);
   supine_basis_close(basis);
   free(o.bytes);
   f->vertex[0] = 1e6F; /* a vertex a kilometre away makes rest positions coarse */
   o = made(f);
   basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_EXACT);
+  check_stated_error(&o, basis);
   supine_basis_close(basis);
   drop(&o);
 }
