@@ -97,6 +97,16 @@ supine(...words.slice(1), '-o', second);
 const undated = (path) => readFileSync(path, 'utf8').replace(/\d{4}-\d\d-\d\d[^<]*/g, '');
 assert.equal(undated(second), undated(html));
 
+/* Directions are named by the nearest posture, and are as far from it as they say. */
+const named = { supine: [0, 1, 0], prone: [0, -1, 0], left: [1, 0, 0], right: [-1, 0, 0], upright: [0, 0, -1], inverted: [0, 0, 1] };
+const told = [...(await page.evaluate(() => document.body.innerText)).matchAll(/(\d+)° from (\w+) \(([-\d.]+):([-\d.]+):([-\d.]+)\)/g)];
+assert.ok(told.length >= 2, 'no direction is told');
+for (const [words, degrees, name, ...numbers] of told) {
+  const far = (axis) => (Math.acos(axis.reduce((sum, x, i) => sum + x * numbers[i], 0) / Math.hypot(...numbers)) * 180) / Math.PI;
+  assert.equal(name, Object.keys(named).reduce((best, other) => (far(named[other]) < far(named[best]) ? other : best)), words);
+  assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // of rounded numbers
+}
+
 /* Each picture has four letters, and they are where the body's axes put them. */
 const shots = await page.evaluate(() => [...document.querySelectorAll('.shot')].map((shot) => ({
   alt: shot.querySelector('img').alt,
