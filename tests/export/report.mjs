@@ -99,9 +99,9 @@ assert.equal(undated(second), undated(html));
 
 /* Directions are named by the nearest posture, and are as far from it as they say. */
 const named = { supine: [0, 1, 0], prone: [0, -1, 0], left: [1, 0, 0], right: [-1, 0, 0], upright: [0, 0, -1], inverted: [0, 0, 1] };
-const told = [...(await page.evaluate(() => document.body.innerText)).matchAll(/(\d+)° from (\w+) \(([-\d.]+):([-\d.]+):([-\d.]+)\)/g)];
-assert.ok(told.length >= 2, 'no direction is told');
-for (const [words, degrees, name, ...numbers] of told) {
+const directions = [...(await page.evaluate(() => document.body.innerText)).matchAll(/(\d+)° from (\w+) \(([-\d.]+):([-\d.]+):([-\d.]+)\)/g)];
+assert.ok(directions.length >= 2, 'no direction is told');
+for (const [words, degrees, name, ...numbers] of directions) {
   const far = (axis) => (Math.acos(axis.reduce((sum, x, i) => sum + x * numbers[i], 0) / Math.hypot(...numbers)) * 180) / Math.PI;
   assert.equal(name, Object.keys(named).reduce((best, other) => (far(named[other]) < far(named[best]) ? other : best)), words);
   assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // of rounded numbers
