@@ -111,11 +111,9 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond && i > 0) { /* once more, from the neighbour's */
+      if (off > lost_beyond) { /* once more, from the node itself */
         double other[3];
-        for (size_t k = 0; k < 3; ++k) {
-          other[k] = y[k] + (double)v[3 * (node - 1) + k];
-        }
+        memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);
         if (again < off) {
           off = again;
