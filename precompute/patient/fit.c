@@ -165,7 +165,7 @@ static supine_status refit(const study *s, const supine_patient_row *rows, size_
   if (afresh && status == SUPINE_OK) {
     status = supine_patient_power_fit(rows, count, s->moved, supine_patient_starts[0], REFIT_STEPS,
                                       refit_tolerance, &other, NULL);
-    if (other.squares < fit->squares) {
+    if (status == SUPINE_OK && other.squares < fit->squares) {
       *fit = other;
     }
   }
@@ -237,7 +237,8 @@ static void draw_range(void *context, size_t begin, size_t end, size_t thread) {
 static supine_status failure(const study *s, size_t count, const char *what, supine_error *error) {
   for (size_t i = 0; i < count; ++i) {
     if (s->failed[i] != SUPINE_OK) {
-      return supine_error_set(error, s->failed[i], "%s failed", what);
+      return supine_error_set(error, s->failed[i], "%s failed: %s", what,
+                              supine_status_string(s->failed[i]));
     }
   }
   return SUPINE_OK;
