@@ -157,7 +157,9 @@ static void write_command(const supine_comparison *c, const char *file, char *co
     (void)fprintf(to, "--rms %.9g", amount);
   } else if (c->inflation.kind == SUPINE_INFLATION_REST || supine_report_knows_rest(c)) {
     (void)fprintf(to, "--volume %s", c->inflation.kind == SUPINE_INFLATION_REST ? "rest" : "full");
-    (void)fprintf(to, amount != 0.0 ? "%+.9g" : "", amount);
+    if (amount != 0.0) {
+      (void)fprintf(to, "%+.9g", amount);
+    }
   } else {
     (void)fprintf(to, "--volume %.9g", amount);
   }
