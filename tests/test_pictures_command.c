@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -578,6 +579,41 @@ static void test_render_turn_plays_from_posture_to_posture(void **state) {
 }
 #endif
 
+#ifdef SUPINE_TEST_CAIRO
+/* Red, green and blue of the page, in its corner. */
+static void corner_of(const char *name, int rgb[3]) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  cairo_surface_t *image = cairo_image_surface_create_from_png(path);
+  uint32_t pixel;
+  assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
+  memcpy(&pixel, cairo_image_surface_get_data(image), sizeof pixel);
+  for (int i = 0; i < 3; ++i) {
+    rgb[i] = (int)(pixel >> (16 - 8 * i) & 255U);
+  }
+  cairo_surface_destroy(image);
+}
+
+/* A dark page is all but black, a light one all but white, both all but grey. */
+static void test_render_themes_are_dark_and_light(void **state) {
+  (void)state;
+  int rgb[2][3];
+  if (!render("lungs.safetensors --posture supine --size 260x380 --theme dark -o dark.png")) {
+    skip();
+  }
+  assert_true(render("lungs.safetensors --posture supine --size 260x380 -o light.png"));
+  corner_of("dark.png", rgb[0]);
+  corner_of("light.png", rgb[1]);
+  for (int i = 0; i < 3; ++i) {
+    assert_in_range(rgb[0][i], 12, 40);
+    assert_in_range(rgb[1][i], 240, 255);
+    for (int t = 0; t < 2; ++t) {
+      assert_in_range(abs(rgb[t][i] - rgb[t][0]), 0, 12);
+    }
+  }
+}
+#endif
+
 static void test_render_options_change_the_picture(void **state) {
   (void)state;
   static const char *const variants[] = {
@@ -637,6 +673,7 @@ int main(void) {
 #ifdef SUPINE_TEST_CAIRO
       cmocka_unit_test(test_render_agrees_with_golden_picture),
       cmocka_unit_test(test_render_opacity_is_the_lungs_share),
+      cmocka_unit_test(test_render_themes_are_dark_and_light),
 #endif
 #ifdef SUPINE_TEST_WEBP
       cmocka_unit_test(test_render_turn_plays_from_posture_to_posture),
