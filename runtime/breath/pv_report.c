@@ -13,15 +13,12 @@
 
 #include "runtime/breath/pv_internal.h"
 
-/* Ratio of the extreme singular values of J with columns scaled to unit length; 0 on failure. */
-static double jacobian_condition(const gsl_matrix *jacobian) {
+/* Ratio of the extreme singular values of J with columns scaled to unit length, in `scaled`; 0
+ * where none are found. */
+static double jacobian_condition(const gsl_matrix *jacobian, double *scaled) {
   const int rows = (int)jacobian->size1;
   const int columns = (int)jacobian->size2;
   double s[SUPINE_PV_UNKNOWNS];
-  double *scaled = malloc(jacobian->size1 * jacobian->size2 * sizeof *scaled);
-  if (scaled == NULL) {
-    return 0.0;
-  }
   for (int j = 0; j < columns; ++j) {
     cblas_dcopy(rows, jacobian->data + j, (int)jacobian->tda, scaled + j, columns);
     const double length = cblas_dnrm2(rows, scaled + j, columns);
@@ -29,7 +26,6 @@ static double jacobian_condition(const gsl_matrix *jacobian) {
   }
   const bool found = LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'N', rows, columns, scaled, columns, s, NULL,
                                     columns, NULL, columns) == 0;
-  free(scaled);
   return found ? s[0] / s[columns - 1] : 0.0;
 }
 
@@ -51,8 +47,9 @@ supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_ve
   const size_t count = residual->size;
   gsl_matrix *covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS);
   gsl_vector *scratch = gsl_vector_alloc(count);
+  double *scaled = malloc(count * SUPINE_PV_UNKNOWNS * sizeof *scaled);
   const supine_status status =
-      covariance == NULL || scratch == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+      covariance == NULL || scratch == NULL || scaled == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -67,7 +64,7 @@ supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_ve
                                .confidence = confidence,
                                .rms = span * misfit / sqrt((double)count),
                                .rms_percent = 100.0 * misfit / sqrt((double)count),
-                               .condition = jacobian_condition(jacobian)};
+                               .condition = jacobian_condition(jacobian, scaled)};
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
     const double unit_i = i < SUPINE_PV_CONTROLS ? 1.0 : span; /* shares of the range to mL */
     for (size_t j = 0; j < SUPINE_PV_UNKNOWNS; ++j) {
@@ -82,6 +79,7 @@ supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_ve
     }
   }
 cleanup:
+  free(scaled);
   gsl_vector_free(scratch);
   gsl_matrix_free(covariance);
   return status;

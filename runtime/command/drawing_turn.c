@@ -105,8 +105,10 @@ static supine_status play(turning *t, supine_command_drawn *shown, supine_animat
   supine_status status = SUPINE_OK;
   for (size_t frame = 0; frame < t->count && status == SUPINE_OK; ++frame) {
     char label[128];
-    (void)find_frame(t, frame, &item, shown); /* as measure() did */
-    if (t->inside != NULL) {
+    if (find_frame(t, frame, &item, shown) != SUPINE_EXIT_OK) { /* it was found before */
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a frame");
+    }
+    if (status == SUPINE_OK && t->inside != NULL) {
       status = supine_command_marks_make(t->inside, &t->names, shown->weights, shown->scales,
                                          t->reference != NULL ? t->reference->weights : NULL,
                                          t->reference != NULL ? t->reference->scales : NULL,
