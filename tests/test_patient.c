@@ -76,6 +76,17 @@ static supine_patient known(const supine_patient_pairs *pairs) {
                           .lengths = {7.3, 5.9, 21.7}};
 }
 
+/* The same with a quadratic map of each lung, its coefficients up to `size` mm. */
+static supine_patient known_quadratic(const supine_patient_pairs *pairs, double size,
+                                      uint64_t seed) {
+  supine_patient truth = known(pairs);
+  truth.law = SUPINE_PATIENT_QUADRATIC;
+  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
+    truth.polynomial[k] = size * random_signed(&seed);
+  }
+  return truth;
+}
+
 static supine_patient_record record_of(const supine_patient *patient) {
   supine_patient_record record = {.patient = *patient,
                                   .rest = {"supine", "rest", {0.0, 1.0, 0.0}},
@@ -171,14 +182,9 @@ static void test_noisy_landmarks_return_the_constants(void **state) {
 static void test_quadratic_field_is_recovered(void **state) {
   (void)state;
   supine_patient_pairs pairs = scatter(400, 77);
-  supine_patient truth = known(&pairs);
+  const supine_patient truth = known_quadratic(&pairs, 4.0, 31);
   supine_patient found;
   supine_patient_fit_report report;
-  uint64_t seed = 31;
-  truth.law = SUPINE_PATIENT_QUADRATIC;
-  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
-    truth.polynomial[k] = 4.0 * random_signed(&seed);
-  }
   move(&pairs, &truth, 0.1, 3);
   fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &report);
   assert_int_equal(found.law, SUPINE_PATIENT_QUADRATIC);
@@ -193,15 +199,10 @@ static void test_quadratic_field_is_recovered(void **state) {
 static void test_ridges_follow_the_points(void **state) {
   (void)state;
   supine_patient_pairs pairs = scatter(120, 41);
-  supine_patient truth = known(&pairs);
+  supine_patient truth = known_quadratic(&pairs, 8.0, 9);
   supine_patient found;
   supine_patient_fit_report curved;
   supine_patient_fit_report straight;
-  uint64_t seed = 9;
-  truth.law = SUPINE_PATIENT_QUADRATIC;
-  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
-    truth.polynomial[k] = 8.0 * random_signed(&seed);
-  }
   move(&pairs, &truth, 0.1, 3);
   fit_pairs(&pairs, SUPINE_PATIENT_STILL, &found, &curved);
   memset(truth.polynomial, 0, sizeof truth.polynomial);
@@ -237,12 +238,7 @@ static void test_motion_between_scans_is_told_from_the_law(void **state) {
 static void test_derivatives_continue_beyond_the_frame(void **state) {
   (void)state;
   supine_patient_pairs pairs = scatter(50, 6);
-  supine_patient patient = known(&pairs);
-  patient.law = SUPINE_PATIENT_QUADRATIC;
-  uint64_t seed = 12;
-  for (size_t k = 0; k < SUPINE_PATIENT_POLYNOMIAL; ++k) {
-    patient.polynomial[k] = random_signed(&seed);
-  }
+  const supine_patient patient = known_quadratic(&pairs, 1.0, 12);
   double at[3] = {60.3, patient.frame.maximum[1], -70.1}; /* on the dorsal face */
   double inside[3];
   double face[3];
