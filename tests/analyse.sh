@@ -21,6 +21,7 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
   cmake --build build/clang >>build/clang.log || { grep -E 'error|warning' build/clang.log; exit 1; }
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
+  command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed"; exit 1; }
   # What is built here; the file that defines what analyse.h redefines does without it.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |

@@ -136,9 +136,10 @@ supine_status supine_export_targets_normals(const export_source *source,
       status = supine_export_targets_at(source, breath, targets, g, part, &pose[p], error);
       part /= 2;
     } while (status == SUPINE_ERROR_NUMERICAL && part > 1e-3);
+    /* Numerical: without any breath, the reference surface, which tells nothing new. */
     if (status != SUPINE_OK && status != SUPINE_ERROR_NUMERICAL) {
       goto cleanup;
-    } /* without any breath: the reference surface, which tells nothing new */
+    }
     for (size_t j = 0; j < targets->count; ++j) {
       a[p * targets->count + j] = pose[p].weights[j] + targets->offset[j] / targets->unit[j];
     }

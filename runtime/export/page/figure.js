@@ -174,7 +174,7 @@ function drawBall(canvas, toEye, gravity) {
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
     context.beginPath(); // one stroke for all three
-    for (const n of [ends[0], ends[3], ends[4]]) {
+    for (const n of [ends[0], ends[3], ends[4]]) { // L, P and H
       // A circle about n is seen as an ellipse, the near half of which lies away from n.
       const begin = n[2] > 0 === front ? -radius : radius;
       const angle = Math.atan2(-n[0], -n[1]);
