@@ -6,11 +6,14 @@
     mutate.py random [COUNT] [SEED]    a random COUNT (100) of places in the rooms below
 
 Works on a copy of what is committed, in build/mutation. A mutant is killed where a test fails or runs
-beyond its time; one that does not compile does not count. Random mutants meet the tests in groups, those
-of the mutant's room first, then the quick, then the slower, until one fails; tests that fail without any
-mutant are left out, and so are those that take longer than SLOW and those of real lungs, so that what
-survives is an upper bound. CMake's further options come from SUPINE_CMAKE_OPTIONS.
+beyond its time; one that does not compile does not count. A random mutant meets the tests that reach its
+line, the quick before the slower, until one fails or they took ENOUGH: which those are an instrumented
+build tells, in which each test runs once alone, kept for further seeds of the same commit. Left out are
+tests that fail there, those that take longer than SLOW and those that build the project anew, so that
+what survives is an upper bound. CMake's further options come from SUPINE_CMAKE_OPTIONS:
+-DSUPINE_LUNGS=FOLDER, say.
 """
+import json
 import os
 import random
 import re
@@ -18,85 +21,69 @@ import shlex
 import subprocess
 import sys
 import time
+from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from itertools import accumulate
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
 FOLDER = SOURCE / "build" / "mutation"
 COPY = FOLDER / "source"
 BUILD = FOLDER / "build"
+COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
+                        stdout=subprocess.PIPE).stdout.strip()
 ROOMS = ("sh", "mesh", "precompute", "runtime")
-QUICK, SLOW = 2.0, 40.0  # s, without a mutant
+QUICK, SLOW = 2.0, 320.0  # s, instrumented: some three times what a test takes optimised
+ENOUGH = 240.0  # s, of all that one mutant meets
 JOBS = str(len(os.sched_getaffinity(0)))  # as many as it may use
-# What reads the sources rather than the program, or asks more of the machine than it has at hand.
-LEFT_OUT = (r"house|readme_example|install|python|windows|stream_(link|slicer|page|igtl)|export_.*_node|"
-            r"cohort|bids|manual|fuzz_.*")
-# Where a mutant most probably dies, by the beginning of its path; the longest that fits is taken.
-NEAR = {
-    "sh": "base|sh_basis|sh_grid|transform|aliasing", "mesh": "mesh_.*|labels|image",
-    "mesh/image": "image|labels", "mesh/labels": "labels", "mesh/read": "mesh_load|mesh_hostile",
-    "mesh/save": "mesh_save", "precompute": "command_output|equilibrium|projection|fields",
-    "precompute/physics": "equilibrium|inverse|force|reach|torture|disease",
-    "precompute/patient": "patient|patient_surface|patient_command", "precompute/fields": "fields",
-    "precompute/lungs": "lungs|mesh_lungs", "precompute/inside": "inside|command_output",
-    "precompute/command": "command_output|program|patient_command|tissue_command",
-    "runtime": "deform|runtime_basis|volume|posture|runtime_quiet|deform_lit",
-    "runtime/breath": "pv_.*", "runtime/compare": "compare", "runtime/command": "command_output|program",
-    "runtime/export": "export_glb|export_html|export_command|command_output", "runtime/field": "field|inside",
-    "runtime/options": "command_output|program", "runtime/render": "render|pictures_command",
-    "runtime/report": "pictures_command|command_output", "runtime/safetensors": "safetensors|golden",
-    "runtime/stream": "stream_gravity|stream_poses|stream_wire|stream_igtl|stream_server",
-}
+LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # reads the sources, builds anew, takes any input
 
 
-def run(*command, cwd=BUILD):
+def run(*command, cwd=BUILD, **environment):
     done = subprocess.run(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          text=True, errors="replace", check=False)
+                          text=True, errors="replace", check=False, env={**os.environ, **environment})
     return done.returncode, done.stdout
 
 
 def prepare():
     subprocess.run(["rm", "-rf", str(COPY)], check=True)
     COPY.mkdir(parents=True)
-    archive = subprocess.run(["git", "-C", str(SOURCE), "archive", "HEAD"], check=True,
+    archive = subprocess.run(["git", "-C", str(SOURCE), "archive", COMMIT], check=True,
                              stdout=subprocess.PIPE).stdout
     subprocess.run(["tar", "-x", "-C", str(COPY)], input=archive, check=True)
-    options = shlex.split(os.environ.get("SUPINE_CMAKE_OPTIONS", ""))
-    code, said = run("cmake", "-S", str(COPY), "-B", str(BUILD), "-G", "Ninja",
-                     "-DCMAKE_BUILD_TYPE=Release", "-DSUPINE_LUNGS=none", *options, cwd=FOLDER)
-    if code != 0 or not build():
-        sys.exit("the unchanged code does not build: " + said[-2000:])
+    configure(BUILD, "-DCMAKE_BUILD_TYPE=Release")
+    if not build():
+        sys.exit("the unchanged code does not build")
 
 
-def build(targets=()):
-    wanted = [word for target in targets for word in ("--target", target)]
-    return run("cmake", "--build", str(BUILD), "-j", JOBS, *wanted)[0] == 0
+def configure(folder, *options):
+    code, said = run("cmake", "-S", str(COPY), "-B", str(folder), "-G", "Ninja", *options,
+                     *shlex.split(os.environ.get("SUPINE_CMAKE_OPTIONS", "")), cwd=FOLDER)
+    if code != 0:
+        sys.exit("the unchanged code is not configured: " + said[-2000:])
 
 
-def failed_tests(regex, limit=3600):
-    """Names of the tests among those of the pattern that fail, at most a few; none may take limit seconds."""
-    code, said = run("timeout", "-k", "9", str(limit), "ctest", "-R", regex, "-j", JOBS, "--stop-on-failure",
-                     "--timeout", str(4 * SLOW))
-    if code == 124:
-        return [f"longer than {limit} s"]
+def build(folder=BUILD):
+    return run("cmake", "--build", str(folder), "-j", JOBS)[0] == 0
+
+
+def failed_tests(names):
+    """Those of the tests that fail or run beyond their time, at most a few."""
+    _, said = run("ctest", "-R", f"^({'|'.join(names)})$", "-j", JOBS, "--stop-on-failure") if names else (0, "")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
 
 
-def programs(names):
-    """Targets of these tests."""
-    return ["supine", *(f"test_{name}" for name in names if (COPY / "tests" / f"test_{name}.c").exists())]
-
-
-def tries(path, changed, groups, limit=3600):
+def tries(path, changed, groups):
     """The test that reports the change, '' where none does, None where it does not compile. A group is
     tests' names."""
     file = COPY / path
     before = file.read_text()
     file.write_text(changed)
     try:
+        if not build():
+            return None
         for names in groups:
-            if not build(programs(names)):
-                return None
-            failed = failed_tests("^(" + "|".join(names) + ")$", limit)
+            failed = failed_tests(names)
             if failed:
                 return failed[0]
         return ""
@@ -111,7 +98,7 @@ def named(word):
         if "@" in fields and re.search(word, fields["#"]):
             mutants.append(fields)
     survived = 0
-    failed = failed_tests("^(" + "|".join(sorted({m["~"] for m in mutants})) + ")$")
+    failed = failed_tests(sorted({m["~"] for m in mutants}))
     if failed:
         sys.exit(f"without a mutant fails {failed}")
     for m in mutants:
@@ -121,7 +108,7 @@ def named(word):
             survived += 1
             continue
         line = text[:text.index(m["-"])].count("\n") + 1
-        by = tries(m["@"], text.replace(m["-"], m["+"]), [m["~"].split("|")])
+        by = tries(m["@"], text.replace(m["-"], m["+"]), [[m["~"]]])
         survived += not by
         verdict = "no build " if by is None else "killed   " if by else "SURVIVED "
         print(f"{verdict} {m['#']}, {m['@']}:{line}: {by}", flush=True)
@@ -160,9 +147,12 @@ def places():
 
 def random_ones(count, seed):
     chosen = random.Random(seed)
-    quick, slower, limit = measured_groups()
+    took, reached = measured()
+    for file in BUILD.rglob("CTestTestfile.cmake"):  # what does not end shall not take a quarter of an hour
+        file.write_text(re.sub(r'(set_tests_properties\(\[=\[(\S+)\]=\].* TIMEOUT )"\d+"',
+                               lambda m: f'{m[1]}"{20 + took.get(m[2], 0):.0f}"', file.read_text()))
     every = places()
-    print(f"{len(every)} places in {len({p[0] for p in every})} files; seed {seed}")
+    print(f"{len(every)} places in {len({p[0] for p in every})} files; seed {seed}", flush=True)
     chosen.shuffle(every)
     killed = survived = 0
     for file, number, match, instead in every:
@@ -172,30 +162,72 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        room = max((r for r in NEAR if path.startswith(r)), key=len)
-        near = [n for n in quick + slower if re.fullmatch(NEAR[room], n)]
-        groups = [near, [n for n in quick if n not in near], [n for n in slower if n not in near]]
-        by = tries(path, "".join(lines), [names for names in groups if names], limit)
+        # A line that gcov does not count is reached by all that reach its file, a file of tables by all.
+        tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
+        used = list(accumulate(took[t] for t in tests))
+        tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
+        groups = [t for t in tests if took[t] <= QUICK], [t for t in tests if took[t] > QUICK]
+        by = tries(path, "".join(lines), groups)
         if by is None:
             continue
         killed += bool(by)
         survived += not by
         print(f"{'killed  ' if by else 'SURVIVED'} {path}:{number + 1}: {lines[number].strip()}"
-              f"  [was {line.strip()}] {by}", flush=True)
+              f"  [was {line.strip()}] {by or f'of {len(tests)} tests'}", flush=True)
     print(f"{killed} of {killed + survived} random mutants killed, seed {seed}")
     return killed >= 0.9 * (killed + survived)
 
 
-def measured_groups():
-    """The quick and the slower tests that pass unchanged, and the seconds that none of the groups needs."""
-    _, said = run("ctest", "-E", f"^({LEFT_OUT})$", "-j", JOBS)
-    passed = [(name, float(took))
-              for name, took in re.findall(r"Test +#\d+: (\S+) \.+ +Passed +([\d.]+) sec", said)]
-    quick = [name for name, took in passed if took <= QUICK]
-    slower = [name for name, took in passed if QUICK < took <= SLOW]
-    print(f"tests: {len(quick)} quick, {len(slower)} slower, "
-          f"{len(passed) - len(quick) - len(slower)} too slow for this", flush=True)
-    return quick, slower, 60 + 10 * int(sum(took for _, took in passed if took <= SLOW))
+def measured():
+    """The seconds of each test, and for each (file, line) the tests that reach it; line 0 is the file."""
+    covered = FOLDER / "covered"
+    configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
+    if not build(covered):
+        sys.exit("the instrumented code does not build")
+    kept = FOLDER / "reached" / COMMIT
+    kept.mkdir(parents=True, exist_ok=True)
+    names = [name for name in re.findall(r"Test +#\d+: (\S+)", run("ctest", "-N", cwd=covered)[1])
+             if not re.fullmatch(LEFT_OUT, name)]
+    with ThreadPoolExecutor(int(JOBS)) as pool:
+        each = dict(zip(names, pool.map(lambda name: lines_reached(name, covered, kept), names)))
+    took = {name: seconds for name, (seconds, _, _) in each.items() if seconds <= SLOW}
+    print(f"{len(took)} tests, without {' '.join(sorted(set(names) - set(took)))}", flush=True)
+    reached = defaultdict(list)
+    for name in sorted(took, key=took.get):
+        _, counted, run_by_it = each[name]
+        for place in counted:
+            reached[tuple(place)] += []
+        for place in run_by_it:
+            reached[tuple(place)].append(name)
+    return took, dict(reached)
+
+
+def lines_reached(name, covered, kept):
+    """Seconds of one test of the instrumented build, infinite where it fails, and the (file, line) that
+    count and that it reached, with line 0 for a file; from the folder `kept` where they are there."""
+    kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
+    if kept.exists():
+        return json.loads(kept.read_text())
+    subprocess.run(["rm", "-rf", str(counts)], check=True)
+    counts.mkdir(parents=True)
+    _, said = run("ctest", "-R", f"^{name}$", cwd=covered, GCOV_PREFIX=str(counts))
+    passed = re.search(r"(?:Passed|\*Skipped) +([\d.]+) sec", said)
+    files = [str(file) for file in counts.rglob("*.gcda")] if passed else []
+    for file in files:  # gcov looks for the notes beside the counts
+        notes = file.removesuffix("gcda") + "gcno"
+        os.symlink(notes.removeprefix(str(counts)), notes)
+    counted, found = set(), set()
+    said = subprocess.run(["gcov", "--json-format", "--stdout", *files], cwd=counts, stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, check=False).stdout if files else b""
+    for report in said.splitlines():
+        for file in json.loads(report)["files"]:
+            path = os.path.relpath(os.path.join(covered, file["file"]), COPY)
+            counted.update((path, line["line_number"]) for line in file["lines"])
+            found.update((path, line["line_number"]) for line in file["lines"] if line["count"] > 0)
+            found.add((path, 0))
+    answer = float(passed[1]) if passed else float("inf"), sorted(counted), sorted(found)
+    kept.write_text(json.dumps(answer))
+    return answer
 
 
 def main():
