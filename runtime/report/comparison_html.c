@@ -217,10 +217,6 @@ static json_t *facts(const supine_comparison *c) {
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
-  json_t *pictures = supine_report_pictures(c, error);
-  if (pictures == NULL && error->status == SUPINE_ERROR_MEMORY) {
-    return error->status;
-  }
   json_t *data = facts(c);
   (void)json_object_set_new(data, "postures", postures(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
@@ -230,11 +226,6 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   (void)json_object_set_new(data, "map_bar",
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,
                                               false, "RMS distance from supine, mm"));
-  if (pictures != NULL) {
-    (void)json_object_set_new(data, "pictures", pictures);
-  } else {
-    (void)json_object_set_new(data, "trouble", json_string(error->message));
-  }
   if (c->postures.count > 1) {
     (void)json_object_set_new(
         data, "matrix",
@@ -244,6 +235,15 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   }
   if (supine_basis_get_info(c->basis)->has_volume) {
     (void)json_object_set_new(data, "slabs", slabs(c));
+  }
+  json_t *pictures = supine_report_pictures(c, error);
+  if (pictures != NULL) {
+    (void)json_object_set_new(data, "pictures", pictures);
+  } else if (error->status == SUPINE_ERROR_MEMORY) {
+    json_decref(data);
+    return error->status;
+  } else {
+    (void)json_object_set_new(data, "trouble", json_string(error->message));
   }
   const supine_template report = {.assets = supine_report_assets, .data = data};
   supine_template_fill(&report, "report.html", file);

@@ -61,6 +61,8 @@ void supine_template_escape(const char *text, FILE *file) {
 static void write_value(const json_t *value, FILE *file) {
   if (json_is_string(value)) {
     supine_template_escape(json_string_value(value), file);
+  } else if (json_is_integer(value)) {
+    (void)fprintf(file, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
   } else {
     (void)json_dumpf(value, file, JSON_ENCODE_ANY | JSON_REAL_PRECISION(9));
   }
