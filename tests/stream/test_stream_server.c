@@ -21,6 +21,7 @@
 
 #include "runtime/stream/address.h"
 #include "runtime/stream/crc64.h"
+#include "runtime/stream/peer.h"
 #include "runtime/stream/server.h"
 #include "runtime/stream/strips.h"
 #include "sh/base/clock.h"
@@ -755,11 +756,63 @@ static void test_places_that_cannot_be_listened_on(void **state) {
   stage_destroy(s);
 }
 
+/* A socket that takes little at a time gets every byte once and in order, never more than a share
+ * of 1 MiB at one go. */
+static void test_a_frame_in_parts_arrives_whole(void **state) {
+  (void)state;
+  static const size_t sizes[3] = {3001, 1, 2500007};
+  const size_t size = sizes[0] + sizes[1] + sizes[2];
+  unsigned char *bytes = fixture_allocate(size, 1);
+  unsigned char *got = fixture_allocate(size + 1, 1);
+  for (size_t i = 0; i < size; ++i) {
+    bytes[i] = (unsigned char)(i * 2654435761u >> 13);
+  }
+  static const int rooms[2] = {4096, 4096000}; /* bytes, asked of the kernel */
+  for (size_t r = 0; r < 2; ++r) {
+    supine_stream_peer peer = {.took = 1.0};
+    int ends[2];
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+    assert_int_equal(setsockopt(ends[0], SOL_SOCKET, SO_SNDBUF, &rooms[r], sizeof rooms[r]), 0);
+    peer.socket = ends[0];
+    size_t begin = 0;
+    for (; peer.parcel.count < 3; begin += sizes[peer.parcel.count++]) {
+      peer.parcel.piece[peer.parcel.count] =
+          (struct iovec){bytes + begin, sizes[peer.parcel.count]};
+    }
+    peer.parcel.size = size;
+    size_t arrived = 0;
+    supine_stream_outcome outcome = SUPINE_STREAM_MORE;
+    for (int pass = 0; arrived < size && pass < 100000; ++pass) {
+      const size_t before = peer.sent;
+      if (outcome == SUPINE_STREAM_MORE) {
+        outcome = supine_stream_peer_send(&peer, 2.0 + pass);
+      }
+      assert_int_not_equal(outcome, SUPINE_STREAM_LOST);
+      assert_true(peer.sent - before <= 1u << 20);
+      assert_true(peer.sent == before || peer.took == 2.0 + pass);
+      assert_int_equal(outcome == SUPINE_STREAM_DONE, peer.sent == size);
+      const ssize_t more = recv(ends[1], got + arrived, size + 1 - arrived, MSG_DONTWAIT);
+      arrived += more > 0 ? (size_t)more : 0;
+    }
+    assert_int_equal(arrived, size);
+    assert_int_equal(outcome, SUPINE_STREAM_DONE);
+    assert_memory_equal(got, bytes, size);
+    assert_int_equal(recv(ends[1], got, 1, MSG_DONTWAIT), -1);
+    (void)close(ends[1]);
+    peer.sent = 0;
+    assert_int_equal(supine_stream_peer_send(&peer, 3.0), SUPINE_STREAM_LOST);
+    (void)close(ends[0]);
+  }
+  free(bytes);
+  free(got);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_weights_answer_each_pose),
       cmocka_unit_test(test_surfaces_and_wishes),
       cmocka_unit_test(test_newest_pose_wins),
+      cmocka_unit_test(test_a_frame_in_parts_arrives_whole),
       cmocka_unit_test(test_stuck_and_vanished_peers_hold_up_nobody),
       cmocka_unit_test(test_fifty_peers_and_no_more_than_allowed),
       cmocka_unit_test(test_ten_thousand_mutated_messages),
