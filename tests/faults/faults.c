@@ -4,9 +4,9 @@
  *
  *     FAULT_KIND    "memory" or "file"
  *     FAULT_NTH     which call fails, from 0; none where absent
- *     FAULT_ALSO    libraries whose calls count as the program's, as parts of their names:
- * "gsl,jansson" FAULT_REPORT  a file that gets three numbers at the end: calls seen, calls failed,
- * and blocks that the program's own code took and nobody gave back
+ *     FAULT_ALSO    parts of names of libraries whose calls count as well: gsl,jansson
+ *     FAULT_REPORT  a file that gets three numbers at the end: calls seen, calls failed, and blocks
+ *                   that the program's own code took and nobody gave back
  */
 #include <dirent.h>
 #include <dlfcn.h>

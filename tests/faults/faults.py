@@ -3,6 +3,7 @@
 """Whole commands with each allocation, and each call that makes a file, failing in turn.
 
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
+    faults.py PROGRAM            each command once, without faults: for a program built with a sanitizer
 
 The n-th call fails in the n-th run, for every n; with EACH above 0, only so many spread over each
 command (tests take few, the campaign takes all with 0). WORD: only commands in which it stands.
@@ -100,8 +101,8 @@ class Trial:
         self.program, self.library, self.folder = program, library, folder
         self.out = folder / "out"
         self.report = folder / "report"
-        self.environment = {**os.environ, "SUPINE_THREADS": "1", "LIBGL_ALWAYS_SOFTWARE": "1",
-                            "FAULT_REPORT": str(self.report), "OPENBLAS_NUM_THREADS": "1"}
+        self.environment = {"SUPINE_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ,
+                            "LIBGL_ALWAYS_SOFTWARE": "1", "FAULT_REPORT": str(self.report)}
 
     def run(self, arguments, kind=None, nth=None):
         """The exit code, what was said on both streams, calls seen, failed, blocks not given back."""
@@ -115,8 +116,8 @@ class Trial:
             environment["FAULT_NTH"] = str(nth)
         try:
             done = subprocess.run([self.program, *arguments], cwd=self.folder, env=environment,
-                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=LIMIT,
-                                  check=False)
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                  timeout=LIMIT if kind else None, check=False)
         except subprocess.TimeoutExpired:
             return None, b"", "", (0, 0, 0)
         said = re.sub(rb"[0-9.]+ ms", b"# ms", done.stdout)  # how long it took is no part of it
@@ -190,7 +191,8 @@ def samples(folder):
 
 
 def main():
-    program, library = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+    program = Path(sys.argv[1]).resolve()
+    library = Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
     each = int(sys.argv[3]) if len(sys.argv) > 3 else 0
     word = sys.argv[4] if len(sys.argv) > 4 else ""
     faults = dict.fromkeys(REASONS, 0)
@@ -204,6 +206,11 @@ def main():
                 sys.exit(f"{line}: {trial.run(line.split())[2]}")
         kept = trial.folder / "kept"
         for line in filter(lambda text: text and word in text, COMMANDS.split("\n")):
+            if library is None:
+                code, _, words, _ = trial.run(line.split())
+                print(f"{code}: {line}" if code == 0 else f"WRONG {code}: {line}: {words}", flush=True)
+                wrong += [line] if code != 0 else []
+                continue
             runs = faultless(trial, line.split())
             code, _, words, _ = runs["file"]
             if code == 3:
@@ -227,8 +234,8 @@ def main():
                         print("WRONG " + wrong[-1], flush=True)
                 faults[kind] += tried
                 print(f"{kind:6} {tried:5} of {count:5} failed, {found} wrong: {line}", flush=True)
-    print(", ".join(f"{count} {kind} faults" for kind, count in faults.items())
-          + f": {len(wrong)} wrong")
+    tried = [f"{count} {kind} faults" for kind, count in faults.items()] if library else ["each once, no faults"]
+    print(f"{', '.join(tried)}: {len(wrong)} wrong")
     sys.exit(1 if wrong else 0)
 
 
