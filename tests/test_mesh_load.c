@@ -176,26 +176,36 @@ static void test_load_ply_strips_illegal_refused(void **state) {
   }
 }
 
-/* A flat face that turns both ways is cut along lines that run inside it: all its triangles face
- * the same way and add up to its area. */
+/* A flat face that turns both ways is cut along lines that run inside it, however small it is: all
+ * its triangles face the same way and add up to its area. */
 static void test_load_concave_face_cut_inside(void **state) {
-  static const char text[] = "OFF\n9 2 0\n0 0 0\n90 0 0\n90 60 0\n60 60 0\n60 30 0\n30 30 0\n"
-                             "30 60 0\n0 60 0\n0 0 50\n8 0 1 2 3 4 5 6 7\n4 8 7 5 0\n";
-  char path[256];
-  supine_mesh mesh = load(sample_text(state, "u.off", text, path), NULL, NULL);
-  assert_int_equal(mesh.vertex_count, 9);
-  assert_int_equal(mesh.triangle_count, 8);
-  double area = 0.0;
-  for (size_t t = 0; t < 6; ++t) {
-    const double *a = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t];
-    const double *b = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 1];
-    const double *c = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 2];
-    const double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    assert_true(twice > 0.0);
-    area += 0.5 * twice;
+  static const double corners[9][3] = {{0, 0, 0},   {90, 0, 0},  {90, 60, 0},
+                                       {60, 60, 0}, {60, 30, 0}, {30, 30, 0},
+                                       {30, 60, 0}, {0, 60, 0},  {0, 0, 50}};
+  for (double size = 1.0; size > 1.0e-4; size /= 100.0) {
+    char text[1024] = "OFF\n9 2 0\n";
+    char path[256];
+    for (size_t i = 0; i < 9; ++i) {
+      const size_t length = strlen(text);
+      (void)snprintf(text + length, sizeof text - length, "%g %g %g\n", size * corners[i][0],
+                     size * corners[i][1], size * corners[i][2]);
+    }
+    (void)strcat(text, "8 0 1 2 3 4 5 6 7\n4 8 7 5 0\n");
+    supine_mesh mesh = load(sample_text(state, "u.off", text, path), NULL, NULL);
+    assert_int_equal(mesh.vertex_count, 9);
+    assert_int_equal(mesh.triangle_count, 8);
+    double area = 0.0;
+    for (size_t t = 0; t < 6; ++t) {
+      const double *a = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t];
+      const double *b = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 1];
+      const double *c = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t + 2];
+      const double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+      assert_true(twice > 0.0);
+      area += 0.5 * twice;
+    }
+    assert_true(fabs(area / (size * size) - (90.0 * 60.0 - 30.0 * 30.0)) < 1.0e-9);
+    supine_mesh_free(&mesh);
   }
-  assert_true(fabs(area - (90.0 * 60.0 - 30.0 * 30.0)) < 1.0e-9);
-  supine_mesh_free(&mesh);
 }
 
 /* Corners on one line, and a face that crosses itself, still give every triangle. */
