@@ -121,6 +121,20 @@ near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
   >fit.json || fail "fit two states"
 near "$(number gain fit.json)" 0.4 0.03 || fail "gain $(number gain fit.json)"
 near "$(number gain_standard_error fit.json)" 0.02 0.02 || fail "its error"
+for state in supine:0:zero supine:900:wide prone:600:down; do
+  posture=${state%%:*}
+  volume=${state#*:}
+  "$supine" deform known.safetensors --posture "$posture" --volume "${volume%:*}" \
+    -o "${state##*:}.obj" >/dev/null || fail "deform to OBJ"
+  {
+    echo x,y,z,to_x,to_y,to_z
+    vertices zero.obj >from.csv
+    vertices "${state##*:}.obj" | paste -d, from.csv - | awk 'NR % 3 == 1'
+  } >"${state##*:}.csv"
+done
+"$supine" fit --landmarks wide.csv --state prone:+600:down.csv -o three.json --json >fit.json ||
+  fail "fit two sets of landmarks"
+near "$(number gain fit.json)" 0.4 0.03 || fail "gain of landmarks $(number gain fit.json)"
 "$supine" fit rest.ply wide.ply half.ply >fit.txt || fail "fit more operands"
 grep -q 'supine: breath scale 0.5' fit.txt || fail "half a breath: $(grep scale fit.txt)"
 grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"

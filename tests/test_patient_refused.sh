@@ -71,6 +71,7 @@ refused 2 'short.csv:30' --landmarks short.csv
 refused 2 'lines 9 and 62 both give the point' --landmarks twice.csv
 head -12 good.csv >eleven.csv
 refused 2 '11 pairs of points determine no law: give at least 12' --landmarks eleven.csv
+refused 2 '11 pairs of points determine no law' --landmarks good.csv --state prone:rest:eleven.csv
 head -50 good.csv >few.csv
 refused 2 '49 points are fewer than the 60 unknowns of the quadratic law' --landmarks few.csv --law quadratic
 head -1 good.csv >none.csv

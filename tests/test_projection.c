@@ -174,9 +174,11 @@ static void test_smooth_route_agrees_with_a_grid(void **state) {
       high += miss;
       all += b[i] * b[i];
     }
-    printf("soften %g, reach %g: %zu directions against %zu: low even bands %.1e, all %.1e\n",
-           softens[c], reaches[c], smooth.solve_count, grid.solve_count, sqrt(low / all),
-           sqrt(high / all));
+    printf("soften %g, reach %g: %zu directions in %zu steps against %zu in %zu: low even bands "
+           "%.1e, all %.1e\n",
+           softens[c], reaches[c], smooth.solve_count, smooth.iterations, grid.solve_count,
+           grid.iterations, sqrt(low / all), sqrt(high / all));
+    assert_true(smooth.iterations <= 15 && grid.iterations <= 15);
     assert_true(sqrt(low / all) <= 2e-4); /* what smooth.c promises */
     assert_true(sqrt(high / all) <= 2e-3);
     free(a);

@@ -20,12 +20,11 @@ typedef struct pair {
 /* The two largest pieces, if they lie beside each other; the left one first. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
-  for (uint32_t r = 0; r < pieces->run_count; ++r) {
+  for (uint32_t r = 1; r < pieces->run_count; ++r) {
     if (pieces->piece[r].count > pieces->piece[top[0]].count) {
       top[1] = top[0];
       top[0] = r;
-    } else if (r != top[0] &&
-               (top[1] == top[0] || pieces->piece[r].count > pieces->piece[top[1]].count)) {
+    } else if (top[1] == top[0] || pieces->piece[r].count > pieces->piece[top[1]].count) {
       top[1] = r;
     }
   }
