@@ -43,13 +43,14 @@ const browser = await chromium.launch({
 });
 const complaints = [];
 const context = await browser.newContext({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce' });
+context.setDefaultTimeout(120000); // for what hangs, on a machine as busy as may be
 
 async function view() {
   const page = await context.newPage();
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(error.stack));
   await page.goto(site);
-  await page.waitForFunction(() => window.supine?.state.moment && window.supineLive?.moments() > 0, null, { timeout: 60000 });
+  await page.waitForFunction(() => window.supine?.state.moment && window.supineLive?.moments() > 0, null);
   return page;
 }
 
@@ -61,7 +62,7 @@ async function expectGravity(wanted, what) {
     await page.waitForFunction((g) => {
       const { state, gravityOf } = window.supine;
       return Math.hypot(...gravityOf(state.q).map((x, i) => x - g[i])) < 1e-5 && Math.abs(state.depth - 300) < 1e-3;
-    }, wanted, { timeout: 20000 }).catch(async () => {
+    }, wanted).catch(async () => {
       assert.fail(`${what}: ${await page.evaluate(() => [window.supine.gravityOf(window.supine.state.q), window.supine.state.depth])}`);
     });
     await page.waitForFunction((g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 1e-5, wanted);
@@ -79,7 +80,7 @@ for (const [name, left, back, head, gravity] of lies) {
   tracker.write(transform(left, back, head));
   await expectGravity(gravity, name);
   for (const page of viewers) {
-    await page.waitForFunction((wanted) => document.getElementById('posture-name').value === wanted, name, { timeout: 20000 });
+    await page.waitForFunction((wanted) => document.getElementById('posture-name').value === wanted, name);
   }
 }
 // A fast tracker: the last of many poses is what is seen.
