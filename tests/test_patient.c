@@ -255,6 +255,22 @@ static void test_derivatives_continue_beyond_the_frame(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
+/* Whether the other state is larger is asked within the frame: beyond its upper face this one
+ * shrinks. */
+static void test_inflation_is_that_of_the_frame(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(50, 6);
+  supine_patient patient = known_quadratic(&pairs, 0.0, 12);
+  double *of_z = patient.polynomial + (size_t)4 * SUPINE_PATIENT_TERMS;
+  of_z[3] = -5.0; /* mm, of 2 Z - 1, which falls towards the head, and of its square */
+  of_z[6] = -3.0;
+  assert_true(supine_patient_inflation(&patient) == 1.0);
+  of_z[3] = 5.0;
+  of_z[6] = 3.0;
+  assert_true(supine_patient_inflation(&patient) == -1.0);
+  supine_patient_pairs_free(&pairs);
+}
+
 /* --- what is refused ------------------------------------------------------------------------- */
 
 static supine_status check(const supine_patient_pairs *pairs, bool moved, char *message) {
@@ -596,6 +612,7 @@ int main(void) {
       cmocka_unit_test(test_ridges_follow_the_points),
       cmocka_unit_test(test_motion_between_scans_is_told_from_the_law),
       cmocka_unit_test(test_derivatives_continue_beyond_the_frame),
+      cmocka_unit_test(test_inflation_is_that_of_the_frame),
       cmocka_unit_test(test_impossible_pairs_are_refused),
       cmocka_unit_test(test_pair_files_say_what_is_wrong),
       cmocka_unit_test(test_pair_files_go_from_rest),
