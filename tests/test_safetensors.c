@@ -212,6 +212,7 @@ static void test_open_bad_headers_refused(void **state) {
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[],\"data_offsets\":[0,1]}}", 1},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[1,1,1,1,1],\"data_offsets\":[0,1]}}", 1},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0]}}", 2},
+      {"{\"a\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[0]}}", 0},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2,2]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"data_offsets\":[0,2]}}", 2},
