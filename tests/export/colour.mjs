@@ -41,6 +41,22 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
+// The report's bars are of one of the two, and its map's cells of the one of differences.
+supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
+const report = readFileSync(join(folder, 'report.html'), 'utf8');
+const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+const apart = (hex, name, i) => Math.max(...bytesOf(hex).map((x, k) => Math.abs(x - Buffer.from(colours[name], 'hex')[3 * i + k])));
+const bars = [...report.matchAll(/linear-gradient\(90deg,(#[^)]*)\)/g)].map((found) => found[1].split(','));
+assert.ok(bars.length >= 3);
+for (const stops of bars) {
+  assert.equal(stops.length, 17);
+  const off = Object.keys(colours).map((name) => Math.max(...stops.map((hex, i) => apart(hex, name, Math.round((255 * i) / 16)))));
+  assert.ok(Math.min(...off) <= 3, `a bar is ${off} off: ${stops}`);
+}
+const fills = [...new Set([...report.matchAll(/<path fill="(#[0-9a-f]{6})"/g)].map((found) => found[1]))];
+assert.ok(fills.length > 50, `the map has ${fills.length} colours`);
+for (const hex of fills) assert.ok(Array.from({ length: 256 }, (_, i) => i).some((i) => apart(hex, 'difference', i) <= 2), `${hex} is not of the map`);
+
 // The cases of tests/test_render.c: page, pictures and reports have one rule.
 for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {
   assert.ok(Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12, `${value}: ${tickStep(value)}, ${rangeEnd(value)}`);
