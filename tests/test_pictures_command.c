@@ -470,6 +470,58 @@ static void test_render_agrees_with_golden_picture(void **state) {
 #endif
 
 #ifdef SUPINE_TEST_CAIRO
+/* Mean place of what is orange in a picture's upper left: of the arrow in the ball. */
+static void find_arrow(const char *path, double place[2]) {
+  cairo_surface_t *image = cairo_image_surface_create_from_png(path);
+  assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
+  const int stride = cairo_image_surface_get_stride(image);
+  double sum[2] = {0, 0};
+  double count = 0;
+  for (int y = 0; y < cairo_image_surface_get_height(image) / 3; ++y) {
+    const unsigned char *pixel = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
+    for (int x = 0; x < cairo_image_surface_get_width(image) / 4; ++x, pixel += 4) {
+      if (pixel[2] > 180 && pixel[1] < 140 && pixel[0] < 110) { /* blue, green, red */
+        sum[0] += x;
+        sum[1] += y;
+        ++count;
+      }
+    }
+  }
+  cairo_surface_destroy(image);
+  assert_true(count > 10);
+  place[0] = sum[0] / count;
+  place[1] = sum[1] / count;
+}
+
+/* Seen from the front, left is on the right and feet are below; who lies supine or prone is drawn
+ * along to the viewer, from the ball's centre. */
+static void test_render_arrow_points_where_gravity_does(void **state) {
+  (void)state;
+  static const struct {
+    const char *posture;
+    int across, down;
+  } cases[] = {{"supine", 0, 0}, {"prone", 0, 0},   {"left", 1, 0},
+               {"right", -1, 0}, {"upright", 0, 1}, {"inverted", 0, -1}};
+  double centre[2];
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    char path[256];
+    double place[2];
+    if (!render("lungs.safetensors --posture %s --size 480x360 -o arrow.png", cases[i].posture)) {
+      skip();
+    }
+    (void)snprintf(path, sizeof path, "%s/arrow.png", folder);
+    find_arrow(path, place);
+    memcpy(centre, i == 0 ? place : centre, sizeof centre);
+    print_message("%s: arrow %.1f across, %.1f down\n", cases[i].posture, place[0] - centre[0],
+                  place[1] - centre[1]);
+    const int wanted[2] = {cases[i].across, cases[i].down};
+    for (int k = 0; k < 2; ++k) {
+      const double off = place[k] - centre[k];
+      assert_true(wanted[k] == 0 ? fabs(off) < 1.5 : wanted[k] * off > 4.0);
+    }
+  }
+}
+
 /* Light through the lungs is a share of what is behind: whole, half and a quarter lie on a line. */
 static void test_render_opacity_is_the_lungs_share(void **state) {
   (void)state;
@@ -672,6 +724,7 @@ int main(void) {
       cmocka_unit_test(test_render_misuse_is_a_usage_error),
 #ifdef SUPINE_TEST_CAIRO
       cmocka_unit_test(test_render_agrees_with_golden_picture),
+      cmocka_unit_test(test_render_arrow_points_where_gravity_does),
       cmocka_unit_test(test_render_opacity_is_the_lungs_share),
       cmocka_unit_test(test_render_themes_are_dark_and_light),
 #endif
