@@ -522,6 +522,27 @@ static void test_render_arrow_points_where_gravity_does(void **state) {
   }
 }
 
+/* One point alone inside is seen. */
+static void test_render_one_point_inside_is_seen(void **state) {
+  (void)state;
+  char path[2][256];
+  (void)snprintf(path[0], sizeof path[0], "%s/one.csv", folder);
+  FILE *points = fopen(path[0], "w");
+  assert_non_null(points);
+  assert_true(fputs("name,x,y,z\nnodule,-80,-120,-90\n", points) >= 0);
+  assert_int_equal(fclose(points), 0);
+  EXPECT(0, "", "embed lungs.safetensors one.csv -o one.safetensors");
+  for (int i = 0; i < 2; ++i) {
+    (void)snprintf(path[i], sizeof path[i], "%s/inside%d.png", folder, i);
+    if (!render(
+            "lungs.safetensors %s --opacity 0.5 --posture supine --size 240x180 -o inside%d.png",
+            i == 0 ? "" : "--inside one.safetensors", i)) {
+      skip();
+    }
+  }
+  assert_true(png_difference(path[0], path[1]) > 0.02);
+}
+
 /* Light through the lungs is a share of what is behind: whole, half and a quarter lie on a line. */
 static void test_render_opacity_is_the_lungs_share(void **state) {
   (void)state;
@@ -725,6 +746,7 @@ int main(void) {
 #ifdef SUPINE_TEST_CAIRO
       cmocka_unit_test(test_render_agrees_with_golden_picture),
       cmocka_unit_test(test_render_arrow_points_where_gravity_does),
+      cmocka_unit_test(test_render_one_point_inside_is_seen),
       cmocka_unit_test(test_render_opacity_is_the_lungs_share),
       cmocka_unit_test(test_render_themes_are_dark_and_light),
 #endif
