@@ -277,6 +277,37 @@ static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **stat
   supine_lungs_free(&full);
 }
 
+/* Volume of the surface at positions, mL. */
+static double volume_at(const supine_lungs *lungs, const float *xyz) {
+  supine_mesh moved = lungs->mesh;
+  moved.vertices = malloc(3 * moved.vertex_count * sizeof *moved.vertices);
+  assert_non_null(moved.vertices);
+  for (size_t i = 0; i < 3 * moved.vertex_count; ++i) {
+    moved.vertices[i] = (double)xyz[i];
+  }
+  const double volume = 1e-3 * supine_mesh_volume(&moved);
+  free(moved.vertices);
+  return volume;
+}
+
+/* A basis moves its surface by as much as it was asked. */
+static void check_volume(const supine_lungs *lungs, const supine_basis *basis, const double g[3],
+                         double wanted) {
+  double weights[SUPINE_MODES_MAX];
+  double scales[2];
+  float *xyz = malloc(3 * lungs->mesh.vertex_count * sizeof *xyz);
+  assert_non_null(xyz);
+  assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
+  assert_int_equal(supine_basis_scale(basis, weights, wanted, scales, NULL), SUPINE_OK);
+  scales[1] = scales[0];
+  supine_deform(basis, weights, scales, xyz);
+  const double is = volume_at(lungs, xyz) - volume_at(lungs, supine_basis_vertices(basis));
+  if (fabs(is - wanted) > 0.02) {
+    fail_msg("%.4f mL were asked, and %.4f came", wanted, is);
+  }
+  free(xyz);
+}
+
 /* A scan said to be at rest is where its posture rests, to rounding, not by way of the harmonics. */
 static void test_scan_at_rest_is_where_its_posture_rests(void **state) {
   (void)state;
@@ -308,6 +339,8 @@ static void test_scan_at_rest_is_where_its_posture_rests(void **state) {
     assert_true(fabs(rest - supine_basis_get_info(basis)->scan_volume) < 0.01);
     /* or nothing was shown: the compressed field's full surface holds otherwise much */
     assert_true(fabs(rest - (share - 1.0) * 6000.0) > 0.1);
+    check_volume(&lungs, basis, g, rest);
+    check_volume(&lungs, basis, postures[(p + 1) % 4], rest + 500.0);
     supine_basis_close(basis);
     supine_lungs_free(&lungs);
   }
