@@ -178,6 +178,37 @@ static void test_noisy_landmarks_return_the_constants(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
+/* Near its end the fit of the law's exponents and slopes comes nearer with each step as only right
+ * derivatives let it. */
+static void test_paper_law_is_found_in_few_steps(void **state) {
+  (void)state;
+  supine_patient_pairs pairs = scatter(200, 3);
+  const supine_patient truth = known(&pairs);
+  supine_patient_row *rows = malloc(3 * pairs.count * sizeof *rows);
+  assert_non_null(rows);
+  move(&pairs, &truth, 0.0, 1);
+  supine_patient_rows_of_pairs(&truth.frame, &pairs, rows);
+  for (size_t k = 0; k < 3 * pairs.count; ++k) {
+    rows[k].weight = 1.0;
+  }
+  double start[SUPINE_PATIENT_POWERS];
+  for (size_t k = 0; k < SUPINE_PATIENT_POWERS; ++k) {
+    start[k] = truth.powers[k] + (k % 2 == 0 ? 0.1 : -0.1);
+  }
+  supine_patient_power after[2];
+  static const size_t steps[2] = {3, 200};
+  for (int i = 0; i < 2; ++i) {
+    assert_int_equal(supine_patient_power_fit(rows, 3 * pairs.count, SUPINE_PATIENT_STILL, start,
+                                              steps[i], 0.0, &after[i], NULL),
+                     SUPINE_OK);
+  }
+  for (size_t k = 0; k < SUPINE_PATIENT_POWERS; ++k) {
+    assert_true(fabs(after[0].powers[k] - after[1].powers[k]) < 3e-9);
+  }
+  free(rows);
+  supine_patient_pairs_free(&pairs);
+}
+
 /* A quadratic map of each lung is found to rounding, but for the ridge. */
 static void test_quadratic_field_is_recovered(void **state) {
   (void)state;
@@ -608,6 +639,7 @@ int main(void) {
   static const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_public_pairs_hold_out_as_measured),
       cmocka_unit_test(test_noisy_landmarks_return_the_constants),
+      cmocka_unit_test(test_paper_law_is_found_in_few_steps),
       cmocka_unit_test(test_quadratic_field_is_recovered),
       cmocka_unit_test(test_ridges_follow_the_points),
       cmocka_unit_test(test_motion_between_scans_is_told_from_the_law),
