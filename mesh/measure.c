@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Volume, box and vertex areas of a surface. */
 #include <math.h>
 #include <string.h>

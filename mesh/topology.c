@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Edges, found by sorting the triangles' sides; components, by joining the ends of the edges. */
 #include <stdlib.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 #include "sh/base/output.h"
 #include <supine/version.h>
 
-#include "runtime/options/command.h"
+#include "program/options/command.h"
 
 /* One file written by `write`; ends the program where that fails. */
 typedef void writer(const supine_command *command, FILE *file);

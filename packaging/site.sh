@@ -44,7 +44,7 @@ INPUT = README.md $out/commands.md tests/FIGURES.md runtime/BINDINGS.md CHANGELO
   runtime/include/supine sh/include/supine
 USE_MDFILE_AS_MAINPAGE = README.md
 FILE_PATTERNS = *.h *.md
-IMAGE_PATH = . runtime/render $out/made
+IMAGE_PATH = . program/render $out/made
 EXAMPLE_PATH = tests/example
 HTML_EXTRA_FILES = $out/made/page.html $out/made/report.html
 STRIP_FROM_INC_PATH = runtime/include sh/include

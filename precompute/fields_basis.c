@@ -5,7 +5,7 @@
 #include "precompute/precompute.h"
 
 #include "precompute/projection/compression.h"
-#include "precompute/writer/basis_file.h"
+#include "precompute/basis_file.h"
 
 /* Eight parameters: those of supine_precompute, the fields and how they are fitted. */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,

@@ -8,11 +8,11 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/accuracy/held_out.h"
+#include "precompute/projection/held_out.h"
 #include "precompute/physics/solve.h"
 #include "precompute/projection/compression.h"
 #include "precompute/rest.h"
-#include "precompute/writer/basis_file.h"
+#include "precompute/basis_file.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */

@@ -4,11 +4,11 @@
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
-#include "precompute/accuracy/accuracy.h"
+#include "precompute/projection/accuracy.h"
 #include "precompute/fields/fields.h"
 #include "precompute/physics/model.h"
 #include "precompute/projection/projection.h"
-#include "precompute/reference/reference.h"
+#include "precompute/physics/reference.h"
 
 #ifdef __cplusplus
 extern "C" {

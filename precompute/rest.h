@@ -4,7 +4,7 @@
 #define SUPINE_REST_H
 
 #include "precompute/projection/projection.h"
-#include "precompute/reference/reference.h"
+#include "precompute/physics/reference.h"
 
 /* What lungs hold at rest, mL beyond the reference, as real harmonics of bands 0 to 2 [9]. Both
  * lungs of a pair have one scale, found where they, healthy, hold the share of their posture; so

@@ -9,7 +9,7 @@
 #include <supine/sh.h>
 
 #include "runtime/internal.h"
-#include "runtime/platform/platform.h"
+#include "runtime/safetensors/platform.h"
 
 /* The file that is being checked, and where its name and a failure go. */
 typedef struct check {

@@ -5,7 +5,7 @@
 
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
-#include "runtime/platform/platform.h"
+#include "runtime/safetensors/platform.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */

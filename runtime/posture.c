@@ -6,7 +6,7 @@
 
 #include <supine/posture.h>
 
-#include "runtime/words/words.h"
+#include "runtime/words.h"
 
 static const struct {
   const char *name;

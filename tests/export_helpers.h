@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "runtime/options/command.h"
+#include "program/options/command.h"
 #include "runtime_fixture.h"
 
 /* Runs the command with standard output and error in a file, which `text` then holds. */

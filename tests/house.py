@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rooms of the house: README's table says whom each may use, and the sources keep to it.
+"""Check ARCHITECTURE.md's table of folders against the sources.
 
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
@@ -13,30 +13,33 @@ import sys
 source, build = sys.argv[1:3]
 faults = []
 
-# Rooms whose external names begin otherwise than supine_<folder>_.
-PREFIX = {"sh/base": "supine_", "runtime": "supine_", "runtime/words": "supine_words_",
-          "mesh/read": "supine_mesh_", "mesh/save": "supine_mesh_"}
+# Folders whose external names begin otherwise than supine_<folder>_.
+PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
+          "mesh/io": ("supine_mesh_",), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
+          "precompute/physics": ("supine_physics_", "supine_reference_"),
+          "precompute/projection": ("supine_projection_", "supine_accuracy_"),
+          "precompute": ("supine_precompute_", "supine_writer_"), "program": ("supine_command_",)}
 PUBLIC = ("sh/include/supine", "runtime/include/supine")
 
 
 def read_table():
     rooms = {}
-    with open(os.path.join(source, "README.md"), encoding="utf-8") as readme:
-        table = re.findall(r"^\| `(?:sh|mesh|precompute|runtime)[a-z/]*`.*$", readme.read(), re.M)
+    with open(os.path.join(source, "ARCHITECTURE.md"), encoding="utf-8") as readme:
+        table = re.findall(r"^\| `(?:sh|mesh|precompute|runtime|program)[a-z/]*`.*$", readme.read(), re.M)
     rows = []
     for line in table:
         row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
         if row is None:
-            faults.append(f"README: no row of three cells: {line}")
+            faults.append(f"ARCHITECTURE.md: no row of three cells: {line}")
         else:
             rows.append(row.groups())
     for room, what, uses in rows:
         if not what.strip():
-            faults.append(f"README does not say what {room} is")
+            faults.append(f"ARCHITECTURE.md does not say what {room} is")
         rooms[room] = set()
         for used in re.findall(r"`([a-z/]+)`", uses):
             if used == room or used not in rooms:
-                faults.append(f"README: {room} may use only rooms above it, not {used}")
+                faults.append(f"ARCHITECTURE.md: {room} may use only rooms above it, not {used}")
             else:
                 rooms[room] |= {used} | rooms[used]
     return rooms
@@ -46,10 +49,10 @@ def tracked():
     listed = subprocess.run(["git", "-C", source, "ls-files", "*.c", "*.h"], capture_output=True,
                             text=True, check=False).stdout.split()
     found = [os.path.relpath(os.path.join(folder, name), source)
-             for top in ("sh", "mesh", "precompute", "runtime")
+             for top in ("sh", "mesh", "precompute", "runtime", "program")
              for folder, _, names in os.walk(os.path.join(source, top))
              for name in names if name.endswith((".c", ".h"))]
-    files = [f for f in (listed or found) if f.split("/")[0] in ("sh", "mesh", "precompute", "runtime")]
+    files = [f for f in (listed or found) if f.split("/")[0] in ("sh", "mesh", "precompute", "runtime", "program")]
     return [f for f in files if os.path.exists(os.path.join(source, f))]
 
 
@@ -64,7 +67,7 @@ def included(file):
 
 def check_includes(rooms, files):
     for room in sorted({os.path.dirname(f) for f in files} - set(rooms)):
-        faults.append(f"README's table lacks the room {room}")
+        faults.append(f"ARCHITECTURE.md's table lacks the room {room}")
     for file in files:
         room = os.path.dirname(file)
         for used, name in included(file):
@@ -74,13 +77,13 @@ def check_includes(rooms, files):
 
 def check_systems(files):
     """The library asks an operating system in one room alone."""
-    library = PUBLIC + ("runtime", "runtime/words", "runtime/safetensors", "runtime/kernels", "runtime/compare")
+    library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
-        if os.path.dirname(file) in library:
+        if os.path.dirname(file) in library and os.path.basename(file) not in ("posix.c", "windows.c"):
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
                                        text.read(), re.M):
-                    faults.append(f"{file} includes {name}, which runtime/platform is for")
+                    faults.append(f"{file} includes {name}, which posix.c and windows.c are for")
 
 
 def check_files_apart(files):
@@ -106,13 +109,13 @@ def check_names(rooms):
             room = (match[1] + match[2]).replace("//", "/")
             if not name.endswith(".c.o") or not os.path.exists(os.path.join(source, room, name[:-2])):
                 continue
-            prefix = PREFIX.get(room, f"supine_{os.path.basename(room)}_")
+            prefix = PREFIX.get(room, (f"supine_{os.path.basename(room)}_",))
             listed = subprocess.run(["nm", "--defined-only", "--extern-only", os.path.join(folder, name)],
                                     capture_output=True, text=True, check=True).stdout
             checked += 1
             for symbol in re.findall(r" [A-Z] (\w+)$", listed, re.M):
-                if not symbol.startswith((prefix, "__")) and symbol != prefix[:-1]:
-                    faults.append(f"{room}/{name[:-2]} defines {symbol}, which does not begin {prefix}")
+                if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
+                    faults.append(f"{room}/{name[:-2]} defines {symbol}, which does not begin {' or '.join(prefix)}")
     if checked < len(rooms):
         faults.append(f"only {checked} objects in {build}")
 

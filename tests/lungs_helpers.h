@@ -13,7 +13,7 @@
 #include "mesh/mesh.h"
 #include "precompute/lungs/lungs.h"
 
-#include "precompute/phantom/geodesic.h"
+#include "precompute/lungs/geodesic.h"
 #include "sh_helpers.h"
 
 /* Irregular numbers in [0, 1). */

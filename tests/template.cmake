@@ -6,6 +6,6 @@ add_test(NAME template_unknown_name COMMAND ${CMAKE_COMMAND}
   -D FILES=${CMAKE_CURRENT_SOURCE_DIR}/golden/unknown_name.html
   -D SOURCES=${CMAKE_CURRENT_SOURCE_DIR}/test_template.c -D ARRAY=assets
   -D OUTPUT=${CMAKE_CURRENT_BINARY_DIR}/unknown_name.c
-  -P ${PROJECT_SOURCE_DIR}/runtime/template/embed.cmake)
+  -P ${PROJECT_SOURCE_DIR}/program/template/embed.cmake)
 set_tests_properties(template_unknown_name PROPERTIES PASS_REGULAR_EXPRESSION
   "nothing fills {{untold}}")

@@ -19,14 +19,14 @@
 #include <cmocka.h>
 
 #include "mesh/mesh.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include <supine/safetensors.h>
 
 #include "lungs_helpers.h"
-#include "runtime/breath/breath_course.h"
-#include "runtime/options/command.h"
+#include "program/breath/breath_course.h"
+#include "program/options/command.h"
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64], series_folder[64], open_basis[64];

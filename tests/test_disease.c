@@ -13,7 +13,7 @@
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/precompute.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 #include <supine/volume.h>
 
 #include "lungs_helpers.h"

@@ -14,7 +14,7 @@
 
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "precompute/tissue/expandability.h"
+#include "precompute/lungs/expandability.h"
 
 #include "lungs_helpers.h"
 

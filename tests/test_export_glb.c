@@ -16,7 +16,7 @@
 #include <targets.h>
 
 #include "export_helpers.h"
-#include "runtime/export/targets.h"
+#include "program/export/targets.h"
 #include "sh/base/vec3.h"
 
 enum { MODES = 11, BAND = 4, VERTICES = 40 };

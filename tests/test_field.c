@@ -5,7 +5,7 @@
 
 #include "precompute/inside/embed.h"
 #include "precompute/inside/grid.h"
-#include "runtime/field/field.h"
+#include "program/field/field.h"
 #include "sh/base/vec3.h"
 
 static char folder[] = "/tmp/supine-field-XXXXXX";

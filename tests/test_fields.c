@@ -12,14 +12,14 @@
 #include <cmocka.h>
 
 #include "precompute/fields/fields.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "sh/grid.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer/safetensors_write.h"
+#include "runtime/safetensors/safetensors_write.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

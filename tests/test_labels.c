@@ -12,7 +12,7 @@
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/surface.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 
 #include "labels_helpers.h"
 #include "sh_helpers.h"

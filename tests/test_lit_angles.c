@@ -14,7 +14,7 @@
 
 #include <supine/runtime.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 
 #include "lungs_helpers.h"

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 

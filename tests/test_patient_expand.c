@@ -18,9 +18,9 @@
 
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 
 #include "lungs_helpers.h"
 

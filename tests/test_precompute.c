@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "precompute/projection/compression.h"

@@ -12,8 +12,8 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include "precompute/accuracy/tally.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/projection/tally.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "sh/grid.h"

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 #include <gsl/gsl_errno.h>
 
-#include "runtime/breath/pv.h"
+#include "program/breath/pv.h"
 
 #define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
 

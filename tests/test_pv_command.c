@@ -13,9 +13,9 @@
 #include <cmocka.h>
 #include <gsl/gsl_errno.h>
 
-#include "runtime/breath/pv.h"
+#include "program/breath/pv.h"
 
-#include "runtime/options/command.h"
+#include "program/options/command.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
 static char good[64], bad[64], out[64], printed[64];

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 #include <gsl/gsl_errno.h>
 
-#include "runtime/breath/pv.h"
+#include "program/breath/pv.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
 static char path[64];

@@ -13,7 +13,7 @@
 
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

@@ -16,7 +16,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 

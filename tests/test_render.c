@@ -13,7 +13,7 @@
 
 #include <supine/compare.h>
 
-#include "runtime/render/render.h"
+#include "program/render/render.h"
 #include "runtime_fixture.h"
 
 static void test_view_axes_are_right_handed_and_orthonormal(void **state) {

@@ -13,7 +13,7 @@
 
 #include <supine/safetensors.h>
 
-#include "precompute/writer/safetensors_write.h"
+#include "runtime/safetensors/safetensors_write.h"
 #include "runtime/safetensors/checksum.h"
 
 #include "runtime_fixture.h"

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "runtime/template/template.h"
+#include "program/template/template.h"
 
 static void write_large(const void *context, const char *name, FILE *file) {
   (void)fprintf(file, "[%s %s]", (const char *)context, name);

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 
 enum { VERTICES = 9000 }; /* several blocks of every sum, the last of them short */

@@ -14,10 +14,10 @@
 #include <cmocka.h>
 
 #include "mesh/mesh.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include <supine/runtime.h>
 
-#include "runtime/options/command.h"
+#include "program/options/command.h"
 
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
 static char lungs[64], csv[64], out[64], other[64], printed[64];

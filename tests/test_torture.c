@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 
 #include "lungs_helpers.h"

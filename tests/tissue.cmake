@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(disease supine_precompute supine_phantom supine_mesh_read supine_gsl)
-supine_test(expandability supine_precompute supine_phantom supine_mesh_read supine_gsl)
+supine_test(disease supine_precompute supine_lungs supine_mesh_io supine_gsl)
+supine_test(expandability supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(tissue_command supine_commands supine_gsl)
 supine_test(breathe supine_commands supine_gsl)
-supine_test(reach supine_precompute supine_phantom supine_mesh_read supine_gsl)
-supine_test(validation_network supine_precompute supine_phantom supine_mesh_read supine_gsl)
-supine_test(validation_lungs supine_precompute supine_phantom supine_mesh_read supine_gsl)
+supine_test(reach supine_precompute supine_lungs supine_mesh_io supine_gsl)
+supine_test(validation_network supine_precompute supine_lungs supine_mesh_io supine_gsl)
+supine_test(validation_lungs supine_precompute supine_lungs supine_mesh_io supine_gsl)
 
 # A series as VTK reads it, where Debian's python has VTK.
 add_test(NAME series_vtk COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_series_vtk.py

@@ -15,7 +15,7 @@
 
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 #include <supine/volume.h>
 
 /* Masses and the links between them; no surface need be there. */

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* The two formats, for the files of this folder; no other folder sees it. */
 #ifndef SUPINE_IMAGE_FORMATS_H
 #define SUPINE_IMAGE_FORMATS_H

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Images: which format, what is checked of both, voxels as numbers. */
 #include <errno.h>
 #include <math.h>

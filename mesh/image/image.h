@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * Images and label maps in three dimensions: NRRD and NIfTI, read and written, in millimetres and
  * LPS whatever axes the file is in. */

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* NIfTI, read through libnifti2, written as NIfTI-1. */
 #include <math.h>
 #include <stdint.h>

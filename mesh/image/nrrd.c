@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* NRRD, through teem. */
 #include <stdlib.h>
 #include <string.h>

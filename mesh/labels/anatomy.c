@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Does the header's orientation agree with what lungs look like? */
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Whose a label is: by the convention of the segmenter, or by where it lies. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* The labels of an image, and how many voxels have each. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* A mask averaged over cubes, in steps along its own axes, and made so that no two cubes of the
  * inside, or of the outside, meet in an edge or a corner alone: then its surface is a manifold
  * [Latecki1995]. */

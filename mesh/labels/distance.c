@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Distances from every voxel to a set of voxels, exact: along the first axis by counting, along the
  * others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
  * [Felzenszwalb2012]. */

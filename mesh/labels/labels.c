@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* The whole way from a label map to surfaces. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * From a label map, as segmenters write them, to the closed surface of each lung. */
 #ifndef SUPINE_LABELS_H

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* What the files of this folder share; no other folder sees it. */
 #ifndef SUPINE_LABELS_MASK_H
 #define SUPINE_LABELS_MASK_H

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Surface nets: a vertex in each cell that the surface runs through, a quadrilateral across each
  * edge between an inner and an outer cube [Gibson1998]. */
 #include <math.h>

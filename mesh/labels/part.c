@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Two lungs in one mask. Where they touch, the mask is worn down until it falls into two pieces
  * beside each other; each voxel then belongs to the nearer piece. */
 #include <math.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Pieces of voxels that share faces, by runs along the rows: islands and cavities. */
 #include <stdlib.h>
 

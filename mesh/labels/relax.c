@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Smooths a surface net by turns of shrinking and swelling, which leave long waves as they are
  * [Taubin1995]. */
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * The labels of a map, each as a surface of its own: nodules, airways, lobes. */
 #ifndef SUPINE_LABELS_SHAPES_H

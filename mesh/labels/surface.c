@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* The surface of a mask. */
 #include <math.h>
 #include <stdlib.h>

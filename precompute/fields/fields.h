@@ -11,7 +11,7 @@
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
-#include "precompute/accuracy/accuracy.h"
+#include "precompute/projection/accuracy.h"
 #include "precompute/lungs/lungs.h"
 
 #ifdef __cplusplus

@@ -12,7 +12,7 @@
 #include "sh/transform.h"
 #include <supine/sh.h>
 
-#include "precompute/accuracy/tally.h"
+#include "precompute/projection/tally.h"
 #include "precompute/projection/compression.h"
 
 /* Directions determine a band while the harmonics there are no closer to dependent than this, and

@@ -7,7 +7,7 @@
 
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 
 void supine_physics_solution_free(supine_solution *solution) {
   free(solution->catch_);

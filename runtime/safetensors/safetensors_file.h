@@ -4,7 +4,7 @@
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 
-#include "runtime/platform/platform.h"
+#include "runtime/safetensors/platform.h"
 #include "runtime/safetensors/dtype.h"
 
 /** A tensor and where the header says that it lies. */

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * A clock for measuring how long things take. */
 #ifndef SUPINE_CLOCK_H

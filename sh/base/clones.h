@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * Versions of a function for wider vector units, chosen when the program is loaded. */
 #ifndef SUPINE_CLONES_H

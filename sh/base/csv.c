@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* A strict reader of small CSV files whose errors name the line. */
 #include <ctype.h>
 #include <errno.h>

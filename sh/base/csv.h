@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Small CSV files: lists of fields, samples, parameters. */
 #ifndef SUPINE_CSV_H
 #define SUPINE_CSV_H

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Denormal numbers: the tail of a unit force's response fades into them, and they are slow. */
 #include "sh/base/denormals.h"
 

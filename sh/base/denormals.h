@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * Denormal numbers as zero, for the calling thread. */
 #ifndef SUPINE_DENORMALS_H

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /* Splitting a range of independent work over POSIX threads. */
 #include <pthread.h>
 #include <sched.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: MIT */
 /** @file
  * Splitting a range of independent work over threads. */
 #ifndef SUPINE_PARALLEL_H

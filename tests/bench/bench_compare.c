@@ -8,7 +8,7 @@
 
 #include "sh/base/clock.h"
 
-#include "runtime/report/comparison.h"
+#include "program/report/comparison.h"
 
 enum { REPEATS = 5, PAIRS = 10000, PASSES = 20, DIRECTIONS = 200 };
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 
 #include "../labels_helpers.h"
 #include "program.h"

@@ -13,9 +13,9 @@
 #include <gsl/gsl_rng.h>
 
 #include "precompute/patient/surfaces.h"
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
-#include "precompute/tissue/disease.h"
+#include "precompute/lungs/disease.h"
 #include "sh/base/clock.h"
 
 enum { LANDMARKS = 300, REPEATS = 3, SEEDS = 20, VERTICES = 20001, FINE = 40000 };

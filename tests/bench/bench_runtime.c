@@ -14,9 +14,9 @@
 
 #include <cblas.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
-#include "runtime/bench/bench.h"
+#include "program/bench/bench.h"
 
 #include "full_solve.h"
 

@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/physics/equilibrium.h"
 #include "precompute/precompute.h"
 #include "precompute/projection/sampler.h"

@@ -23,8 +23,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "runtime/stream/crc64.h"
-#include "runtime/stream/message.h"
+#include "program/stream/crc64.h"
+#include "program/stream/message.h"
 #include "sh/base/clock.h"
 
 static const double interval = 1.0 / 66.66; /* s */

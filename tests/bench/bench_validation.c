@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 
 #include "tests/postures.h"
 #include "tests/validation.h"

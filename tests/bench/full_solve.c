@@ -2,7 +2,7 @@
 /* What a frame costs without a basis. */
 #include <stdlib.h>
 
-#include "precompute/phantom/phantom.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 
 #include "full_solve.h"

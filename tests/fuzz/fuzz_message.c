@@ -7,9 +7,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "runtime/stream/crc64.h"
-#include "runtime/stream/message.h"
-#include "runtime/stream/poses.h"
+#include "program/stream/crc64.h"
+#include "program/stream/message.h"
+#include "program/stream/poses.h"
 
 #include "fuzz.h"
 

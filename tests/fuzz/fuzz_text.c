@@ -7,8 +7,8 @@
 #include <unistd.h>
 
 #include "precompute/physics/force.h"
-#include "precompute/tissue/expandability.h"
-#include "runtime/breath/pv.h"
+#include "precompute/lungs/expandability.h"
+#include "program/breath/pv.h"
 
 #include "fuzz.h"
 

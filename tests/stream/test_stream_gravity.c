@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "runtime/stream/gravity.h"
+#include "program/stream/gravity.h"
 #include <supine/posture.h>
 
 /* A few roundings of 32-bit numbers. */

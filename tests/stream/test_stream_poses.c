@@ -11,10 +11,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "precompute/writer/safetensors_write.h"
-#include "runtime/stream/latency.h"
-#include "runtime/stream/poses.h"
-#include "runtime/stream/volume.h"
+#include "runtime/safetensors/safetensors_write.h"
+#include "program/stream/latency.h"
+#include "program/stream/poses.h"
+#include "program/stream/volume.h"
 #include "tests/runtime_fixture.h"
 
 static char *folder;

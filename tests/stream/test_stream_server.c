@@ -19,11 +19,11 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "runtime/stream/address.h"
-#include "runtime/stream/crc64.h"
-#include "runtime/stream/peer.h"
-#include "runtime/stream/server.h"
-#include "runtime/stream/strips.h"
+#include "program/stream/address.h"
+#include "program/stream/crc64.h"
+#include "program/stream/peer.h"
+#include "program/stream/server.h"
+#include "program/stream/strips.h"
 #include "sh/base/clock.h"
 #include "tests/runtime_fixture.h"
 

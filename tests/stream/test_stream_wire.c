@@ -19,9 +19,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/stream/crc64.h"
-#include "runtime/stream/frame.h"
-#include "runtime/stream/strips.h"
+#include "program/stream/crc64.h"
+#include "program/stream/frame.h"
+#include "program/stream/strips.h"
 #include "tests/runtime_fixture.h"
 
 static void fill(unsigned char *bytes, size_t size, uint64_t seed) {

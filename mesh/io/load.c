@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: MIT */
+/* From a file to a welded surface in millimetres, LPS. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "mesh/io/read.h"
+
+static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                  supine_error *error) {
+  switch (file->format) {
+  case MESH_FORMAT_PLY:
+    return supine_mesh_read_ply(file, mesh, dropped, error);
+  case MESH_FORMAT_STL:
+    return supine_mesh_read_stl(file, mesh, error);
+  case MESH_FORMAT_OFF:
+    return supine_mesh_read_off(file, mesh, dropped, error);
+  case MESH_FORMAT_OBJ:
+    if (supine_mesh_guard_obj(file, error) != SUPINE_OK) {
+      return SUPINE_ERROR_FORMAT;
+    }
+    break;
+  case MESH_FORMAT_OTHER:
+    break;
+  }
+  return supine_mesh_import(file, mesh, dropped, error);
+}
+
+static supine_status choose_axes(const mesh_file *file, supine_axes asked,
+                                 supine_mesh_report *report, supine_error *error) {
+  const mesh_space tag = file->space;
+  if (asked != SUPINE_AXES_AUTO) {
+    report->axes = asked;
+    return SUPINE_OK;
+  }
+  if (tag == MESH_SPACE_FOREIGN) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: its SPACE tag names axes that are neither LPS nor RAS; say which "
+                            "of the two to assume",
+                            file->path);
+  }
+  report->axes = tag == MESH_SPACE_RAS ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
+  report->axes_from_tag = tag != MESH_SPACE_NONE;
+  report->comment_names_ras = tag == MESH_SPACE_NONE && file->mentions_ras;
+  return SUPINE_OK;
+}
+
+/* To millimetres, LPS. RAS has -x and -y: a half turn, so that triangles keep their sense. */
+static supine_status convert(const char *path, double scale, bool ras, supine_mesh *mesh,
+                             supine_error *error) {
+  const double factor[3] = {ras ? -scale : scale, ras ? -scale : scale, scale};
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    double *vertex = mesh->vertices + 3 * i;
+    for (int axis = 0; axis < 3; ++axis) {
+      vertex[axis] = vertex[axis] * factor[axis] + 0.0; /* + 0: no -0, for the weld */
+    }
+    if (!isfinite(vertex[0]) || !isfinite(vertex[1]) || !isfinite(vertex[2])) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: vertex %zu of %zu has a coordinate that is not finite; repair "
+                              "the mesh",
+                              path, i, mesh->vertex_count);
+    }
+  }
+  return SUPINE_OK;
+}
+
+static double longest_side(const supine_mesh *mesh) {
+  double minimum[3];
+  double maximum[3];
+  supine_mesh_box(mesh, minimum, maximum);
+  double side = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    side = fmax(side, maximum[axis] - minimum[axis]);
+  }
+  return side;
+}
+
+supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
+                               supine_mesh *mesh, supine_mesh_report *report, supine_error *error) {
+  const supine_mesh_load_options chosen =
+      options == NULL ? (supine_mesh_load_options){0} : *options;
+  const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
+  if (!(scale > 0.0) || !isfinite(scale)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: %g mm per unit is not a positive number", path, scale);
+  }
+  supine_mesh loaded = {0};
+  supine_mesh_report found = {0};
+  mesh_file file;
+  supine_status status = supine_mesh_file_read(path, &file, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if ((status = read_surface(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
+      (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
+      (status = convert(path, scale, found.axes == SUPINE_AXES_RAS, &loaded, error)) != SUPINE_OK) {
+    goto cleanup;
+  }
+  found.file_vertices = loaded.vertex_count;
+  found.file_faces = loaded.triangle_count + found.degenerate_faces;
+  status = supine_mesh_weld(&loaded, &found);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "%s: out of memory", path);
+    goto cleanup;
+  }
+  if (loaded.triangle_count == 0) {
+    status = supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: no triangles (%zu vertices, %zu faces in the file); give a "
+                              "surface, not points or lines",
+                              path, found.file_vertices, found.file_faces);
+    goto cleanup;
+  }
+  found.odd_side = supine_mesh_unit_check(longest_side(&loaded), scale, &found.likely_unit);
+  *mesh = loaded;
+  loaded = (supine_mesh){0};
+  if (report != NULL) {
+    *report = found;
+  }
+
+cleanup:
+  supine_mesh_free(&loaded);
+  supine_mesh_file_free(&file);
+  return status;
+}

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: MIT */
+/* PLY: vertices, faces and strips of triangles out of a body that may not hold what its header
+ * promises. */
+#include <stdlib.h>
+
+#include "mesh/io/ply.h"
+
+/* Where reading stands, and where what is read goes. */
+typedef struct ply_reader {
+  const mesh_file *file;
+  ply_header header;
+  mesh_text text; /* what is left; in ASCII, `line` what is left of the item's line */
+  mesh_text line;
+  size_t width; /* columns of `rows`: x, y, z, perhaps the value */
+  size_t row_count;
+  double *rows; /* [row_count, width] */
+  mesh_faces faces;
+  supine_error *error;
+} ply_reader;
+
+/* A number of this type, least significant byte first. */
+static double decode(const unsigned char bytes[8], const ply_type *type) {
+  union {
+    uint64_t bits;
+    double real;
+  } as64 = {0};
+  for (unsigned k = type->size; k-- > 0;) {
+    as64.bits = as64.bits << 8 | bytes[k];
+  }
+  if (type->is_real && type->size == 8) {
+    return as64.real;
+  }
+  const union {
+    uint32_t bits;
+    float real;
+  } as32 = {(uint32_t)as64.bits};
+  if (type->is_real) {
+    return (double)as32.real;
+  }
+  const uint64_t sign = UINT64_C(1) << (8 * type->size - 1);
+  return type->is_signed && (as64.bits & sign) != 0 ? (double)as64.bits - 2.0 * (double)sign
+                                                    : (double)as64.bits;
+}
+
+static bool take_binary(ply_reader *in, const ply_type *type, double *value) {
+  if ((size_t)(in->text.end - in->text.at) < type->size) {
+    return false;
+  }
+  unsigned char bytes[8];
+  for (unsigned k = 0; k < type->size; ++k) {
+    bytes[k] = in->text.at[in->header.encoding == PLY_LITTLE ? k : type->size - 1 - k];
+  }
+  in->text.at += type->size;
+  *value = decode(bytes, type);
+  return true;
+}
+
+static bool take_ascii(ply_reader *in, const ply_type *type, double *value) {
+  mesh_text word = in->line;
+  uint64_t count = 0;
+  if (type->is_real) {
+    return supine_mesh_text_number(&in->line, value);
+  }
+  if (!supine_mesh_text_word(&in->line, &word)) {
+    return false;
+  }
+  const bool negative = type->is_signed && *word.at == '-';
+  word.at += negative;
+  const bool good = supine_mesh_text_count(word, &count);
+  *value = negative ? -(double)count : (double)count;
+  return good;
+}
+
+static bool take(ply_reader *in, const ply_type *type, double *value) {
+  return in->header.encoding == PLY_ASCII ? take_ascii(in, type, value)
+                                          : take_binary(in, type, value);
+}
+
+/* Two corners of a strip, and how many triangles it has by now. */
+typedef struct strip {
+  double corner[2];
+  size_t length;
+} strip;
+
+/* (a, b, c, d): triangles abc, cbd, ...; -1 begins anew. */
+static supine_status take_strip_corner(ply_reader *in, strip *so_far, double value) {
+  if (value == -1.0) {
+    so_far->length = 0;
+    return SUPINE_OK;
+  }
+  supine_status status = SUPINE_OK;
+  if (so_far->length >= 2) {
+    const size_t odd = so_far->length % 2;
+    const double corners[3] = {so_far->corner[odd], so_far->corner[1 - odd], value};
+    status = supine_mesh_faces_add(&in->faces, corners, 3, in->error);
+  }
+  so_far->corner[0] = so_far->corner[1];
+  so_far->corner[1] = value;
+  ++so_far->length;
+  return status;
+}
+
+static supine_status cut_short(const ply_reader *in, const ply_element *element, uint64_t item) {
+  static const char *const names[] = {"vertex", "face", "tristrips", "item"};
+  return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                          "%s: truncated or malformed at %s %llu of the %llu that the PLY header "
+                          "promises",
+                          in->file->path, names[element->kind], (unsigned long long)item,
+                          (unsigned long long)element->count);
+}
+
+static supine_status take_list(ply_reader *in, const ply_element *element, uint64_t item,
+                               const ply_property *property) {
+  double corners[MESH_CORNERS_MAX];
+  strip so_far = {.length = 0};
+  double length = 0.0;
+  if (!take(in, property->count, &length)) {
+    return cut_short(in, element, item);
+  }
+  if (length < 0.0) {
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: a list of %.0f numbers",
+                            in->file->path, length);
+  }
+  const uint64_t count = (uint64_t)length; /* below 2^63, and the file ends sooner */
+  const bool corner = property->role == PLY_CORNERS;
+  for (uint64_t k = 0; k < count; ++k) {
+    double value = 0.0;
+    if (!take(in, property->type, &value)) {
+      return cut_short(in, element, item);
+    }
+    if (corner && element->kind == PLY_STRIPS) {
+      const supine_status status = take_strip_corner(in, &so_far, value);
+      if (status != SUPINE_OK) {
+        return status;
+      }
+    } else if (k < MESH_CORNERS_MAX) {
+      corners[k] = value;
+    }
+  }
+  return corner && element->kind == PLY_FACES
+             ? supine_mesh_faces_add(&in->faces, corners, (size_t)count, in->error)
+             : SUPINE_OK;
+}
+
+static supine_status take_item(ply_reader *in, const ply_element *element, uint64_t item) {
+  if (in->header.encoding == PLY_ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
+    return cut_short(in, element, item); /* an item is a line */
+  }
+  for (size_t p = 0; p < element->property_count; ++p) {
+    const ply_property *property = &in->header.properties[element->first_property + p];
+    double value = 0.0;
+    if (property->count != NULL) {
+      const supine_status status = take_list(in, element, item, property);
+      if (status != SUPINE_OK) {
+        return status;
+      }
+    } else if (!take(in, property->type, &value)) {
+      return cut_short(in, element, item);
+    } else if (element->kind == PLY_VERTICES && property->role < in->width) {
+      in->rows[item * in->width + property->role] =
+          property->role == PLY_VALUE ? value : (double)(float)value;
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status take_items(ply_reader *in, const ply_element *element) {
+  supine_status status = SUPINE_OK;
+  for (uint64_t i = 0; status == SUPINE_OK && i < element->count; ++i) {
+    status = take_item(in, element, i);
+  }
+  return status;
+}
+
+/* Room for the rows that the header promises, or for those that can be there. */
+static supine_status take_vertices(ply_reader *in, const ply_element *element) {
+  uint64_t least = 0; /* bytes of an item */
+  for (size_t p = 0; p < element->property_count; ++p) {
+    const ply_property *property = &in->header.properties[element->first_property + p];
+    least += in->header.encoding == PLY_ASCII ? 2 /* a digit, a blank */
+             : property->count != NULL        ? property->count->size
+                                              : property->type->size;
+  }
+  const uint64_t room = (uint64_t)(in->text.end - in->text.at) / least + 1;
+  const uint64_t count = element->count < room ? element->count : room;
+  if (count > MESH_VERTICES_MAX) {
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: more than %d vertices",
+                            in->file->path, MESH_VERTICES_MAX);
+  }
+  in->row_count = (size_t)count;
+  in->rows = malloc((size_t)count * in->width * sizeof *in->rows);
+  return in->rows == NULL
+             ? supine_error_set(in->error, SUPINE_ERROR_MEMORY, "%s: out of memory", in->file->path)
+             : take_items(in, element);
+}
+
+/* The vertices first, wherever they stand, as faces are checked and cut by them. Leaves the reader
+ * behind them. */
+static supine_status read_vertices(ply_reader *in) {
+  supine_status status = SUPINE_OK;
+  for (size_t e = 0; status == SUPINE_OK; ++e) {
+    ply_element element = in->header.elements[e];
+    if (element.kind == PLY_VERTICES) {
+      return take_vertices(in, &element);
+    }
+    element.kind = PLY_OTHER;
+    status = take_items(in, &element);
+  }
+  return status;
+}
+
+static supine_status read_faces(ply_reader *in, const unsigned char *after_vertices) {
+  supine_status status = SUPINE_OK;
+  for (size_t e = 0; status == SUPINE_OK && e < in->header.element_count; ++e) {
+    const ply_element *element = &in->header.elements[e];
+    if (element->kind == PLY_VERTICES) {
+      in->text.at = after_vertices;
+    } else {
+      status = take_items(in, element);
+    }
+  }
+  return status;
+}
+
+static supine_status begin(const mesh_file *file, const char *value, ply_reader *in,
+                           supine_error *error) {
+  *in = (ply_reader){.file = file, .width = value == NULL ? 3 : 4, .error = error};
+  const supine_status status = supine_mesh_ply_header_read(file, value, &in->header, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  in->text = (mesh_text){file->bytes + in->header.size, file->bytes + file->size};
+  for (size_t e = 0; e < in->header.element_count; ++e) {
+    if (in->header.elements[e].property_count == 0) { /* no bytes, whatever the count */
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: element %zu of the PLY header has no property", file->path,
+                              e + 1);
+    }
+  }
+  return in->header.encoding == PLY_ASCII && !supine_mesh_guard_text(file, error)
+             ? SUPINE_ERROR_FORMAT
+             : SUPINE_OK;
+}
+
+static bool holds(const ply_header *header, ply_role role) {
+  return (header->present >> role & 1U) != 0;
+}
+
+static bool holds_positions(const ply_header *header) {
+  return holds(header, PLY_X) && holds(header, PLY_Y) && holds(header, PLY_Z);
+}
+
+supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
+  ply_reader in;
+  supine_status status = begin(file, NULL, &in, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_mesh_space_note(file, in.header.size);
+  if (!holds_positions(&in.header) || !holds(&in.header, PLY_CORNERS)) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: no triangles: the PLY header has no faces with vertex_indices, or "
+                            "no vertices with x, y and z",
+                            file->path);
+  }
+  const unsigned char *body = in.text.at;
+  in.faces = (mesh_faces){.path = file->path, .mesh = mesh};
+  status = read_vertices(&in);
+  mesh->vertices = in.rows;
+  mesh->vertex_count = in.row_count;
+  if (status == SUPINE_OK) {
+    const unsigned char *after_vertices = in.text.at;
+    in.text.at = body;
+    status = read_faces(&in, after_vertices);
+  }
+  *dropped = in.faces.dropped;
+  return status;
+}
+
+supine_status supine_mesh_load_property(const char *path, const char *property, double **rows,
+                                        size_t *count, supine_error *error) {
+  ply_reader in = {.rows = NULL};
+  mesh_file file;
+  supine_status status = supine_mesh_file_read(path, &file, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  status = begin(&file, property, &in, error);
+  if (status == SUPINE_OK && !(holds_positions(&in.header) && holds(&in.header, PLY_VALUE))) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: its vertices have no property '%.60s', or lack x, y or z", path,
+                              property);
+  }
+  if (status == SUPINE_OK) {
+    status = read_vertices(&in);
+  }
+  supine_mesh_file_free(&file);
+  if (status == SUPINE_OK) {
+    *rows = in.rows;
+    *count = in.row_count;
+  } else {
+    free(in.rows);
+  }
+  return status;
+}

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/* Writing surfaces, one function a format. */
+#ifndef SUPINE_MESH_SAVE_H
+#define SUPINE_MESH_SAVE_H
+
+#include <stdio.h>
+
+#include "mesh/mesh.h"
+
+/** What the writers get: the mesh and how to write it. */
+typedef struct mesh_writer {
+  FILE *out;
+  const supine_mesh *mesh;
+  const double *rest;        /**< NULL: no displacement */
+  const float *normals;      /**< NULL: none */
+  const unsigned char *lung; /**< NULL: none */
+  const supine_mesh_field *fields;
+  size_t field_count;
+  double factor[3];  /**< of x, y, z: the sign of the file's axes over its unit */
+  double quantum;    /**< of lengths in the file's units, a power of two; 0: exact */
+  const char *space; /**< "LPS" or "RAS" */
+  char comment[256]; /**< one printable line, "" where there is none */
+} mesh_writer;
+
+/** Vertex i in the file's axes and units. */
+void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
+/** Displacement of vertex i in the file's axes and units, and its length. */
+void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
+
+/** Normal of vertex i in the file's axes. */
+void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]);
+
+/** Fills a writer, but for `out`, from what supine_mesh_save is given. */
+void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
+                              mesh_writer *writer);
+/** Whether a surface fits the formats; statuses as supine_mesh_save. */
+supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
+                                       supine_error *error);
+
+/** Little-endian bytes of `count` values; at grows. */
+void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
+void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
+
+/* Write errors stay in the stream, for the caller to find; VTP wants memory. */
+void supine_mesh_save_ply(const mesh_writer *writer);
+void supine_mesh_save_obj(const mesh_writer *writer);
+void supine_mesh_save_stl(const mesh_writer *writer);
+supine_status supine_mesh_save_vtp(const mesh_writer *writer);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* Binary little-endian PLY. */
+#include "mesh/io/save.h"
+
+void supine_mesh_save_ply(const mesh_writer *writer) {
+  const supine_mesh *mesh = writer->mesh;
+  (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s mm\n",
+                writer->space);
+  if (writer->comment[0] != '\0') {
+    (void)fprintf(writer->out, "comment %s\n", writer->comment);
+  }
+  (void)fprintf(writer->out,
+                "element vertex %zu\nproperty float x\nproperty float y\nproperty float z\n",
+                mesh->vertex_count);
+  if (writer->rest != NULL) {
+    (void)fputs("property float displacement_x\nproperty float displacement_y\n"
+                "property float displacement_z\nproperty float displacement_magnitude\n",
+                writer->out);
+  }
+  (void)fprintf(writer->out,
+                "element face %zu\nproperty list uchar int vertex_indices\nend_header\n",
+                mesh->triangle_count);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    float row[7];
+    supine_mesh_writer_position(writer, i, row);
+    if (writer->rest != NULL) {
+      supine_mesh_writer_displacement(writer, i, row + 3);
+    }
+    unsigned char bytes[sizeof row];
+    unsigned char *at = bytes;
+    supine_mesh_put_f32(&at, row, writer->rest != NULL ? 7 : 3);
+    (void)fwrite(bytes, 1, (size_t)(at - bytes), writer->out);
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    unsigned char bytes[13] = {3};
+    unsigned char *at = bytes + 1;
+    supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
+    (void)fwrite(bytes, 1, sizeof bytes, writer->out);
+  }
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: MIT */
+/* Binary STL. */
+#include <math.h>
+#include <string.h>
+
+#include "mesh/io/save.h"
+
+enum { HEADER = 80, FACET = 50 };
+
+/* Unit normal of the three corners, 0 where they are in line. */
+static void facet_normal(float corners[3][3], float normal[3]) {
+  double side[2][3];
+  for (int k = 0; k < 2; ++k) {
+    for (int axis = 0; axis < 3; ++axis) {
+      side[k][axis] = (double)corners[k + 1][axis] - (double)corners[0][axis];
+    }
+  }
+  double n[3];
+  double square = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    n[axis] = side[0][u] * side[1][v] - side[0][v] * side[1][u];
+    square += n[axis] * n[axis];
+  }
+  const double scale = square > 0.0 && isfinite(square) ? 1.0 / sqrt(square) : 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    normal[axis] = scale > 0.0 ? (float)(scale * n[axis]) : 0.0F;
+  }
+}
+
+void supine_mesh_save_stl(const mesh_writer *writer) {
+  const supine_mesh *mesh = writer->mesh;
+  /* The header must not begin with "solid", by which readers know STL text. */
+  char text[HEADER + 1 + sizeof writer->comment];
+  (void)snprintf(text, sizeof text, "SPACE=%s mm %s", writer->space, writer->comment);
+  unsigned char header[HEADER + 4] = {0};
+  memcpy(header, text, strnlen(text, HEADER));
+  unsigned char *at = header + HEADER;
+  const uint32_t count = (uint32_t)mesh->triangle_count;
+  supine_mesh_put_u32(&at, &count, 1);
+  (void)fwrite(header, 1, sizeof header, writer->out);
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    float corners[3][3];
+    float normal[3];
+    for (size_t k = 0; k < 3; ++k) {
+      supine_mesh_writer_position(writer, mesh->triangles[3 * t + k], corners[k]);
+    }
+    facet_normal(corners, normal);
+    unsigned char bytes[FACET] = {0};
+    at = bytes;
+    supine_mesh_put_f32(&at, normal, 3);
+    for (size_t k = 0; k < 3; ++k) {
+      supine_mesh_put_f32(&at, corners[k], 3);
+    }
+    (void)fwrite(bytes, 1, sizeof bytes, writer->out);
+  }
+}

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: MIT */
+/* Joining vertices at the same position, in linear time, by a hash of the position's bits. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/io/read.h"
+
+static const uint32_t free_slot = UINT32_MAX;
+
+static uint64_t hash_position(const double position[3]) {
+  uint64_t bits[3];
+  memcpy(bits, position, sizeof bits);
+  uint64_t hash = 0;
+  for (int k = 0; k < 3; ++k) { /* odd multipliers; the high bits go down each time */
+    hash = (hash ^ bits[k]) * UINT64_C(0x9E3779B97F4A7C15);
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+static bool same_position(const double a[3], const double b[3]) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* Moves the vertices that are first at their position to the front; remap: old to new index. */
+static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t slot_count) {
+  const size_t mask = slot_count - 1;
+  double *vertices = mesh->vertices;
+  size_t kept = 0;
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    const double *position = vertices + 3 * i;
+    size_t slot = hash_position(position) & mask;
+    while (slots[slot] != free_slot &&
+           !same_position(vertices + 3 * (size_t)slots[slot], position)) {
+      slot = (slot + 1) & mask;
+    }
+    if (slots[slot] == free_slot) {
+      slots[slot] = (uint32_t)kept;
+      memmove(vertices + 3 * kept, position, 3 * sizeof *vertices);
+      ++kept;
+    }
+    remap[i] = slots[slot];
+  }
+  return kept;
+}
+
+static size_t drop_degenerate(supine_mesh *mesh, const uint32_t *remap) {
+  size_t kept = 0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t a = remap[mesh->triangles[3 * t]];
+    const uint32_t b = remap[mesh->triangles[3 * t + 1]];
+    const uint32_t c = remap[mesh->triangles[3 * t + 2]];
+    if (a != b && b != c && c != a) {
+      mesh->triangles[3 * kept] = a;
+      mesh->triangles[3 * kept + 1] = b;
+      mesh->triangles[3 * kept + 2] = c;
+      ++kept;
+    }
+  }
+  return kept;
+}
+
+static size_t drop_unreferenced(supine_mesh *mesh, uint32_t *remap) {
+  const size_t corners = 3 * mesh->triangle_count;
+  memset(remap, 0, mesh->vertex_count * sizeof *remap);
+  for (size_t c = 0; c < corners; ++c) {
+    remap[mesh->triangles[c]] = 1;
+  }
+  size_t kept = 0;
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    if (remap[i] != 0) {
+      memmove(mesh->vertices + 3 * kept, mesh->vertices + 3 * i, 3 * sizeof *mesh->vertices);
+      remap[i] = (uint32_t)kept;
+      ++kept;
+    }
+  }
+  if (kept < mesh->vertex_count) {
+    for (size_t c = 0; c < corners; ++c) {
+      mesh->triangles[c] = remap[mesh->triangles[c]];
+    }
+  }
+  return kept;
+}
+
+supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
+  size_t slot_count = 16;
+  while (slot_count < 2 * mesh->vertex_count) {
+    slot_count *= 2;
+  }
+  supine_status status = SUPINE_ERROR_MEMORY;
+  uint32_t *remap = malloc((mesh->vertex_count + 1) * sizeof *remap);
+  uint32_t *slots = malloc(slot_count * sizeof *slots);
+  if (remap == NULL || slots == NULL) {
+    goto cleanup;
+  }
+  memset(slots, 0xFF, slot_count * sizeof *slots);
+
+  size_t kept = join(mesh, remap, slots, slot_count);
+  report->welded_vertices += mesh->vertex_count - kept;
+  mesh->vertex_count = kept;
+  kept = drop_degenerate(mesh, remap);
+  report->degenerate_faces += mesh->triangle_count - kept;
+  mesh->triangle_count = kept;
+  kept = drop_unreferenced(mesh, remap);
+  report->unreferenced_vertices += mesh->vertex_count - kept;
+  mesh->vertex_count = kept;
+  status = SUPINE_OK;
+
+cleanup:
+  free(slots);
+  free(remap);
+  return status;
+}

@@ -1,0 +1,323 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The basis file: tensors and metadata of a compressed field. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/safetensors.h>
+#include <supine/sh.h>
+
+#include "precompute/normals/normals.h"
+#include "precompute/lungs/disease.h"
+#include "precompute/basis_file.h"
+#include "runtime/safetensors/safetensors_write.h"
+
+/* Metadata under construction. */
+typedef struct entries {
+  size_t count;
+  supine_metadata *metadata; /* [count], in room for a power of two; values are allocated */
+  bool failed;               /* out of memory */
+} entries;
+
+SUPINE_PRINTF(3, 4)
+static void add(entries *list, const char *key, const char *format, ...) {
+  char *text = NULL;
+  va_list arguments;
+  va_start(arguments, format);
+  const int length = vasprintf(&text, format, arguments);
+  va_end(arguments);
+  if (length < 0) {
+    list->failed = true;
+    return;
+  }
+  if ((list->count & (list->count - 1)) == 0) { /* 0 or a power of two: full */
+    const size_t room = list->count == 0 ? 1 : 2 * list->count;
+    supine_metadata *grown = realloc(list->metadata, room * sizeof *grown);
+    if (grown == NULL) {
+      free(text);
+      list->failed = true;
+      return;
+    }
+    list->metadata = grown;
+  }
+  list->metadata[list->count++] = (supine_metadata){key, text};
+}
+
+static void entries_free(entries *list) {
+  for (size_t i = 0; i < list->count; ++i) {
+    free((char *)list->metadata[i].value);
+  }
+  free(list->metadata);
+}
+
+static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at_rest) {
+  add(list, "error_directions", "%zu", accuracy->direction_count);
+  add(list, "error_rms_percent", "%.6g", 100.0 * accuracy->relative_rms);
+  add(list, "error_p95_percent", "%.6g", 100.0 * accuracy->relative_p95);
+  add(list, "error_max_percent", "%.6g", 100.0 * accuracy->relative_max);
+  if (accuracy->volume > 0.0) {
+    add(list, at_rest ? "error_rest_part" : "error_volume_ml", "%.6g", accuracy->volume);
+  }
+  if (accuracy->rms_mm > 0.0) {
+    add(list, "error_rms_mm", "%.6g", accuracy->rms_mm);
+    add(list, "error_p95_mm", "%.6g", accuracy->p95_mm);
+    add(list, "error_max_mm", "%.6g", accuracy->max_mm);
+  }
+}
+
+/* How much of the lungs lesions changed, and how far. */
+static void add_lesions(entries *list, size_t count, const double *factors) {
+  size_t changed = 0;
+  double low = 1.0;
+  double high = 1.0;
+  for (size_t i = 0; i < count; ++i) {
+    changed += factors[i] != 1.0;
+    low = fmin(low, factors[i]);
+    high = fmax(high, factors[i]);
+  }
+  add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
+}
+
+static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model) {
+  static const char *const models[] = {"box", "normal", "radial", "vectors"};
+  const supine_force_law *force = &model->force;
+  const double *c = model->direction.c;
+  add(list, "law", "%s", supine_physics_law_name(model->law));
+  add(list, "midline_mm", "%.9g", lungs->midline);
+  add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
+      force->gain, force->box[0], force->box[1], force->box[2], force->soften);
+  add(list, "direction", "%s", models[model->direction.model]);
+  if (model->direction.model == SUPINE_DIRECTION_BOX) {
+    add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
+        c[2], c[3], c[4], c[5]);
+  }
+  add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
+  if (model->lesions != NULL) {
+    add_lesions(list, lungs->mesh.vertex_count, model->lesions);
+  }
+  if (model->reach > 0.0) {
+    add(list, "reach_mm", "%.9g", model->reach);
+  }
+}
+
+/* Where volumes count from, and what was assumed of the scan. */
+static void add_reference(entries *list, const supine_reference *reference) {
+  static const char *const kinds[] = {"none", "full", "rest", "volume"};
+  const double *g = reference->scan.gravity;
+  const double *share = reference->resting.share;
+  add(list, "scanned", "%s", kinds[reference->scan.kind]);
+  if (reference->scan.kind > SUPINE_SCAN_FULL) {
+    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  }
+  add(list, "scan_volume_ml", "%.9g", reference->scan_volume);
+  add(list, "full_volume_ml", "%.9g", reference->full_volume);
+  add(list, "resting_shares", "left=%g,right=%g,supine=%g,prone=%g,inverted=%g,upright=%g",
+      share[0], share[1], share[2], share[3], share[4], share[5]);
+}
+
+static void add_fit(entries *list, const supine_fit_report *fit) {
+  add(list, "directions", "%s", fit->grid ? "grid" : "scattered");
+  add(list, "condition", "%.4g", fit->condition);
+  add(list, "band_determined", "%zu", fit->band_highest);
+  add(list, "scalar_loss_percent", "%.6g", 100.0 * fit->scalar_loss);
+  add(list, "error_method", "leave-one-out");
+}
+
+static void add_lungs(entries *list, const supine_lungs *lungs, const double share[2]) {
+  if (lungs->lung_count == 2) {
+    add(list, "lungs", "left,right");
+  } else {
+    add(list, "lungs", "%s", supine_lungs_name(lungs, 0));
+  }
+  if (lungs->topology.closed) {
+    char text[64];
+    int used = 0;
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      const supine_mesh part = {lungs->mesh.vertex_count, lungs->mesh.vertices,
+                                lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
+                                lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
+      used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
+                       1e-3 * share[lung] * supine_mesh_volume(&part));
+    }
+    add(list, "reference_volume_ml", "%s", text);
+  }
+  if (share[0] != 1.0 || share[1] != 1.0) {
+    if (lungs->lung_count == 2) {
+      add(list, "lung_share", "%.9g,%.9g", share[0], share[1]);
+    } else {
+      add(list, "lung_share", "%.9g", share[0]);
+    }
+  }
+}
+
+/* Doubles as floats. */
+static float *to_float(const double *values, size_t count) {
+  float *out = malloc(count * sizeof *out);
+  for (size_t i = 0; out != NULL && i < count; ++i) {
+    out[i] = (float)values[i];
+  }
+  return out;
+}
+
+/* Normals of the surface as the file will have it. */
+static supine_status find_normals(const supine_basis_content *content, const float *vertices,
+                                  const float *directions, supine_normals_modes *normals,
+                                  supine_error *error) {
+  const supine_compression *field = content->compression;
+  const supine_volume_forms *forms = content->forms;
+  const supine_normals_surface surface = {.vertex_count = content->lungs->mesh.vertex_count,
+                                          .triangle_count = content->lungs->mesh.triangle_count,
+                                          .lung_count = content->lungs->lung_count,
+                                          .mode_count = field->mode_count,
+                                          .band = field->band,
+                                          .lung_begin = content->lungs->lung_begin,
+                                          .vertices = vertices,
+                                          .triangles = content->lungs->mesh.triangles,
+                                          .directions = directions,
+                                          .coefficients = field->coefficients,
+                                          .modes = field->modes,
+                                          .linear = forms != NULL ? forms->linear : NULL,
+                                          .quadratic = forms != NULL ? forms->quadratic : NULL,
+                                          .cubic = forms != NULL ? forms->cubic : NULL,
+                                          .resting = content->resting};
+  return supine_normals_modes_create(&surface, normals, error);
+}
+
+static void add_normals(entries *list, const supine_normals_modes *normals, bool closed) {
+  if (normals->count > 0) {
+    add(list, closed ? "normals_range_ml" : "normals_range_mm", "%.0f..%.0f", normals->range[0],
+        normals->range[1]);
+    add(list, "normals_mean_degrees", "%.2g", normals->mean);
+    add(list, "normals_p999_degrees", "%.2g", normals->p999);
+  }
+}
+
+/* Over 60 lines: the format from its first tensor to its last, in the order of the file. */
+supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
+                                        supine_error *error) {
+  const supine_lungs *lungs = content->lungs;
+  const supine_compression *field = content->compression;
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t k = field->mode_count;
+  const size_t g = lungs->lung_count;
+  supine_status status = SUPINE_OK;
+  entries list = {0};
+  supine_normals_modes normals = {0};
+  const bool vector = content->directions == NULL;
+  static const double healthy[2] = {1.0, 1.0};
+  const double *share = content->model != NULL ? content->model->share : healthy;
+  float *vertices = NULL;
+  float *directions = NULL;
+  double *rest = malloc(3 * n * sizeof *rest);
+  unsigned char *lung = malloc(n);
+  if (rest != NULL) { /* the surface at rest, then its directions */
+    supine_tissue_rest(lungs, share, rest);
+    vertices = to_float(rest, 3 * n);
+  }
+  if (rest != NULL && !vector) {
+    memcpy(rest, content->directions, 3 * n * sizeof *rest);
+    supine_tissue_rest_directions(lungs, share, rest);
+    directions = to_float(rest, 3 * n);
+  }
+  if (vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
+                              path, n);
+    goto cleanup;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
+  }
+  add(&list, "format", "supine-basis");
+  add(&list, "version", "2");
+  add(&list, "kind", "%s", vector ? "vector" : "scalar");
+  add(&list, "band", "%zu", field->band);
+  add(&list, "modes", "%s", content->harmonics ? "harmonics" : "best");
+  add(&list, "mode_count", "%zu", k);
+  add(&list, "route", "%s", content->route);
+  add(&list, "units", "mm");
+  add(&list, "axes", "LPS");
+  add_lungs(&list, lungs, share);
+  if (content->model != NULL) {
+    add_model(&list, lungs, content->model);
+  }
+  if (content->reference != NULL) {
+    add_reference(&list, content->reference);
+  }
+  if (content->fit != NULL) {
+    add_fit(&list, content->fit);
+  }
+  add_accuracy(&list, content->accuracy, content->reference != NULL);
+  if (content->turned_over != NULL) {
+    add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
+  }
+  if (content->patient != NULL) {
+    add(&list, "patient_law", "%s", content->patient);
+    add(&list, "patient", "%s", content->patient_summary);
+  }
+  if (content->assumed != NULL) {
+    add(&list, "assumed", "%s", content->assumed);
+  }
+  if (content->frame.millimetres_per_unit > 0.0) {
+    add(&list, "scan_axes", "%s", content->frame.axes == SUPINE_AXES_RAS ? "RAS" : "LPS");
+    add(&list, "scan_unit_mm", "%.17g", content->frame.millimetres_per_unit);
+  }
+  status = find_normals(content, vertices, directions, &normals, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  add_normals(&list, &normals, content->forms != NULL);
+  add(&list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  if (list.failed) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    goto cleanup;
+  }
+  supine_tensor tensors[14] = {
+      {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
+      {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
+      {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
+      {"lung", SUPINE_U8, 1, {n}, lung},
+  };
+  size_t count = 4;
+  if (vector) {
+    tensors[count++] =
+        (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
+  } else {
+    tensors[count++] = (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
+    tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, directions};
+  }
+  if (content->forms != NULL) {
+    tensors[count++] =
+        (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, content->forms->linear};
+    tensors[count++] =
+        (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, content->forms->quadratic};
+    tensors[count++] =
+        (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
+  }
+  if (content->resting != NULL) {
+    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, content->resting};
+  }
+  if (content->table != NULL) {
+    const supine_error_table *table = content->table;
+    tensors[count++] =
+        (supine_tensor){"error_harmonics", SUPINE_F64, 1, {table->band_count}, table->harmonics};
+    tensors[count++] =
+        (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
+  }
+  if (normals.count > 0) {
+    const size_t q = normals.count;
+    tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes};
+    tensors[count++] = (supine_tensor){
+        "normal_weights", SUPINE_F64, 3, {g, q, (k + 1) * (k + 2) / 2}, normals.weights};
+  }
+  status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
+cleanup:
+  entries_free(&list);
+  supine_normals_modes_free(&normals);
+  free(rest);
+  free(vertices);
+  free(directions);
+  free(lung);
+  return status;
+}

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Writing a basis file. */
+#ifndef SUPINE_BASIS_FILE_H
+#define SUPINE_BASIS_FILE_H
+
+#include "precompute/fields/fields.h"
+#include "precompute/physics/model.h"
+#include "precompute/physics/reference.h"
+
+#include "precompute/projection/error_table.h"
+
+typedef struct supine_basis_content {
+  const supine_lungs *lungs;
+  const supine_model *model;    /* NULL: fields from elsewhere */
+  const supine_fit_report *fit; /* of those */
+  const double *directions;     /* [N, 3]; NULL: a vector field */
+  const supine_compression *compression;
+  const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
+  const supine_accuracy *accuracy;
+  const supine_reference *reference; /* that volumes count from; NULL: the surface as it came */
+  const double *resting;             /* [9] with it: the resting volume, harmonics, mL */
+  const double *turned_over;         /* optional, see supine_accuracy_turned_over */
+  const supine_error_table *table;   /* optional */
+  const char *route;                 /* how the field was found */
+  bool harmonics;                    /* the modes are the harmonics themselves */
+  const char *patient;               /* a person's own law, JSON; optional */
+  const char *patient_summary;       /* whose, and how well it held out */
+  const char *assumed;               /* optional */
+  supine_scan_frame frame;
+  const char *made_by; /* optional */
+} supine_basis_content;
+
+supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
+                                        supine_error *error);
+
+#endif

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A breath as a series of frames: when, how much air, and where gravity points. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/vec3.h"
+
+#include "program/breath/breath_course.h"
+
+/* The direction a quarter turn on from `from`, towards `to`. */
+static void find_quarter(const breath_turn *turn, double quarter[3]) {
+  static const double left[3] = {1.0, 0.0, 0.0};
+  static const double back[3] = {0.0, 1.0, 0.0};
+  const double *from = turn->from;
+  double axis[3];
+  supine_cross(from, turn->to, axis);
+  const double sine = supine_length(axis);
+  if (sine < 1e-9) { /* opposite */
+    const double *over = fabs(from[2]) > 0.5 ? back : left;
+    supine_cross(from, over, axis);
+    if (supine_dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
+      supine_cross(from, back, axis);
+    }
+  }
+  const double length = supine_length(axis);
+  const double unit[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
+  supine_cross(unit, from, quarter);
+}
+
+void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
+  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
+  if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
+    memcpy(gravity, turn->to, 3 * sizeof *gravity);
+    return;
+  }
+  double quarter[3];
+  find_quarter(turn, quarter);
+  const double angle = acos(cosine) * fmax(0.0, time / turn->seconds);
+  for (size_t k = 0; k < 3; ++k) {
+    gravity[k] = cos(angle) * turn->from[k] + sin(angle) * quarter[k];
+  }
+}
+
+void supine_breath_course_free(breath_course *course) {
+  free(course->time);
+  free(course->volume);
+  free(course->gravity);
+  *course = (breath_course){0};
+}
+
+/* Eight parameters: the relation, the breath, the turn, and how many frames of how many lungs. */
+supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
+                                          const breath_turn *turn, double rate, size_t count,
+                                          size_t lungs, breath_course *course,
+                                          supine_error *error) {
+  breath_course made = {.count = count, .lungs = lungs, .fixed = turn->seconds == 0.0};
+  made.time = malloc(count * sizeof *made.time);
+  made.volume = malloc(count * sizeof *made.volume);
+  made.gravity = malloc(3 * count * sizeof *made.gravity);
+  if (made.time == NULL || made.volume == NULL || made.gravity == NULL) {
+    supine_breath_course_free(&made);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    made.time[i] = (double)i / rate;
+    supine_breath_turn_gravity(turn, made.time[i], made.gravity + 3 * i);
+  }
+  const supine_status status =
+      supine_breath_evaluate(pv, breath, count, made.time, made.volume, NULL, error);
+  if (status != SUPINE_OK) {
+    supine_breath_course_free(&made);
+    return status;
+  }
+  *course = made;
+  return SUPINE_OK;
+}

@@ -1,0 +1,389 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine breathe: the lungs of a basis, breathing, frame by frame. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/breath/breath_frames.h"
+#include "program/breath_output.h"
+#include "program/drawing.h"
+#include "program/options/basis_input.h"
+#include "program/options/orientation.h"
+#include "program/options/volume.h"
+
+static const char name[] = "breathe";
+
+static const double budget = 15e-3; /* s a frame */
+
+typedef struct request {
+  supine_orientation orientation;
+  bool turns;
+  breath_turn turn;
+  supine_pv_breath breath;
+  const char *pv;
+  const char *path;
+  bool allow_folds, as_scanned;
+  double fps, seconds, step; /* 0: not given */
+} request;
+
+static int read_turn(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  return supine_command_read_turn(command, text, &wanted->turn);
+}
+
+static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
+
+static const supine_option table[] = {
+    {"output", 'o', "OUT",
+     "NAME.vtp: one file for ParaView, the triangles once, whose time is the frame's number; "
+     "NAME.pvd: "
+     "time in seconds, and a folder NAME with a VTP file a frame, half as large again. Both to "
+     "1/256 "
+     "mm, with normals, lungs, gravity and volumes. NAME.safetensors: one "
+     "file with positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; "
+     "anything else: a folder with breath.pvd and the VTP files. A folder must be new or empty",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
+    {"turn", 0, "FROM:TO:SECONDS",
+     "turns gravity from one posture to another at constant speed, as supine:left:10s; to the "
+     "opposite posture over the left side. Rest turns with it",
+     .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
+    {.help = "The breath:"},
+    {"tidal", 0, "ML", "air of a breath above the posture's rest, both lungs together; default 500",
+     SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
+    {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
+     SUPINE_ABOVE_ZERO},
+    {"inhale", 0, "SHARE", "of the breath's time that is inhalation, between 0 and 1; default 1/3",
+     SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
+     .wants = "a share between 0 and 1"},
+    {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
+     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
+    {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
+     SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O"},
+    {"course", 0, "NAME",
+     "how pressure rises and falls: cosine (default), ramp; or flow: the volume goes in straight "
+     "lines, whatever the pressure",
+     SUPINE_FILLS(request, breath.course), .choices = courses},
+    {"step", 0, "ML",
+     "the paper's own breath instead: constant flow of this volume a frame, in and out; 1.5 takes "
+     "5 s to inhale 500 mL at 66.66 frames a second",
+     SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
+    {.help = "The frames:"},
+    {"fps", 0, "N", "frames a second, one every 15 ms", SUPINE_FILLS(request, fps),
+     SUPINE_ABOVE_ZERO, .standard = "66.66"},
+    {"seconds", 0, "S", "how long; default: the turn, or one breath",
+     SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.name = NULL}};
+
+/* Number of frames and what was left to default; an exit code. */
+static int complete(request *wanted, size_t *count) {
+  enum { FRAMES_MAX = 1000000 };
+  supine_pv_breath *breath = &wanted->breath;
+  if (wanted->step > 0.0) { /* in and out alike, at this volume a frame */
+    breath->course = SUPINE_PV_CONSTANT_FLOW;
+    breath->inhale_fraction = 0.5;
+    breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
+  }
+  const char *ending = strrchr(wanted->path, '.');
+  if (wanted->as_scanned && ending != NULL && strcmp(ending, ".safetensors") == 0) {
+    return supine_options_usage(name, "--as-scanned is for a series: tensors are LPS and mm");
+  }
+  if (wanted->turns && wanted->orientation.given) {
+    return supine_options_usage(name, "give --turn, or one posture, not both");
+  }
+  if (!wanted->turns) {
+    const int result =
+        supine_options_orientation_finish(&wanted->orientation, name, wanted->turn.to);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+    memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
+  }
+  double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;
+  seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
+  const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
+  if (!(frames <= FRAMES_MAX)) {
+    return supine_options_usage(name, "%g s at %g frames a second are more than %d frames", seconds,
+                                wanted->fps, FRAMES_MAX);
+  }
+  *count = (size_t)frames;
+  return SUPINE_EXIT_OK;
+}
+
+static int compare(const void *a, const void *b) {
+  const double x = *(const double *)a;
+  const double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* What the frames' own surfaces enclose, against what was asked. */
+typedef struct gauge {
+  supine_mesh mesh;          /* shares the rest surface's triangles */
+  double rest;               /* mL */
+  double least, peak, worst; /* mL beyond the file's surface */
+} gauge;
+
+static supine_status gauge_begin(const supine_mesh *rest, gauge *g) {
+  *g = (gauge){
+      .mesh = *rest, .rest = 1e-3 * supine_mesh_volume(rest), .least = INFINITY, .peak = -INFINITY};
+  g->mesh.vertices = malloc(3 * rest->vertex_count * sizeof *g->mesh.vertices);
+  return g->mesh.vertices != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+}
+
+static void gauge_frame(gauge *g, const float *xyz, double wanted) {
+  for (size_t i = 0; i < 3 * g->mesh.vertex_count; ++i) {
+    g->mesh.vertices[i] = (double)xyz[i];
+  }
+  const double gained = 1e-3 * supine_mesh_volume(&g->mesh) - g->rest;
+  g->peak = fmax(g->peak, gained);
+  g->least = fmin(g->least, gained);
+  g->worst = fmax(g->worst, fabs(gained - wanted));
+}
+
+static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
+                   const gauge *measured, double *seconds) {
+  qsort(seconds, course->count, sizeof *seconds, compare);
+  const double median = seconds[course->count / 2];
+  const double most = seconds[course->count - 1];
+  (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces hold %.2f to %.2f mL, each "
+               "within %.2g mL of its volume\n",
+               wanted->path, course->count, course->time[course->count - 1], wanted->fps,
+               measured->rest + measured->least, measured->rest + measured->peak, measured->worst);
+  if (course->fixed) {
+    (void)printf("one posture: %zu of the frames by three additions a vertex\n",
+                 supine_breath_frames_stepped(frames));
+  }
+  (void)printf("compute time a frame: median %.3f ms, longest %.3f ms, of %.0f ms\n", 1e3 * median,
+               1e3 * most, 1e3 * budget);
+}
+
+static supine_status play_frames(const breath_course *course, breath_frames *frames,
+                                 breath_output *output, gauge *measured, float *xyz,
+                                 double *seconds, supine_error *error) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_status status = SUPINE_OK;
+  for (size_t t = 0; t < course->count && status == SUPINE_OK; ++t) {
+    seconds[t] = supine_breath_frames_next(frames, xyz);
+    gauge_frame(measured, xyz, course->volume[t]);
+    status = supine_command_breath_output_add(output, xyz, error);
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)course->count)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  supine_options_progress_end(&progress);
+  return status;
+}
+
+/* Whether lungs can look as they do at the ends of the breath. */
+static supine_status check_ends(const supine_basis *basis, const request *wanted,
+                                const breath_course *course, supine_error *error) {
+  size_t least = 0;
+  size_t most = 0;
+  for (size_t t = 1; t < course->count; ++t) {
+    least = course->volume[t] < course->volume[least] ? t : least;
+    most = course->volume[t] > course->volume[most] ? t : most;
+  }
+  const size_t ends[2] = {least, most};
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
+    double weights[SUPINE_MODES_MAX];
+    double scales[SUPINE_LUNGS_MAX] = {0};
+    status = supine_basis_weights(basis, course->gravity + 3 * ends[i], weights);
+    if (status == SUPINE_OK) {
+      status = supine_basis_scale(basis, weights, course->volume[ends[i]], &scales[0], error);
+    }
+    for (size_t lung = 1; lung < course->lungs; ++lung) {
+      scales[lung] = scales[0];
+    }
+    if (status == SUPINE_OK) {
+      status =
+          supine_options_volume_check(basis, name, wanted->allow_folds, weights, scales, error);
+    }
+  }
+  return status;
+}
+
+/* Before the work, of what few would want by accident. */
+static void warn_of_size(const request *wanted, const breath_content *content) {
+  static const double large = 2e9; /* bytes */
+  const double bytes = supine_command_breath_output_size(wanted->path, content);
+  if (bytes >= large) {
+    supine_options_say(name,
+                       "%s: %zu frames of %zu vertices will take about %.1f GB; --fps or --seconds "
+                       "make them fewer",
+                       wanted->path, content->course->count, content->rest->vertex_count,
+                       1e-9 * bytes);
+  }
+}
+
+/* Where displacement counts from: the basis' surface or, where the first frame is as good as that
+ * and would show none, the fullest frame. Viewers take their colours' range from the first. NULL:
+ * no memory. */
+static double *find_origin(const supine_basis *basis, const breath_course *course,
+                           const supine_mesh *rest) {
+  static const double unseen = 1.0; /* mL */
+  const size_t count = 3 * rest->vertex_count;
+  double *origin = malloc(count * sizeof *origin);
+  float *xyz = malloc(count * sizeof *xyz);
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  size_t fullest = 0;
+  for (size_t t = 1; t < course->count; ++t) {
+    fullest = course->volume[t] > course->volume[fullest] ? t : fullest;
+  }
+  if (origin != NULL && xyz != NULL) {
+    memcpy(origin, rest->vertices, count * sizeof *origin);
+    if (fabs(course->volume[0]) < unseen &&
+        supine_basis_weights(basis, course->gravity + 3 * fullest, weights) == SUPINE_OK &&
+        supine_basis_scale(basis, weights, course->volume[fullest], &scales[0], NULL) ==
+            SUPINE_OK) {
+      for (size_t lung = 1; lung < SUPINE_LUNGS_MAX; ++lung) {
+        scales[lung] = scales[0];
+      }
+      supine_deform(basis, weights, scales, xyz);
+      for (size_t i = 0; i < count; ++i) {
+        origin[i] = (double)xyz[i];
+      }
+    }
+  } else {
+    free(origin);
+    origin = NULL;
+  }
+  free(xyz);
+  return origin;
+}
+
+/* Over 60 lines: what a breath needs is made in one place and freed in one. */
+static supine_status play(const supine_basis *basis, const request *wanted,
+                          const supine_mesh_save_options *frame, size_t count, const char *made_by,
+                          supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_pv pv = *supine_breath_normal();
+  supine_mesh rest = {0};
+  breath_course course = {0};
+  breath_frames *frames = NULL;
+  breath_output *output = NULL;
+  gauge measured = {0};
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  double *seconds = malloc(count * sizeof *seconds);
+  double *origin = NULL;
+  supine_status status = SUPINE_OK;
+  if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+      gauge_begin(&rest, &measured) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    goto cleanup;
+  }
+  if (wanted->pv != NULL) {
+    status = supine_breath_load(wanted->pv, &pv, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
+                                         info->lung_count, &course, error);
+  }
+  for (size_t t = 0; status == SUPINE_OK && t < count;
+       ++t) { /* a breath begins at its posture's rest */
+    double at_rest = 0.0;
+    (void)supine_basis_resting_volume(basis, course.gravity + 3 * t, &at_rest);
+    course.volume[t] += at_rest;
+  }
+  if (status == SUPINE_OK) {
+    status = supine_breath_frames_create(basis, &course, &frames, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_ends(basis, wanted, &course, error);
+  }
+  if (status == SUPINE_OK) {
+    origin = find_origin(basis, &course, &rest);
+    status =
+        origin != NULL ? SUPINE_OK : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  supine_options_signals_catch(true);
+  if (status == SUPINE_OK) {
+    const breath_content content = {.basis = basis,
+                                    .rest = &rest,
+                                    .origin = origin,
+                                    .frame = frame,
+                                    .course = &course,
+                                    .volumes = supine_breath_frames_volumes(frames),
+                                    .made_by = made_by};
+    warn_of_size(wanted, &content);
+    status = supine_command_breath_output_open(wanted->path, &content, &output, error);
+  }
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  status = play_frames(&course, frames, output, &measured, xyz, seconds, error);
+  if (status == SUPINE_OK) {
+    status = supine_command_breath_output_commit(output, error);
+  }
+  if (status == SUPINE_OK) {
+    report(wanted, &course, frames, &measured, seconds);
+  }
+cleanup:
+  supine_command_breath_output_close(output);
+  supine_breath_frames_destroy(frames);
+  supine_breath_course_free(&course);
+  supine_mesh_free(&rest);
+  free(measured.mesh.vertices);
+  free(origin);
+  free(xyz);
+  free(seconds);
+  return status;
+}
+
+static void begin(void *chosen) {
+  ((request *)chosen)->breath = supine_breath_default();
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  const char *path = given->operand[0];
+  supine_basis *basis = NULL;
+  supine_error error;
+  size_t count = 1;
+  int result = complete(wanted, &count);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  supine_status status = supine_basis_open(path, &basis, &error);
+  if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
+    status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
+                              "%s: its surface is open and encloses no volume: close the mesh "
+                              "before 'supine precompute'",
+                              path);
+  }
+  supine_mesh_save_options frame = {0};
+  if (status == SUPINE_OK) {
+    result = supine_options_basis_frame(basis, name, wanted->as_scanned, &frame);
+  }
+  if (status == SUPINE_OK && result == SUPINE_EXIT_OK) {
+    status = play(basis, wanted, &frame, count, given->made_by, &error);
+  }
+  if (result == SUPINE_EXIT_OK) {
+    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  }
+  supine_basis_close(basis);
+  return result;
+}
+
+const supine_command supine_command_breathe = {
+    name,
+    "let a basis breathe, in one posture or turning",
+    .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
+    .about =
+        "Lets the lungs of a basis file breathe, in one posture or while the body turns, and "
+        "writes the surface of every frame. The volume follows the pressure-volume relation and "
+        "is exact in each frame. Prints how long computing a frame took, beside the 15 ms of a "
+        "display that must not wait.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
+             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
+             "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine compare: how far postures differ, and where the lungs ventilate in each. */
+#include <errno.h>
+#include <string.h>
+
+#include "sh/base/output.h"
+
+#include "program/compare_content.h"
+#include "program/options/volume.h"
+#include "program/report/comparison.h"
+
+static const char name[] = "compare";
+
+/* Writes one form to a file, whole or not at all. */
+static int write_file(const char *path, const supine_comparison *comparison, bool html) {
+  supine_output output = {0};
+  supine_error error;
+  supine_status status = supine_output_open(path, &output, &error);
+  if (status == SUPINE_OK && html) {
+    status = supine_report_html(comparison, output.file, &error);
+  } else if (status == SUPINE_OK) {
+    supine_report_csv(comparison, output.file);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_output_commit(&output, &error);
+  }
+  supine_output_abandon(&output);
+  return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(name, &error);
+}
+
+typedef struct request {
+  const char *postures;
+  const char *csv;
+  const char *html;
+  bool json;
+  bool by_rms;
+  const char *volume; /* as given, or NULL */
+  bool allow_folds;
+  double breath; /* mL */
+  double rms;    /* mm */
+} request;
+
+static const supine_option table[] = {
+    {"postures", 0, "LIST", "which to compare", SUPINE_FILLS(request, postures),
+     .standard = "supine,prone,left,right"},
+    {"volume", 0, "VOLUME", "in every posture: " SUPINE_VOLUME_HELP, SUPINE_FILLS(request, volume),
+     .rivals = "breath"},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
+    {"breath", 0, "ML",
+     "air added to that volume, to see which heights ventilate (where rest is known; elsewhere the "
+     "breath is --volume itself)",
+     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
+    {"rms", 0, "MM",
+     "root-mean-square displacement in every posture instead: for open surfaces, which have no "
+     "volume",
+     SUPINE_FILLS(request, rms), SUPINE_SAYS_GIVEN(request, by_rms), .wants = "millimetres",
+     .rivals = "breath"},
+    {"json", 0, NULL, "the same for programs, on standard output", SUPINE_FILLS(request, json)},
+    {"csv", 0, "FILE", "the same for spreadsheets, one number a row", SUPINE_FILLS(request, csv),
+     .file = SUPINE_FILE_OUT},
+    {"output", 'o', "FILE", ".html: a report of one file, with charts and pictures",
+     SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
+    {.help = SUPINE_POSTURE_LIST_HELP},
+    {.name = NULL}};
+
+/* In every form that is wanted. */
+static int tell(const supine_comparison *comparison, const request *wanted) {
+  if (!wanted->json) {
+    supine_report_text(comparison, stdout);
+  } else if (!supine_report_json(comparison, stdout)) {
+    supine_options_say(name, "cannot print JSON: %s",
+                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    return SUPINE_EXIT_OUTPUT;
+  }
+  int result = supine_options_finish(name);
+  if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
+    result = write_file(wanted->csv, comparison, false);
+  }
+  if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
+    result = write_file(wanted->html, comparison, true);
+  }
+  return result;
+}
+
+static int compare(const char *path, const supine_basis *basis, const request *wanted) {
+  supine_comparison comparison = {.path = path,
+                                  .command = name,
+                                  .allow_folds = wanted->allow_folds,
+                                  .basis = basis,
+                                  .inflation = {SUPINE_INFLATION_RMS, wanted->rms},
+                                  .breath = wanted->breath};
+  supine_volume volume = supine_options_volume_default(basis);
+  supine_error error;
+  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
+    return supine_options_usage(
+        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
+        wanted->volume);
+  }
+  if (!wanted->by_rms && volume.from == SUPINE_VOLUME_REST) {
+    comparison.inflation = (supine_inflation){SUPINE_INFLATION_REST, volume.offset};
+  } else if (!wanted->by_rms) {
+    static const double anywhere[3] = {0.0, 1.0, 0.0}; /* full and the scan do not turn */
+    comparison.inflation = (supine_inflation){SUPINE_INFLATION_VOLUME,
+                                              supine_options_volume_of(basis, &volume, anywhere)};
+  }
+  int result = supine_options_posture_list_parse(name, wanted->postures, &comparison.postures);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  if (!wanted->by_rms && !supine_basis_get_info(basis)->has_volume) {
+    supine_options_say(name,
+                       "%s: the surface is open and encloses no volume: give --rms MM, or close "
+                       "the mesh before 'supine precompute'",
+                       path);
+    return SUPINE_EXIT_INPUT;
+  }
+  if (supine_basis_metadata(basis, "content") != NULL) { /* of 'supine embed' */
+    if (wanted->html != NULL || wanted->by_rms) {
+      return supine_options_usage(name,
+                                  "what is inside has no surface: -o and --rms are for lungs");
+    }
+    return supine_command_compare_content(name, basis, &comparison.postures, &volume, wanted->json,
+                                          wanted->csv);
+  }
+  if (supine_report_find(&comparison, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  result = tell(&comparison, wanted);
+cleanup:
+  supine_report_free(&comparison);
+  return result;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  supine_basis *basis = NULL;
+  supine_error error;
+  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  const int result = compare(given->operand[0], basis, chosen);
+  supine_basis_close(basis);
+  return result;
+}
+
+const supine_command supine_command_compare = {
+    name,
+    "how far postures differ, and who ventilates where",
+    .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
+    .about =
+        "Says how far the lungs move in each posture and between every two, how much each lung "
+        "holds, and which heights ventilate in a breath; then searches all directions of gravity "
+        "for the two that differ most and for the one that is farthest from supine. Of what is "
+        "inside ('supine embed') it says how far each named part moves between every two postures, "
+        "and where to.",
+    .options = table,
+    .notes =
+        "Averages are over the surface's area; 95 % of the area moves no farther than the number "
+        "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
+        "equal "
+        "thickness across gravity. What the tissue of a slab gains is the volume that its part of "
+        "the surface sweeps, plus what crosses its lower cut, less what crosses its upper one; a "
+        "cut's motion is the plane fitted to its outline's. The slabs' gains sum to the volume "
+        "asked for; gain over volume is the regional expansion. Constant, odd and even are shares "
+        "of the squared displacement over all directions: odd parts turn over with gravity, so "
+        "without an even part prone is the exact reverse of supine about their mean.\n"
+        "\n"
+        "Examples:\n"
+        "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+        "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How far named points move between postures, and where to. */
+#include <math.h>
+#include <stdlib.h>
+
+#include <jansson.h>
+
+#include "sh/base/output.h"
+#include "sh/base/vec3.h"
+
+#include "program/compare_content.h"
+#include "program/names.h"
+
+/* Where everything is in every posture: moves [postures, names, 3], mm from rest. */
+typedef struct comparison {
+  const supine_posture_list *postures;
+  supine_command_names names;
+  double *moves;
+} comparison;
+
+/* Means over each name's vertices in one posture. */
+static supine_status find_moves(const supine_basis *basis, const double gravity[3], double volume,
+                                const supine_command_names *names, float *step, double *moves,
+                                supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  supine_status status = supine_basis_weights(basis, gravity, weights);
+  if (status == SUPINE_OK) {
+    status = supine_basis_scale(basis, weights, volume, &scales[0], error);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  for (size_t lung = 1; lung < info->lung_count; ++lung) {
+    scales[lung] = scales[0];
+  }
+  supine_displace_range(basis, weights, scales, 0, info->vertex_count, step);
+  for (size_t begin = 0; begin < info->vertex_count;) { /* a name's vertices follow each other */
+    const size_t name = names->part[names->order[begin]];
+    double sum[3] = {0.0, 0.0, 0.0};
+    size_t end = begin;
+    for (; end < info->vertex_count && names->part[names->order[end]] == name; ++end) {
+      for (size_t k = 0; k < 3; ++k) {
+        sum[k] += (double)step[3 * names->order[end] + k];
+      }
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      moves[3 * name + k] = sum[k] / (double)(end - begin);
+    }
+    begin = end;
+  }
+  return SUPINE_OK;
+}
+
+/* From posture `from` to posture `to`; its length is returned. */
+static double move_between(const comparison *c, size_t from, size_t to, size_t name,
+                           double move[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    move[k] = c->moves[3 * (to * c->names.count + name) + k] -
+              c->moves[3 * (from * c->names.count + name) + k];
+  }
+  return supine_length(move);
+}
+
+static void print_table(const comparison *c, size_t from, size_t to) {
+  static const char *const ways[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
+  (void)printf("%s to %s:\n", c->postures->item[from].name, c->postures->item[to].name);
+  for (size_t name = 0; name < c->names.count; ++name) {
+    double move[3];
+    const double length = move_between(c, from, to, name, move);
+    (void)printf("  %-16s %5.1f mm:", c->names.text[name], length);
+    for (int k = 0; k < 3; ++k) {
+      (void)printf("%s %4.1f to the %s", k > 0 ? "," : "", fabs(move[k]), ways[k][move[k] > 0.0]);
+    }
+    (void)putchar('\n');
+  }
+}
+
+static void write_csv(const comparison *c, size_t from, size_t to, FILE *file) {
+  for (size_t name = 0; name < c->names.count; ++name) {
+    double move[3];
+    const double length = move_between(c, from, to, name, move);
+    (void)fprintf(file, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f\n", c->postures->item[from].name,
+                  c->postures->item[to].name, c->names.text[name], move[0], move[1], move[2],
+                  length);
+  }
+}
+
+static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) {
+  for (size_t name = 0; name < c->names.count; ++name) {
+    double move[3];
+    const double length = move_between(c, from, to, name, move);
+    if (json_array_append_new(
+            list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f}", "from", c->postures->item[from].name,
+                            "to", c->postures->item[to].name, "name", c->names.text[name], "move",
+                            move[0], move[1], move[2], "mm", length)) != 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* All that was asked for, pair by pair. */
+static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
+  if (csv != NULL) {
+    (void)fputs("from,to,name,dx,dy,dz,mm\n", csv);
+  }
+  for (size_t from = 0; from < c->postures->count; ++from) {
+    for (size_t to = from + 1; to < c->postures->count; ++to) {
+      if (csv != NULL) {
+        write_csv(c, from, to, csv);
+      } else if (list == NULL) {
+        print_table(c, from, to);
+      } else if (!add_json(c, from, to, list)) {
+        return SUPINE_ERROR_MEMORY;
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status write_all(const comparison *c, bool json, const char *csv,
+                               supine_error *error) {
+  supine_output output = {0};
+  json_t *list = json ? json_array() : NULL;
+  supine_status status = json && list == NULL ? SUPINE_ERROR_MEMORY : write_pairs(c, list, NULL);
+  if (status == SUPINE_OK && json) {
+    status = json_dumpf(list, stdout, JSON_INDENT(2)) == 0 ? SUPINE_OK : SUPINE_ERROR_WRITE;
+    (void)putchar('\n');
+  }
+  json_decref(list);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "cannot print JSON");
+  }
+  if (csv != NULL) {
+    status = supine_output_open(csv, &output, error);
+    if (status == SUPINE_OK) {
+      (void)write_pairs(c, NULL, output.file);
+      status = supine_output_commit(&output, error);
+    }
+  }
+  return status;
+}
+
+int supine_command_compare_content(const char *command, const supine_basis *basis,
+                                   const supine_posture_list *postures, const supine_volume *volume,
+                                   bool json, const char *csv) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  comparison c = {.postures = postures};
+  supine_error error;
+  supine_status status = supine_command_names_open(basis, &c.names, &error);
+  if (status != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  float *step = malloc(3 * n * sizeof *step);
+  c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
+  if (step == NULL || c.moves == NULL) {
+    status = supine_error_set(&error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+  }
+  for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
+    status = find_moves(basis, postures->item[i].gravity,
+                        supine_options_volume_of(basis, volume, postures->item[i].gravity),
+                        &c.names, step, c.moves + 3 * i * c.names.count, &error);
+  }
+  if (status == SUPINE_OK) {
+    status = write_all(&c, json, csv, &error);
+  }
+  free(step);
+  free(c.moves);
+  supine_command_names_close(&c.names);
+  return status == SUPINE_OK ? supine_options_finish(command)
+                             : supine_options_fail(command, &error);
+}

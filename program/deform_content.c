@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Moved points as CSV; displacement fields; images resampled by them. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "sh/base/output.h"
+#include "sh/base/vec3.h"
+
+#include "program/deform_content.h"
+#include "program/names.h"
+#include "program/field/field.h"
+
+/* How far outside the lungs a field fades to 0, mm: no steeper than the tissue moves. 'supine
+ * embed' leaves as much room around. */
+static const double fade = 60.0;
+
+const supine_option supine_command_deform_content_options[] = {
+    {.help =
+         "What is inside ('supine embed'): -o FILE.csv writes moved points by name; of a grid:"},
+    {"field-out", 0, "FILE",
+     ".nrrd: displacements in mm, LPS, from each node at rest to where its tissue goes; they fade "
+     "out within 60 mm of the lungs",
+     SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT, .endings = ".nrrd"},
+    {"inverse", 0, NULL,
+     "from each node of the moved lungs to where its tissue was, as resampling an image takes it",
+     SUPINE_FILLS(supine_deform_content, inverse)},
+    {"image", 0, "FILE", "image to move, into -o: .nrrd, .nii or .nii.gz, linear",
+     SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+    {"labels", 0, "FILE", "label map to move, into -o: nearest voxel",
+     SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+    {.name = NULL}};
+
+static bool is_csv(const char *path) {
+  const size_t length = strlen(path);
+  return length > 4 && strcasecmp(path + length - 4, ".csv") == 0;
+}
+
+int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command) {
+  const bool image = wanted->image != NULL || wanted->labels != NULL;
+  if (wanted->path == NULL && (image || wanted->field == NULL)) {
+    return supine_options_usage(command, "-o FILE is missing; its name must end in %s",
+                                image ? ".nrrd, .nii or .nii.gz" : ".ply, .obj, .stl or .vtp");
+  }
+  if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
+    return supine_options_usage(command,
+                                image ? "%s: --image and --labels write .nrrd, .nii or .nii.gz"
+                                      : "%s: which image? Give --image FILE or --labels FILE",
+                                wanted->path);
+  }
+  if (wanted->inverse && wanted->field == NULL) {
+    return supine_options_usage(command, "--inverse is of --field-out FILE, which is missing");
+  }
+  return SUPINE_EXIT_OK;
+}
+
+bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
+  return wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL ||
+         is_csv(wanted->path);
+}
+
+/* name, lung, x, y, z and where that is now. */
+static supine_status write_points(const char *path, const supine_basis *basis,
+                                  const double *weights, const double *scales,
+                                  supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  supine_command_names names;
+  supine_output output = {0};
+  supine_status status = supine_command_names_open(basis, &names, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  float *step = malloc(3 * n * sizeof *step);
+  if (step == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+  } else {
+    status = supine_output_open(path, &output, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_displace_range(basis, weights, scales, 0, n, step);
+    (void)fputs("name,lung,x,y,z,dx,dy,dz,mm\n", output.file);
+    for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
+      const size_t at = names.order[i];
+      const float *p = info->vertices + 3 * at;
+      const float *u = step + 3 * at;
+      const double d[3] = {(double)u[0], (double)u[1], (double)u[2]};
+      (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n",
+                    names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
+                    (double)p[0] + d[0], (double)p[1] + d[1], (double)p[2] + d[2], d[0], d[1], d[2],
+                    supine_length(d));
+    }
+    status = supine_output_commit(&output, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %zu points\n", path, n);
+  }
+  free(step);
+  supine_command_names_close(&names);
+  return status;
+}
+
+static supine_status write_field(const supine_deform_content *wanted, const supine_field *forward,
+                                 const supine_field *inverse, supine_error *error) {
+  const supine_image *nodes = wanted->inverse ? &inverse->nodes : &forward->nodes;
+  const char *note =
+      wanted->inverse
+          ? "displacement v(y), mm, LPS: the tissue at y, deformed, was at y + v(y) at rest"
+          : "displacement u(x), mm, LPS: the tissue at x, at rest, goes to x + u(x)";
+  const supine_status status = supine_image_write(wanted->field, nodes, note, error);
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
+                 wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
+                 nodes->size[2]);
+  }
+  return status;
+}
+
+static supine_status write_image(const supine_deform_content *wanted, const supine_field *inverse,
+                                 supine_image *image, supine_error *error) {
+  supine_status status = supine_field_resample(inverse, wanted->labels != NULL, image, error);
+  if (status == SUPINE_OK) {
+    status = supine_image_write(wanted->path, image, NULL, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %zu x %zu x %zu voxels\n", wanted->path, image->size[0], image->size[1],
+                 image->size[2]);
+  }
+  return status;
+}
+
+static supine_status invert(const supine_field *forward, supine_field *inverse,
+                            supine_error *error) {
+  supine_field_residual residual = {0};
+  const supine_status status = supine_field_invert(forward, inverse, &residual, error);
+  if (status == SUPINE_OK) {
+    (void)printf("forward and back again misses %.3g mm RMS, %.3g mm at most, inside the lungs",
+                 residual.rms, residual.largest);
+    if (residual.lost > 0) {
+      (void)printf("; the field folds at %zu nodes, outside or between them", residual.lost);
+    }
+    (void)putchar('\n');
+  }
+  return status;
+}
+
+static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
+                               const double *weights, const double *scales, supine_error *error) {
+  const char *from = wanted->image != NULL ? wanted->image : wanted->labels;
+  supine_field forward = {0};
+  supine_field inverse = {0};
+  supine_image image = {0};
+  supine_status status = supine_field_create(basis, weights, scales, fade, &forward, error);
+  if (status == SUPINE_OK && from != NULL) {
+    status = supine_image_read(from, &image, error);
+  }
+  if (status == SUPINE_OK && (from != NULL || wanted->inverse)) {
+    status = invert(&forward, &inverse, error);
+  }
+  if (status == SUPINE_OK && wanted->field != NULL) {
+    status = write_field(wanted, &forward, &inverse, error);
+  }
+  if (status == SUPINE_OK && from != NULL) {
+    status = write_image(wanted, &inverse, &image, error);
+  }
+  supine_field_free(&forward);
+  supine_field_free(&inverse);
+  supine_image_free(&image);
+  return status;
+}
+
+int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
+                                  const supine_basis *basis, const double *weights,
+                                  const double *scales) {
+  supine_error error;
+  supine_status status = SUPINE_OK;
+  if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
+    status = move_grid(wanted, basis, weights, scales, &error);
+  }
+  if (status == SUPINE_OK && wanted->path != NULL && is_csv(wanted->path)) {
+    status = write_points(wanted->path, basis, weights, scales, &error);
+  }
+  return status == SUPINE_OK ? supine_options_finish(command)
+                             : supine_options_fail(command, &error);
+}

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The part of 'supine deform' that moves what 'supine embed' made: points, fields, images. */
+#ifndef SUPINE_DEFORM_CONTENT_H
+#define SUPINE_DEFORM_CONTENT_H
+
+#include <supine/runtime.h>
+
+#include "program/options/command.h"
+
+typedef struct supine_deform_content {
+  const char *path;   /* -o */
+  const char *field;  /* --field-out */
+  const char *image;  /* --image */
+  const char *labels; /* --labels */
+  bool inverse;
+} supine_deform_content;
+
+extern const supine_option supine_command_deform_content_options[];
+
+/* Do the options fit each other? An exit code. */
+int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command);
+
+/* Is what is wanted none of a surface's files? */
+bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
+
+/* Writes what is wanted, and says what it wrote; an exit code. */
+int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
+                                  const supine_basis *basis, const double *weights,
+                                  const double *scales);
+
+#endif

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What still and moving pictures of 'supine render' share: what was asked for, states of the lungs,
+ * and the picture around them. */
+#ifndef SUPINE_COMMAND_DRAWING_H
+#define SUPINE_COMMAND_DRAWING_H
+
+#include <supine/compare.h>
+
+#include "program/breath/breath_course.h"
+#include "program/inside.h"
+#include "program/options/posture_list.h"
+#include "program/options/volume.h"
+#include "program/render/render.h"
+
+/* What the options say. */
+typedef struct supine_command_drawing {
+  const char *output;
+  const char *postures;
+  supine_volume_options volume;
+  const char *reference; /* posture that colours are the difference from, or NULL */
+  const char *title;
+  const char *inside; /* a file, or NULL */
+  double scale;       /* mm, or 0: by volume */
+  double largest;
+  double opacity; /* of the lungs; 0: not given */
+  size_t width, height;
+  supine_view view[SUPINE_VIEWS_MAX];
+  size_t view_count;
+  unsigned theme; /* 1: dark */
+  bool turns;
+  breath_turn turn;
+} supine_command_drawing;
+
+/* One posture, ready to be drawn. */
+typedef struct supine_command_drawn {
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  float *value; /* [N] */
+  char subtitle[96];
+  supine_command_marks marks;
+} supine_command_drawn;
+
+/* Weights and scales for gravity along a direction of that name; an exit code. `value` [N] is
+ * written over. */
+int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
+                              const supine_command_drawing *wanted, const supine_posture_item *item,
+                              supine_command_drawn *found);
+
+/* What the colours show, and the words below the posture's name; `ends`, of the colours, grow: the
+ * 95th percentile, the largest. */
+void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
+                                const supine_command_drawn *reference, supine_command_drawn *shown,
+                                double ends[2]);
+
+/* The picture around panels that the caller sets; `label` [128] is the bar's words.
+ * @param reference  the name of the posture that colours are the difference from, or NULL */
+supine_picture supine_command_drawing_picture(const supine_basis *basis,
+                                              const supine_command_drawing *wanted,
+                                              const char *reference, const double ends[2],
+                                              size_t panels, char *label);
+
+/* A panel of a state. */
+supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
+                                        const supine_command_drawn *shown, const char *title,
+                                        const double gravity[3]);
+
+/* The turn as an animation; an exit code. */
+int supine_command_drawing_turn(const supine_basis *basis, const supine_command_drawing *wanted,
+                                const supine_posture_item *reference);
+
+/* "supine:left:10s" into a breath_turn, as --turn takes it; an exit code or SUPINE_OPTION_MISFIT.
+ */
+int supine_command_read_turn(const char *command, const char *value, breath_turn *turn);
+
+#endif

@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A turn of the patient as an animation. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/output.h"
+
+#include "program/drawing.h"
+
+static const char name[] = "render";
+
+enum { PER_SECOND = 15, FRAMES_MAX = 10000, PAUSE_MS = 1000 /* at the end */ };
+
+int supine_command_read_turn(const char *command, const char *value, breath_turn *turn) {
+  char text[128];
+  char *colon[2];
+  (void)snprintf(text, sizeof text, "%s", value);
+  colon[0] = strchr(text, ':');
+  colon[1] = colon[0] == NULL ? NULL : strchr(colon[0] + 1, ':');
+  if (strlen(value) >= sizeof text || colon[1] == NULL) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  *colon[0] = *colon[1] = '\0';
+  char *seconds = colon[1] + 1;
+  const size_t length = strlen(seconds);
+  if (length > 0 && seconds[length - 1] == 's') {
+    seconds[length - 1] = '\0';
+  }
+  if (!supine_options_parse_number(seconds, &turn->seconds) || !(turn->seconds > 0.0)) {
+    return supine_options_usage(command, "--turn takes a time above 0 s, not '%s'", value);
+  }
+  const int result = supine_options_posture(command, text, turn->from);
+  return result == SUPINE_EXIT_OK ? supine_options_posture(command, colon[0] + 1, turn->to)
+                                  : result;
+}
+
+/* What the frames are drawn with. */
+typedef struct turning {
+  const supine_basis *basis;
+  const supine_command_drawing *wanted;
+  const supine_command_drawn *reference; /* or NULL */
+  const char *reference_name;
+  supine_compare *compare;
+  supine_renderer *renderer;
+  supine_basis *inside; /* or NULL */
+  supine_command_names names;
+  size_t count; /* frames */
+  double ends[2];
+  double extent[SUPINE_VIEWS_MAX][4];
+} turning;
+
+/* The state of a frame; an exit code. */
+static int find_frame(turning *t, size_t frame, supine_posture_item *item,
+                      supine_command_drawn *shown) {
+  const breath_turn *turn = &t->wanted->turn;
+  const double cosine =
+      turn->from[0] * turn->to[0] + turn->from[1] * turn->to[1] + turn->from[2] * turn->to[2];
+  const double angle = acos(fmax(-1.0, fmin(1.0, cosine))) * 180.0 / 3.14159265358979323846;
+  const double share = (double)frame / (double)(t->count - 1);
+  supine_breath_turn_gravity(turn, share * turn->seconds, item->gravity);
+  (void)snprintf(item->name, sizeof item->name, "turned by %.0f of %.0f degrees", share * angle,
+                 angle);
+  const int result = supine_command_drawn_find(t->basis, t->compare, t->wanted, item, shown);
+  if (result == SUPINE_EXIT_OK) {
+    supine_command_drawn_value(t->basis, t->compare, t->reference, shown, t->ends);
+  }
+  return result;
+}
+
+static supine_picture make_picture(turning *t, supine_panel *panel, char *label) {
+  supine_picture picture =
+      supine_command_drawing_picture(t->basis, t->wanted, t->reference_name, t->ends, 1, label);
+  picture.panel = panel;
+  picture.extent = (const double(*)[4])t->extent;
+  return picture;
+}
+
+/* What colours and frames reach over the whole turn, so that nothing jumps; an exit code. */
+static int measure(turning *t, supine_command_drawn *shown) {
+  static const double none[4] = SUPINE_EXTENT_NONE;
+  supine_posture_item item;
+  char label[128];
+  int result = SUPINE_EXIT_OK;
+  for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
+    memcpy(t->extent[view], none, sizeof none);
+  }
+  for (size_t frame = 0; frame < t->count && result == SUPINE_EXIT_OK; ++frame) {
+    result = find_frame(t, frame, &item, shown);
+    supine_panel panel = supine_command_drawn_panel(t->wanted, shown, item.name, item.gravity);
+    const supine_picture picture = make_picture(t, &panel, label);
+    if (result == SUPINE_EXIT_OK) {
+      supine_render_picture_extent(t->renderer, &picture, t->extent);
+    }
+  }
+  return result;
+}
+
+/* Every frame into the animation. */
+static supine_status play(turning *t, supine_command_drawn *shown, supine_animation *animation,
+                          supine_error *error) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_posture_item item;
+  supine_status status = SUPINE_OK;
+  for (size_t frame = 0; frame < t->count && status == SUPINE_OK; ++frame) {
+    char label[128];
+    if (find_frame(t, frame, &item, shown) != SUPINE_EXIT_OK) { /* it was found before */
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a frame");
+    }
+    if (status == SUPINE_OK && t->inside != NULL) {
+      status = supine_command_marks_make(t->inside, &t->names, shown->weights, shown->scales,
+                                         t->reference != NULL ? t->reference->weights : NULL,
+                                         t->reference != NULL ? t->reference->scales : NULL,
+                                         &shown->marks, error);
+    }
+    supine_panel panel = supine_command_drawn_panel(t->wanted, shown, item.name, item.gravity);
+    const supine_picture picture = make_picture(t, &panel, label);
+    if (status == SUPINE_OK) {
+      status =
+          supine_render_animation_add(animation, t->renderer, &picture,
+                                      frame + 1 < t->count ? 1000 / PER_SECOND : PAUSE_MS, error);
+    }
+    supine_command_marks_free(&shown->marks);
+    if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)t->count)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  supine_options_progress_end(&progress);
+  return status;
+}
+
+/* Draws all frames of a turn whose parts are made, into a file that can be written. */
+static int animate(turning *t, supine_command_drawn *shown) {
+  supine_animation *animation = NULL;
+  supine_output output = {0};
+  supine_error error;
+  char label[128];
+  supine_panel panel;
+  int result = measure(t, shown);
+  const supine_picture picture = make_picture(t, &panel, label);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  supine_status status = supine_output_open(t->wanted->output, &output, &error);
+  if (status == SUPINE_OK) {
+    status = supine_render_animation_open(picture.width, picture.height, &animation, &error);
+  }
+  supine_options_signals_catch(true);
+  if (status == SUPINE_OK) {
+    status = play(t, shown, animation, &error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_render_animation_write(animation, output.file, &error);
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* why a write failed, it knows */
+      status = supine_output_commit(&output, &error);
+    }
+  }
+  supine_output_abandon(&output);
+  supine_render_animation_close(animation);
+  if (status != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  (void)printf("%s: %zu x %zu pixels, %zu frames\n", t->wanted->output, picture.width,
+               picture.height, t->count);
+  return supine_options_finish(name);
+}
+
+int supine_command_drawing_turn(const supine_basis *basis, const supine_command_drawing *wanted,
+                                const supine_posture_item *reference) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const double frames = floor(wanted->turn.seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0;
+  turning t = {.basis = basis, .wanted = wanted};
+  supine_command_drawn shown[2] = {{.value = NULL}}; /* a frame; the reference */
+  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  int result = SUPINE_EXIT_OK;
+  if (!(frames <= FRAMES_MAX)) {
+    return supine_options_usage(name, "a turn of %g s is more than %d frames", wanted->turn.seconds,
+                                FRAMES_MAX);
+  }
+  t.count = frames < 2.0 ? 2 : (size_t)frames;
+  float *values = malloc(2 * n * sizeof *values);
+  supine_status status =
+      values != NULL ? supine_compare_create(basis, &t.compare, &error) : SUPINE_ERROR_MEMORY;
+  status = status == SUPINE_OK ? supine_render_create(basis, &t.renderer, &error) : status;
+  if (status == SUPINE_OK && wanted->inside != NULL) {
+    status = supine_command_inside_open(basis, wanted->inside, &t.inside, &t.names, &error);
+  }
+  if (status != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  shown[0].value = values;
+  shown[1].value = values + n;
+  if (reference != NULL) {
+    result = supine_command_drawn_find(basis, t.compare, wanted, reference, &shown[1]);
+    t.reference = &shown[1];
+    t.reference_name = reference->name;
+  }
+  result = result == SUPINE_EXIT_OK ? animate(&t, &shown[0]) : result;
+cleanup:
+  supine_command_names_close(&t.names);
+  supine_basis_close(t.inside);
+  supine_render_destroy(t.renderer);
+  supine_compare_destroy(t.compare);
+  free(values);
+  return result;
+}

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine embed: what is inside the lungs, made to move with them. */
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "sh/base/text.h"
+
+#include "mesh/image/image.h"
+#include "mesh/labels/shapes.h"
+#include "precompute/inside/embed.h"
+#include "precompute/inside/grid.h"
+
+#include "program/options/command.h"
+
+static const char name[] = "embed";
+
+/* Room around the lungs in which 'supine deform' lets a field fade out, mm. */
+static const double margin = 60.0;
+
+enum { LABELS_MOST = 64 };
+
+/* Labels by number; a name of NULL: "label 7". */
+typedef struct label_list {
+  bool given;
+  size_t count; /* 0: all */
+  unsigned label[LABELS_MOST];
+  char name[LABELS_MOST][32];
+} label_list;
+
+typedef struct request {
+  const char *path;
+  label_list labels;
+  bool has_grid;
+  double grid; /* mm */
+  bool clamp;
+  supine_mesh_load_options load;
+} request;
+
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+/* "all", "7", "7=nodule,8=vessels" */
+static int read_labels(const char *command, const char *text, void *field) {
+  label_list *list = field;
+  (void)command;
+  list->given = true;
+  list->count = 0;
+  for (const char *at = text; strcmp(text, "all") != 0;) {
+    const size_t length = strcspn(at, ",");
+    const size_t digits = strspn(at, "0123456789");
+    const bool named = digits < length && at[digits] == '=';
+    if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
+        length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
+      return SUPINE_OPTION_MISFIT;
+    }
+    char *called = list->name[list->count];
+    list->label[list->count] = (unsigned)strtoul(at, NULL, 10);
+    (void)snprintf(called, sizeof list->name[0], "%s%.*s", named ? "" : "label ",
+                   (int)(named ? length - digits - 1 : digits), named ? at + digits + 1 : at);
+    ++list->count;
+    at += length;
+    if (*at++ == '\0') {
+      break;
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "basis of what is inside, a safetensors file",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
+    {"grid", 0, "MM",
+     "nodes this far apart over the lungs, for displacement fields; with an image as CONTENT, "
+     "about as far, every n-th of its voxels",
+     SUPINE_FILLS(request, grid), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
+     SUPINE_ABOVE_ZERO, .wants = "millimetres"},
+    {"labels", 0, "all|N[=NAME],...",
+     "images as CONTENT are label maps: the surface of each of these labels is a part, by name, "
+     "beside points and meshes",
+     SUPINE_FILLS(request, labels), .read = read_labels,
+     .wants = "all, or at most 64 labels with names of up to 31 letters, as 7=nodule,8=vessels"},
+    {"clamp", 0, NULL,
+     "what lies outside the lungs moves as the nearest point of their surface, instead of as the "
+     "inside would if it went on",
+     SUPINE_FILLS(request, clamp)},
+    {"axes", 0, "LPS|RAS", "axes of points and meshes; default: their SPACE tag, else LPS (DICOM)",
+     SUPINE_FILLS(request, load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {.name = NULL}};
+
+/* The nodes of a grid: of its own, or of an image's voxels. */
+static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
+                               const char *image_path, supine_inside_content *content,
+                               supine_error *error) {
+  if (image_path == NULL) {
+    return supine_inside_content_grid(shells, NULL, wanted->grid, margin, content, error);
+  }
+  supine_image image = {0};
+  const supine_status status = supine_image_read(image_path, &image, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_inside_grid like;
+  memcpy(like.size, image.size, sizeof like.size);
+  memcpy(like.origin, image.origin, sizeof like.origin);
+  memcpy(like.step, image.step, sizeof like.step);
+  supine_image_free(&image);
+  return supine_inside_content_grid(shells, &like, wanted->grid, margin, content, error);
+}
+
+/* The labels of a map, each a part. */
+static supine_status read_labelled(const request *wanted, const char *path,
+                                   supine_inside_content *content, supine_error *error) {
+  supine_labels_shape *parts = NULL;
+  size_t count = 0;
+  const label_list *list = &wanted->labels;
+  supine_status status =
+      supine_labels_shapes(path, list->label, list->count, &parts, &count, error);
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    char text[32];
+    (void)snprintf(text, sizeof text, "label %u", parts[i].label);
+    const char *part = list->count > 0 ? list->name[i] : text;
+    if (parts[i].surface.triangle_count == 0) {
+      supine_options_say(name, "%s: %s is thinner than half a voxel everywhere: left out", path,
+                         part);
+      continue;
+    }
+    supine_options_say(name,
+                       "%s: %s, %.3g mL of voxels, %.3g mL within its surface, which is "
+                       "within %.2g mm of them",
+                       path, part, parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface),
+                       parts[i].farthest);
+    status = supine_inside_content_surface(part, &parts[i].surface, content, error);
+  }
+  supine_labels_shapes_free(parts, count);
+  return status;
+}
+
+static supine_status read_content(const supine_inside_shells *shells, const request *wanted,
+                                  char **paths, size_t count, supine_inside_content *content,
+                                  supine_error *error) {
+  if (count == 0 || (!wanted->labels.given && supine_image_is_named(paths[0]))) {
+    return read_grid(shells, wanted, count > 0 ? paths[0] : NULL, content, error);
+  }
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    status = supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
+             : supine_text_ends_in_any_case(paths[i], ".csv")
+                 ? supine_inside_content_points(paths[i], &wanted->load, content, error)
+                 : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
+  }
+  return status;
+}
+
+/* Name of a part, "nodule 3". */
+static void part_name(const supine_inside_content *content, size_t point, char *text, size_t size) {
+  const char *at = content->names;
+  for (uint32_t part = 0; part < content->part[point]; ++part) {
+    at = strchr(at, '\n') + 1;
+  }
+  (void)snprintf(text, size, "%.*s", (int)strcspn(at, "\n"), at);
+}
+
+static void tell(const supine_inside_shells *shells, const supine_inside_content *content,
+                 const supine_inside_report *report, const request *wanted) {
+  const supine_basis_info *info = supine_basis_get_info(shells->basis);
+  const bool grid = content->part_count == 0;
+  (void)printf("%s: %zu %s", wanted->path, report->count,
+               grid                          ? "nodes"
+               : content->triangle_count > 0 ? "vertices and points"
+                                             : "points");
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    (void)printf("%s%zu %s", lung == 0 ? ": " : ", ", report->in_lung[lung],
+                 info->lung_names[lung]);
+  }
+  if (grid) {
+    (void)printf("; grid of %zu x %zu x %zu", content->grid.size[0], content->grid.size[1],
+                 content->grid.size[2]);
+  }
+  (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
+  if (shells->scan_scale != 0.0) {
+    (void)printf(
+        "taken to be where the scan was, %.0f mL below full inflation; the file holds it at "
+        "full inflation\n",
+        -info->scan_volume);
+  }
+  if (report->centres < report->surface) {
+    (void)printf("interpolated from %zu of %zu vertices; at the others that leaves %.2g %% of the "
+                 "motion,\nwhich is added near the surface\n",
+                 report->centres, report->surface, report->left_percent);
+  }
+  if (report->outside > 0 && !grid) {
+    char text[64];
+    part_name(content, report->farthest, text, sizeof text);
+    (void)printf("outside the lungs: %zu of %zu, at most %.1f mm (%s); they move as %s\n",
+                 report->outside, report->count, report->farthest_mm, text,
+                 wanted->clamp ? "the surface next to them"
+                               : "the inside would if it went on, unless --clamp is given");
+    if (2 * report->outside > report->count && report->farthest_mm > 50.0) {
+      (void)printf("most are outside: if the content is RAS, as of 3D Slicer or ITK-SNAP, add "
+                   "--axes RAS\n");
+    }
+  }
+}
+
+static int embed(const supine_basis *basis, const request *wanted, const supine_arguments *given) {
+  supine_inside_shells shells = {0};
+  supine_inside_content content = {0};
+  supine_inside_report report;
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  const supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
+  if (supine_inside_shells_create(basis, &shells, &error) != SUPINE_OK ||
+      read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, &error) !=
+          SUPINE_OK ||
+      supine_inside_embed(&shells, &content, &options, wanted->path, &report, &error) !=
+          SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    tell(&shells, &content, &report, wanted);
+    result = supine_options_finish(name);
+  }
+  supine_inside_content_free(&content);
+  supine_inside_shells_free(&shells);
+  return result;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  supine_basis *basis = NULL;
+  supine_error error;
+  bool image = false;
+  for (size_t i = 1; i < given->count; ++i) {
+    image = image || supine_image_is_named(given->operand[i]);
+  }
+  if (given->count == 1 && !wanted->has_grid) {
+    return supine_options_usage(name, "which content? Name points (.csv), meshes or an image, or "
+                                      "give --grid MM");
+  }
+  if (wanted->labels.given && (!image || wanted->has_grid)) {
+    return supine_options_usage(name, image ? "--labels takes surfaces, --grid voxels: one of the "
+                                              "two"
+                                            : "--labels is of label maps: name one (.nrrd, .nii, "
+                                              ".nii.gz)");
+  }
+  if (!wanted->labels.given && image && given->count > 2) {
+    return supine_options_usage(name,
+                                "a grid, or an image, goes into a file of its own; of a label "
+                                "map, --labels takes the parts");
+  }
+  if (!image && given->count > 1 && wanted->has_grid) {
+    return supine_options_usage(name, "a grid, or an image, goes into a file of its own");
+  }
+  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  const int result = embed(basis, wanted, given);
+  supine_basis_close(basis);
+  return result;
+}
+
+const supine_command supine_command_embed = {
+    name,
+    "let points, meshes or a grid inside move with the lungs",
+    .usage = "BASIS CONTENT... -o FILE\n"
+             "BASIS --grid MM -o FILE",
+    .about =
+        "Makes a basis of what is inside the lungs of a basis: points (a CSV file with the columns "
+        "x, y, z and name), meshes (airways, vessels, nodules), the parts of a label map, or the "
+        "nodes of a grid, of its own or of an image (.nrrd, .nii, .nii.gz). It moves with the "
+        "lungs' own weights and breath, "
+        "through every command that reads a basis.\n"
+        "\n"
+        "Displacements inside are the biharmonic interpolation of the surface's, lung by lung: a "
+        "point on the surface moves with it, and an affine motion goes on inside.",
+    .options = table,
+    .notes =
+        "Examples:\n"
+        "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
+        "  supine deform inside.safetensors --posture prone -o prone.csv\n"
+        "  supine embed lungs.safetensors labels.nii.gz --labels 7=nodule -o inside.safetensors\n"
+        "  supine embed lungs.safetensors ct.nii.gz -o grid.safetensors\n"
+        "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
+    .operands_least = 1,
+    .operands_most = SIZE_MAX,
+    .operands_missing = "name a basis file (made by 'supine precompute'), then what is inside",
+    .request_size = sizeof(request),
+    .run = run};

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine export: a basis as a page for the browser, or as glTF morph targets. */
+#include <string.h>
+#include <strings.h>
+
+#include <export.h>
+
+#include "program/inside.h"
+#include "program/options/basis_input.h"
+
+static const char name[] = "export";
+typedef struct request {
+  const char *path;
+  const char *title;
+  double volume;
+  double largest;
+  bool page;
+  bool glb_only; /* an option was given that a page has no use for */
+  const char *inside;
+  export_glb_options glb;
+} request;
+
+static int read_profile(const char *command, const char *text, void *field) {
+  static const char *const names[] = {"raw", "8", "clamp-safe", "8,clamp-safe"};
+  enum { NAMES = sizeof names / sizeof *names };
+  export_glb_options *glb = field;
+  for (size_t i = 0; i < NAMES; ++i) {
+    if (strcmp(text, names[i]) == 0) {
+      glb->eight = i == 1 || i == 3;
+      glb->clamp_safe = i >= 2;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  const char *nearest = supine_options_suggest(text, names, NAMES);
+  return supine_options_usage(command, "no profile '%s'%s%s", text,
+                              nearest != NULL ? "; did you mean " : ": raw, 8 or clamp-safe",
+                              nearest != NULL ? nearest : "");
+}
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE",
+     ".html: a page to explore the lungs in a browser: one file, no network; bases of up to 16 "
+     "modes\n"
+     ".glb: glTF 2.0 morph targets: any engine deforms the lungs",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
+     .endings = ".html or .glb"},
+    {"volume", 0, "ML",
+     "depth of the breath that is played, and up to which clamp-safe weights stay within 0 and 1",
+     SUPINE_FILLS(request, volume), .standard = "500", SUPINE_ABOVE_ZERO,
+     .wants = "millilitres above 0"},
+    {"scale", 0, "MM",
+     "the same for an open surface, which has no volume: largest displacement when supine",
+     SUPINE_FILLS(request, largest), .standard = "10", SUPINE_ABOVE_ZERO,
+     .wants = "millimetres above 0"},
+    {"inside", 0, "FILE",
+     "what is inside, of 'supine embed' from the same basis: moves along, seen through the lungs, "
+     "points as balls of 4 mm. On a page each part has its name and how far it has moved, at the "
+     "pointer and in a table; in glTF each is a material of its name",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
+    {.help = "Of a page:"},
+    {"title", 0, "TEXT", "its title; default the name of the basis file",
+     SUPINE_FILLS(request, title)},
+    {.help = "Of glTF:"},
+    {"profile", 0, "NAME",
+     "raw: a target for each mode of the basis; weights of either sign (default)\n"
+     "8: at most eight targets, for engines that promise no more: the best eight; says what they "
+     "leave out\n"
+     "clamp-safe: weights within 0 and 1 for every posture and every breath up to --volume, for "
+     "engines that clamp them: the base is shifted and the targets are rescaled, so that rest is "
+     "not at weight 0\n"
+     "8,clamp-safe: both",
+     SUPINE_FILLS(request, glb), .read = read_profile, SUPINE_SAYS_GIVEN(request, glb_only)},
+    {"quantise", 0, NULL,
+     "targets' positions as 16-bit integers (KHR_mesh_quantization): a tenth smaller, within a "
+     "hundredth of a millimetre",
+     SUPINE_FILLS(request, glb.quantise), .alias = "quantize",
+     SUPINE_SAYS_GIVEN(request, glb_only)},
+    {"animate", 0, NULL,
+     "adds an animation: the patient breathes, and turns from the back over the left side onto "
+     "the belly and on",
+     SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
+    {.name = NULL}};
+
+static int write_glb(const export_source *source, const request *wanted) {
+  export_glb_report report = {0};
+  supine_error error;
+  if (supine_export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  (void)printf("%s: %zu morph targets%s, %.1f MB\n", wanted->path, report.targets,
+               wanted->glb.animate ? " and an animation" : "", 1e-6 * (double)report.bytes);
+  if (report.targets < source->info->mode_count) {
+    (void)printf("  of %zu modes: leaves out %.3g %% of the RMS displacement\n",
+                 source->info->mode_count, report.loss_percent);
+  }
+  return supine_options_finish(name);
+}
+
+static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
+  supine_error error;
+  const char *slash = strrchr(basis_path, '/');
+  const export_page page = {.breath = wanted->glb.breath,
+                            .title = wanted->title != NULL ? wanted->title
+                                     : slash != NULL       ? slash + 1
+                                                           : basis_path,
+                            .inside = wanted->glb.inside,
+                            .parts = wanted->glb.parts};
+  if (supine_export_html_write(wanted->path, source, &page, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
+  if (page.inside != NULL) {
+    (void)printf(" and what is inside, %zu name%s", page.parts->count,
+                 page.parts->count == 1 ? "" : "s");
+  }
+  (void)puts("; open it in any browser");
+  return supine_options_finish(name);
+}
+
+static int write_either(const export_source *source, const request *wanted, const char *path) {
+  return wanted->page ? write_page(source, wanted, path) : write_glb(source, wanted);
+}
+
+/* The same with what is inside, which must be of these lungs. */
+static int write_with_inside(const export_source *source, request *wanted, const char *path) {
+  export_source inside = {0};
+  supine_command_names names = {0};
+  supine_error error;
+  supine_status status = supine_export_source_open(wanted->inside, &inside, &error);
+  if (status == SUPINE_OK) {
+    status = supine_command_names_open(inside.basis, &names, &error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, &error);
+  }
+  int result = SUPINE_EXIT_OK;
+  if (status != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    const export_parts parts = {names.count, names.text, names.part};
+    wanted->glb.inside = &inside;
+    wanted->glb.parts = &parts;
+    result = write_either(source, wanted, path);
+  }
+  supine_command_names_close(&names);
+  supine_export_source_close(&inside);
+  return result;
+}
+
+static int export_basis(const char *path, request *wanted) {
+  export_source source = {0};
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  if (supine_export_source_open(path, &source, &error) != SUPINE_OK ||
+      supine_export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath,
+                               &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    result = wanted->inside != NULL ? write_with_inside(&source, wanted, path)
+                                    : write_either(&source, wanted, path);
+  }
+  supine_export_source_close(&source);
+  return result;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other: .glb */
+  if (wanted->page && wanted->glb_only) {
+    return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
+  }
+  if (!wanted->page && wanted->title != NULL) {
+    return supine_options_usage(name, "--title is for .html");
+  }
+  return export_basis(given->operand[0], wanted);
+}
+
+const supine_command supine_command_export = {
+    name,
+    "write a basis as a page or as glTF morph targets",
+    .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
+    .about = "Writes a basis file in a form that other programs play; the ending of the name "
+             "chooses it.",
+    .options = table,
+    .notes =
+        "In the .glb, the mesh's extras name the targets and say how their weights follow from "
+        "gravity and volume: weight k is (s times mode k's sum over Y_lm(g), less offset k) over "
+        "unit k.\n"
+        "\n"
+        "Examples:\n"
+        "  supine export lungs.safetensors -o lungs.html\n"
+        "  supine export lungs.safetensors -o lungs.glb --animate\n"
+        "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
+        "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --volume 1000",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

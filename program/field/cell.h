@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Trilinear interpolation, for the files of this folder. */
+#ifndef SUPINE_FIELD_CELL_H
+#define SUPINE_FIELD_CELL_H
+
+#include "program/field/field.h"
+
+/* Where a point lies among the voxels: the cell's first corner, and how far in it, 0 to 1. */
+typedef struct supine_field_cell {
+  size_t corner[3];
+  double share[3];
+} supine_field_cell;
+
+/* The nearest cell, at its border where the point lies outside. */
+void supine_field_find_cell(const supine_image *image, const double point[3],
+                            supine_field_cell *cell);
+
+/* All channels there, and optionally their derivative [channels, 3] by the shares. */
+void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
+                              double *values, double (*slope)[3]);
+
+#endif

@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A field from a basis's grid, faded out around it; its value anywhere. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/vec3.h"
+
+#include "program/field/cell.h"
+
+/* The tensors of a grid, checked: a file may hold anything. */
+static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
+                               const uint32_t **part, const float **depth, supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const supine_tensor *grid = supine_basis_tensor(basis, "grid");
+  const supine_tensor *size = supine_basis_tensor(basis, "grid_size");
+  const supine_tensor *of = supine_basis_tensor(basis, "part");
+  const supine_tensor *deep = supine_basis_tensor(basis, "depth");
+  if (grid == NULL || size == NULL || of == NULL || deep == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis is of no grid: make one with 'supine embed BASIS --grid MM' "
+                            "or 'supine embed BASIS IMAGE'");
+  }
+  bool well = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
+              grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
+              size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&
+              of->shape[0] == n && deep->dtype == SUPINE_F32 && deep->rank == 1 &&
+              deep->shape[0] == n;
+  double count = 1.0;
+  for (size_t k = 0; k < 3 && well; ++k) {
+    nodes->size[k] = ((const uint32_t *)size->data)[k];
+    count *= (double)nodes->size[k];
+    well = nodes->size[k] >= 2;
+  }
+  well = well && count < 2147483648.0;
+  for (size_t i = 0; i < 12 && well; ++i) {
+    const double value = ((const double *)grid->data)[i];
+    *(i < 3 ? &nodes->origin[i] : &nodes->step[i / 3 - 1][i % 3]) = value;
+    well = isfinite(value);
+  }
+  for (size_t i = 0; i < n && well; ++i) {
+    well = ((const uint32_t *)of->data)[i] < count;
+  }
+  double axes[3] = {0.0, 0.0, 0.0};
+  if (well) {
+    supine_image_locate(nodes, axes, axes); /* not finite where the steps are no frame */
+  }
+  if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "the basis's grid is malformed");
+  }
+  *part = of->data;
+  *depth = deep->data;
+  return SUPINE_OK;
+}
+
+/* Mean of the neighbours of node i that a pass before this one has set; false where there is none.
+ */
+static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
+                           size_t i, float mean[3]) {
+  const float *u = nodes->values;
+  const size_t stride[3] = {1, nodes->size[0], nodes->size[0] * nodes->size[1]};
+  size_t count = 0;
+  mean[0] = mean[1] = mean[2] = 0.0F;
+  for (size_t a = 0; a < 3; ++a) {
+    const size_t at = i / stride[a] % nodes->size[a];
+    for (int side = 0; side < 2; ++side) {
+      if (side == 0 ? at == 0 : at + 1 == nodes->size[a]) {
+        continue;
+      }
+      const size_t j = side == 0 ? i - stride[a] : i + stride[a];
+      if (known[j] != 0 && known[j] != now) {
+        ++count;
+        for (size_t k = 0; k < 3; ++k) {
+          mean[k] += u[3 * j + k];
+        }
+      }
+    }
+  }
+  for (size_t k = 0; k < 3 && count > 0; ++k) {
+    mean[k] /= (float)count;
+  }
+  return count > 0;
+}
+
+/* Layer by layer outwards, each a share less, so that it falls linearly to 0. `known` is 1 where
+ * the basis has a node; the layers are 2 and 3 in turn. */
+static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
+  float *u = nodes->values;
+  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  double step = INFINITY;
+  for (int a = 0; a < 3; ++a) {
+    const double *s = nodes->step[a];
+    step = fmin(step, supine_length(s));
+  }
+  const size_t layers = (size_t)fmin(ceil(fade / step), 1000.0);
+  for (size_t layer = 1; layer < layers; ++layer) {
+    const float share = (float)(layers - layer) / (float)(layers - layer + 1);
+    const unsigned char now = layer % 2 == 1 ? 2 : 3;
+    bool any = false;
+    for (size_t i = 0; i < count; ++i) {
+      float mean[3];
+      if (known[i] == 0 && mean_neighbour(nodes, known, now, i, mean)) {
+        known[i] = now;
+        any = true;
+        for (size_t k = 0; k < 3; ++k) {
+          u[3 * i + k] = share * mean[k];
+        }
+      }
+    }
+    if (!any) {
+      break;
+    }
+    /* The layer before this one no longer differs from what is known. */
+    for (size_t i = 0; i < count; ++i) {
+      known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
+    }
+  }
+}
+
+static void place_node(const supine_image *nodes, size_t i, double place[3]) {
+  const double at[3] = {(double)(i % nodes->size[0]), (double)(i / nodes->size[0] % nodes->size[1]),
+                        (double)(i / nodes->size[0] / nodes->size[1])};
+  for (int k = 0; k < 3; ++k) {
+    place[k] = nodes->origin[k] + at[0] * nodes->step[0][k] + at[1] * nodes->step[1][k] +
+               at[2] * nodes->step[2][k];
+  }
+}
+
+supine_status supine_field_create(const supine_basis *basis, const double *weights,
+                                  const double *scales, double fade, supine_field *field,
+                                  supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
+  const uint32_t *part = NULL;
+  const float *depth = NULL;
+  supine_status status = read_grid(basis, &made.nodes, &part, &depth, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const size_t count = made.nodes.size[0] * made.nodes.size[1] * made.nodes.size[2];
+  float *moved = malloc(3 * n * sizeof *moved);
+  unsigned char *known = calloc(count, 1);
+  float *u = calloc(3 * count, sizeof *u);
+  made.inside = calloc(count, 1);
+  made.nodes.values = u;
+  if (moved == NULL || known == NULL || u == NULL || made.inside == NULL) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
+    supine_field_free(&made);
+  } else {
+    supine_displace_range(basis, weights, scales, 0, n, moved);
+    for (size_t i = 0; i < n; ++i) { /* from the scan's node, which full inflation may have moved */
+      double node[3];
+      place_node(&made.nodes, part[i], node);
+      for (size_t k = 0; k < 3; ++k) {
+        u[3 * (size_t)part[i] + k] =
+            (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
+      }
+      known[part[i]] = 1;
+      made.inside[part[i]] = depth[i] > 0.0F;
+    }
+    fade_out(&made.nodes, known, fade);
+    *field = made;
+  }
+  free(moved);
+  free(known);
+  return status;
+}
+
+void supine_field_free(supine_field *field) {
+  supine_image_free(&field->nodes);
+  free(field->inside);
+  *field = (supine_field){0};
+}
+
+void supine_field_at(const supine_field *field, const double point[3], double u[3]) {
+  supine_field_cell cell;
+  supine_field_find_cell(&field->nodes, point, &cell);
+  supine_field_interpolate(&field->nodes, &cell, u, NULL);
+}

@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The inverse of a field, node by node, and what the two together miss. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
+
+#include "program/field/cell.h"
+
+static const double close_enough = 1e-5; /* mm */
+static const double lost_beyond = 0.01;  /* mm */
+
+/* x + u(x) - y, and its derivative by the cell's shares: that of x, the steps, and of u. */
+static double misfit(const supine_field *field, const double x[3], const double y[3],
+                     double residual[3], double (*slope)[3]) {
+  supine_field_cell cell;
+  double u[3];
+  supine_field_find_cell(&field->nodes, x, &cell);
+  supine_field_interpolate(&field->nodes, &cell, u, slope);
+  for (int k = 0; k < 3; ++k) {
+    residual[k] = x[k] + u[k] - y[k];
+    for (int a = 0; a < 3 && slope != NULL; ++a) {
+      slope[k][a] += field->nodes.step[a][k];
+    }
+  }
+  return supine_length(residual);
+}
+
+/* The step in shares that takes the residual away: Cramer's rule; false where the field folds. */
+static bool newton(const double m[3][3], const double residual[3], double step[3]) {
+  double adjugate[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const int p = (j + 1) % 3;
+      const int q = (j + 2) % 3;
+      const int r = (i + 1) % 3;
+      const int s = (i + 2) % 3;
+      adjugate[i][j] = m[p][r] * m[q][s] - m[p][s] * m[q][r];
+    }
+  }
+  const double determinant =
+      m[0][0] * adjugate[0][0] + m[0][1] * adjugate[1][0] + m[0][2] * adjugate[2][0];
+  for (int i = 0; i < 3; ++i) {
+    step[i] = -supine_dot(adjugate[i], residual) / determinant;
+  }
+  return isfinite(step[0] + step[1] + step[2]);
+}
+
+/* x with x + u(x) = y from the x that is there; how far off it is. Newton's steps, halved until
+ * they help: the field's derivative jumps between cells. */
+static double solve(const supine_field *field, const double y[3], double x[3]) {
+  enum { STEPS = 40, HALVINGS = 6 };
+  double residual[3];
+  double slope[3][3];
+  double off = misfit(field, x, y, residual, slope);
+  for (int i = 0; i < STEPS && off > close_enough; ++i) {
+    double step[3];
+    if (!newton((const double(*)[3])slope, residual, step)) {
+      break;
+    }
+    double better = INFINITY;
+    double next[3];
+    for (int halving = 0; halving < HALVINGS && !(better < off); ++halving) {
+      const double share = ldexp(1.0, -halving);
+      for (int k = 0; k < 3; ++k) {
+        next[k] = x[k];
+        for (int a = 0; a < 3; ++a) {
+          next[k] += share * step[a] * field->nodes.step[a][k];
+        }
+      }
+      better = misfit(field, next, y, residual, slope);
+    }
+    if (!(better < off)) {
+      break;
+    }
+    memcpy(x, next, sizeof next);
+    off = better;
+  }
+  return off;
+}
+
+typedef struct inversion {
+  const supine_field *field;
+  supine_field *inverse;
+  unsigned char *lost; /* of each row's nodes */
+} inversion;
+
+static void node_at(const supine_image *nodes, size_t i, size_t j, size_t k, double point[3]) {
+  for (int a = 0; a < 3; ++a) {
+    point[a] = nodes->origin[a] + (double)i * nodes->step[0][a] + (double)j * nodes->step[1][a] +
+               (double)k * nodes->step[2][a];
+  }
+}
+
+static void invert_rows(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const inversion *work = context;
+  const supine_image *nodes = &work->field->nodes;
+  float *v = work->inverse->nodes.values;
+  for (size_t row = begin; row < end; ++row) {
+    for (size_t i = 0; i < nodes->size[0]; ++i) {
+      const size_t node = row * nodes->size[0] + i;
+      double y[3];
+      double u[3];
+      double x[3];
+      node_at(nodes, i, row % nodes->size[1], row / nodes->size[1], y);
+      supine_field_at(work->field, y, u);
+      for (int k = 0; k < 3; ++k) {
+        x[k] = y[k] - u[k];
+      }
+      double off = solve(work->field, y, x);
+      if (off > lost_beyond) { /* once more, from the node itself */
+        double other[3];
+        memcpy(other, y, sizeof other);
+        const double again = solve(work->field, y, other);
+        if (again < off) {
+          off = again;
+          memcpy(x, other, sizeof x);
+        }
+      }
+      work->lost[node] = off > lost_beyond;
+      for (size_t k = 0; k < 3; ++k) {
+        v[3 * node + k] = (float)(x[k] - y[k]);
+      }
+    }
+  }
+}
+
+/* Forward and back again, from every node inside. */
+static void measure(const supine_field *field, const supine_field *inverse,
+                    supine_field_residual *residual) {
+  const supine_image *nodes = &field->nodes;
+  const float *u = nodes->values;
+  size_t count = 0;
+  double sum = 0.0;
+  for (size_t node = 0; node < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++node) {
+    if (field->inside[node] == 0) {
+      continue;
+    }
+    double x[3];
+    double back[3];
+    node_at(nodes, node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
+            node / nodes->size[0] / nodes->size[1], x);
+    for (size_t k = 0; k < 3; ++k) {
+      x[k] += (double)u[3 * node + k];
+    }
+    supine_field_at(inverse, x, back);
+    for (size_t k = 0; k < 3; ++k) {
+      back[k] += (double)u[3 * node + k];
+    }
+    const double off = supine_length(back);
+    residual->largest = fmax(residual->largest, off);
+    sum += off * off;
+    ++count;
+  }
+  residual->rms = count > 0 ? sqrt(sum / (double)count) : 0.0;
+}
+
+supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
+                                  supine_field_residual *residual, supine_error *error) {
+  const supine_image *nodes = &field->nodes;
+  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  supine_field made = {.nodes = *nodes};
+  made.nodes.values = malloc(3 * count * sizeof(float));
+  made.inside = malloc(count);
+  unsigned char *lost = malloc(count);
+  supine_status status = SUPINE_OK;
+  *residual = (supine_field_residual){0};
+  if (made.nodes.values == NULL || made.inside == NULL || lost == NULL) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
+    supine_field_free(&made);
+  } else {
+    inversion work = {field, &made, lost};
+    memcpy(made.inside, field->inside, count);
+    supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, invert_rows, &work);
+    for (size_t i = 0; i < count; ++i) {
+      residual->lost += lost[i];
+    }
+    measure(field, &made, residual);
+    *inverse = made;
+  }
+  free(lost);
+  return status;
+}

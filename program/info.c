@@ -1,0 +1,303 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine info: what a basis file holds and how exact it is. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include <supine/compare.h>
+#include <supine/runtime.h>
+
+#include "program/options/basis_input.h"
+
+static const char name[] = "info";
+
+/* Share of the squared displacement in each band, [band + 1]; zeros where the surface has no area.
+ */
+static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
+  supine_compare *compare = NULL;
+  const supine_status status = supine_compare_create(basis, &compare, error);
+  if (status != SUPINE_OK) {
+    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
+  }
+  supine_compare_energy(compare, energy);
+  supine_compare_destroy(compare);
+  double total = 0.0;
+  const size_t band = supine_basis_get_info(basis)->band;
+  for (size_t l = 0; l <= band; ++l) {
+    total += energy[l];
+  }
+  for (size_t l = 0; l <= band; ++l) {
+    energy[l] /= total > 0.0 ? total : 1.0;
+  }
+  return SUPINE_OK;
+}
+
+static const char *const shown[] = {"assumed",        "patient",    "scanned",
+                                    "resting_shares", "law",        "route",
+                                    "force",          "direction",  "direction_constants",
+                                    "stiffness",      "midline_mm", "reference_volume_ml",
+                                    "lung_share",     "lesions",    "reach_mm",
+                                    "made_by"};
+static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
+                                     "error_max_percent", "error_volume_ml",   "error_rest_part",
+                                     "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+
+static const char turned_over[] = "turned_over_percent";
+
+static const char *text_of(const supine_basis *basis, const char *key) {
+  const char *value = supine_basis_metadata(basis, key);
+  return value != NULL ? value : "?";
+}
+
+/* The state that errors in mm are stated at, in words. */
+static void state_words(const supine_basis *basis, char *words, size_t size) {
+  const char *part = supine_basis_metadata(basis, "error_rest_part");
+  const char *volume = supine_basis_metadata(basis, "error_volume_ml");
+  if (part != NULL && strcmp(part, "1") != 0) {
+    (void)snprintf(words, size, "at %s of the way to rest", part);
+  } else if (volume != NULL) {
+    (void)snprintf(words, size, "at %s mL", volume);
+  } else {
+    (void)snprintf(words, size, part != NULL ? "at rest" : "of the fields as given");
+  }
+}
+
+/* How many of what is inside each lung, and how deep. */
+static void print_content(const supine_basis *basis, const char *content) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_tensor *tensor = supine_basis_tensor(basis, "depth");
+  const bool well = tensor != NULL && tensor->dtype == SUPINE_F32 && tensor->rank == 1 &&
+                    tensor->shape[0] == info->vertex_count;
+  const float *depth = well ? tensor->data : NULL;
+  size_t outside = 0;
+  (void)printf("  %zu %s", info->vertex_count,
+               strcmp(content, "grid") == 0   ? "nodes"
+               : strcmp(content, "mesh") == 0 ? "vertices and points"
+                                              : "points");
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)printf("%s%zu %s", lung == 0 ? ": " : ", ",
+                 info->lung_begin[lung + 1] - info->lung_begin[lung], info->lung_names[lung]);
+  }
+  for (size_t i = 0; depth != NULL && i < info->vertex_count; ++i) {
+    outside += depth[i] < 0.0F;
+  }
+  if (depth != NULL) {
+    (void)printf("; %zu of them outside", outside);
+  }
+  (void)printf("; %zu triangles; %s\n", info->triangle_count,
+               info->has_volume ? "volumes are the lungs'" : "no volumes");
+}
+
+static void print_text(const char *path, const supine_basis *basis, const double *energy) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const char *content = supine_basis_metadata(basis, "content");
+  char state[64];
+  state_words(basis, state, sizeof state);
+  (void)printf("%s: basis of %s%s%zu lung%s (%s), %s field\n", path, content != NULL ? content : "",
+               content != NULL ? " inside " : "", info->lung_count,
+               info->lung_count == 1 ? "" : "s", text_of(basis, "lungs"),
+               info->vector ? "vector" : "scalar");
+  if (content != NULL) {
+    print_content(basis, content);
+  } else {
+    (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
+                 info->has_volume ? "closed: volumes are exact" : "open: no volumes");
+  }
+  (void)printf(
+      "  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
+      info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
+      info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
+      info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
+  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
+    if (supine_basis_metadata(basis, shown[i]) != NULL) {
+      (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
+    }
+  }
+  if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
+    (void)printf(
+        "\nError%s against the full fields, on %s directions%s:\n"
+        "             RMS   95th percentile   largest\n"
+        "  %%   %10s   %15s   %7s   of the RMS displacement\n",
+        content != NULL ? " of the lungs' surface" : "", text_of(basis, "error_directions"),
+        supine_basis_metadata(basis, "error_method") != NULL ? ", each predicted from the others"
+                                                             : " that no grid used",
+        text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
+        text_of(basis, "error_max_percent"));
+    if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
+      (void)printf("  mm  %10s   %15s   %7s   %s\n", text_of(basis, "error_rms_mm"),
+                   text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"), state);
+    }
+  }
+  if (supine_basis_metadata(basis, turned_over) != NULL) {
+    (void)printf("\nTriangles that are turned over %s, in the worst of six postures: %s %%\n",
+                 state, text_of(basis, turned_over));
+  }
+  if (info->triangle_count == 0) {
+    return; /* energy is the surface's */
+  }
+  (void)puts("\nEnergy per band:");
+  double odd = 0.0;
+  double even = 0.0;
+  for (size_t l = 0; l <= info->band; ++l) {
+    odd += l % 2 == 1 ? energy[l] : 0.0;
+    even += l % 2 == 0 && l > 0 ? energy[l] : 0.0;
+    if (energy[l] >= 5e-8) {
+      (void)printf("  l = %-3zu %10.5f %%\n", l, 100.0 * energy[l]);
+    }
+  }
+  (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
+}
+
+/* A tensor of errors in the file, or NULL. */
+static const double *error_list(const supine_basis *basis, const char *key, size_t *count) {
+  const supine_tensor *tensor = supine_basis_tensor(basis, key);
+  if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {
+    *count = 0;
+    return NULL;
+  }
+  *count = tensor->shape[0];
+  return tensor->data;
+}
+
+/* Error against the number of functions of orientation, each a multiplication per vertex. */
+static void print_table(const supine_basis *basis) {
+  size_t bands;
+  size_t modes;
+  const double *harmonics = error_list(basis, "error_harmonics", &bands);
+  const double *best = error_list(basis, "error_modes", &modes);
+  if (harmonics == NULL || best == NULL) {
+    return;
+  }
+  (void)puts("\nRMS error against the number of multiplications:\n"
+             "             first harmonics     best modes");
+  for (size_t k = 1, l = 0; k <= modes || (l < bands && (l + 1) * (l + 1) <= 64); ++k) {
+    const bool square = l < bands && (l + 1) * (l + 1) == k;
+    if (square || k <= modes) {
+      (void)printf("  %4zu + 3  ", k);
+      if (square) {
+        (void)printf("  %8.3f %% (l <= %zu)", 100.0 * harmonics[l], l);
+        ++l;
+      } else {
+        (void)printf("%22s", "");
+      }
+      if (k <= modes) {
+        (void)printf("  %7.3f %%", 100.0 * best[k - 1]);
+      }
+      (void)putchar('\n');
+    }
+  }
+}
+
+static json_t *number_or_text(const char *text) {
+  double value;
+  return supine_options_parse_number(text, &value) ? json_real(value) : json_string(text);
+}
+
+static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  json_t *bands = json_array();
+  json_t *error = json_object();
+  for (size_t l = 0; l <= info->band; ++l) {
+    (void)json_array_append_new(bands, json_real(energy[l]));
+  }
+  for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
+    const char *value = supine_basis_metadata(basis, errors[i]);
+    if (value != NULL) {
+      (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
+    }
+  }
+  json_t *root =
+      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
+                text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
+                (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
+                (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
+                (int)info->has_volume, "kind", info->vector ? "vector" : "scalar",
+                "energy_per_band", bands, "error", error);
+  bool good = root != NULL;
+  for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
+    const char *value = supine_basis_metadata(basis, shown[i]);
+    good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
+  }
+  const char *folds = supine_basis_metadata(basis, turned_over);
+  good =
+      good && (folds == NULL || json_object_set_new(root, turned_over, number_or_text(folds)) == 0);
+  for (size_t i = 0; good && i < 2; ++i) {
+    static const char *const keys[] = {"error_harmonics", "error_modes"};
+    size_t count;
+    const double *values = error_list(basis, keys[i], &count);
+    json_t *list = json_array();
+    for (size_t k = 0; values != NULL && k < count; ++k) {
+      (void)json_array_append_new(list, json_real(values[k]));
+    }
+    good = json_object_set_new(root, keys[i], list) == 0;
+  }
+  good = good && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+  (void)putchar('\n');
+  json_decref(root);
+  return good;
+}
+
+typedef struct request {
+  bool json;
+} request;
+
+static const supine_option table[] = {
+    {"json", 0, NULL, "the same for programs", SUPINE_FILLS(request, json)}, {.name = NULL}};
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  const char *path = given->operand[0];
+  supine_basis *basis = NULL;
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  double *energy = NULL;
+  if (supine_basis_open(path, &basis, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
+  if (energy == NULL) {
+    supine_options_say(name, "out of memory");
+    result = SUPINE_EXIT_NUMERICAL;
+    goto cleanup;
+  }
+  if (band_energy(basis, energy, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
+  if (wanted->json && !print_json(path, basis, energy)) {
+    supine_options_say(name, "cannot print JSON: %s",
+                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    result = SUPINE_EXIT_OUTPUT;
+    goto cleanup;
+  }
+  if (!wanted->json) {
+    print_text(path, basis, energy);
+    print_table(basis);
+  }
+  result = supine_options_finish(name);
+cleanup:
+  free(energy);
+  supine_basis_close(basis);
+  return result;
+}
+
+const supine_command supine_command_info = {
+    name,
+    "say what a basis file holds and how exact it is",
+    .usage = "BASIS [--json]",
+    .about =
+        "Says what a basis file holds: lungs, functions of orientation, the model it was made "
+        "with, and its error, measured against the full solve on directions that no grid used.\n"
+        "\n"
+        "Energy per band is the share of the squared displacement, over the surface and all "
+        "orientations, that the harmonics of each band l carry. Odd bands change sign when "
+        "gravity does; the even bands beyond l = 0 are what makes prone more than the reverse of "
+        "supine.",
+    .options = table,
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .run = run};

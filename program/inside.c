@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What is inside lungs, beside them. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/inside.h"
+
+supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
+                                          const char *path, supine_error *error) {
+  const supine_basis_info *a = supine_basis_get_info(lungs);
+  const supine_basis_info *b = supine_basis_get_info(inside);
+  const size_t terms = (a->band + 1) * (a->band + 1);
+  const bool same = b->vector && a->mode_count == b->mode_count && a->band == b->band &&
+                    a->lung_count == b->lung_count &&
+                    memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
+  return same ? SUPINE_OK
+              : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                 "%s: not of this basis: make it with 'supine embed' from the very "
+                                 "basis that is shown",
+                                 path);
+}
+
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error) {
+  supine_status status = supine_basis_open(path, inside, error);
+  status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
+  return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+}
+
+/* Adds the marks of one part: its vertices, and its name at their middle. */
+static void add_part(const supine_command_names *names, size_t part, const size_t *order,
+                     size_t count, const float *xyz, const float *from, supine_command_marks *out) {
+  supine_mark middle = {.xyz = {0.0F, 0.0F, 0.0F}, .point = count == 1, .label = out->label[part]};
+  for (size_t i = 0; i < count; ++i) {
+    const float *p = xyz + 3 * order[i];
+    const float *q = from + 3 * order[i];
+    const float moved = hypotf(hypotf(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+    for (size_t k = 0; k < 3; ++k) {
+      middle.xyz[k] += p[k] / (float)count;
+    }
+    middle.value += moved / (float)count;
+    if (count > 1) {
+      out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
+    }
+  }
+  (void)snprintf(out->label[part], sizeof out->label[part], "%.32s %.1f mm", names->text[part],
+                 (double)middle.value);
+  out->mark[out->marks.count++] = middle;
+}
+
+/* Eight parameters: two states of the same content. */
+supine_status supine_command_marks_make(const supine_basis *inside,
+                                        const supine_command_names *names, const double *weights,
+                                        const double *scales, const double *reference_weights,
+                                        const double *reference_scales, supine_command_marks *marks,
+                                        supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *from = malloc(3 * n * sizeof *from);
+  supine_command_marks made = {.mark = malloc((n + names->count) * sizeof(supine_mark)),
+                               .label = calloc(names->count, sizeof *made.label)};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (xyz != NULL && from != NULL && made.mark != NULL && made.label != NULL) {
+    supine_deform(inside, weights, scales, xyz);
+    if (reference_weights != NULL) {
+      supine_deform(inside, reference_weights, reference_scales, from);
+    } else {
+      memcpy(from, info->vertices, 3 * n * sizeof *from);
+    }
+    for (size_t at = 0; at < n;) { /* a part's vertices are together */
+      const uint32_t part = names->part[names->order[at]];
+      size_t end = at;
+      while (end < n && names->part[names->order[end]] == part) {
+        ++end;
+      }
+      add_part(names, part, names->order + at, end - at, xyz, from, &made);
+      at = end;
+    }
+    made.marks.mark = made.mark;
+    *marks = made;
+    made = (supine_command_marks){.mark = NULL};
+    status = SUPINE_OK;
+  }
+  free(xyz);
+  free(from);
+  supine_command_marks_free(&made);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "no memory for %zu points", n);
+}
+
+void supine_command_marks_free(supine_command_marks *marks) {
+  free(marks->mark);
+  free(marks->label);
+  *marks = (supine_command_marks){.mark = NULL};
+}

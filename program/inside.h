@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What is inside lungs, shown with them: a file of 'supine embed' beside the basis it is of. */
+#ifndef SUPINE_COMMAND_INSIDE_H
+#define SUPINE_COMMAND_INSIDE_H
+
+#include "program/render/render.h"
+
+#include "program/names.h"
+
+/* SUPINE_ERROR_FORMAT where the content was not made from this basis. */
+supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
+                                          const char *path, supine_error *error);
+
+/* Opens content of these lungs and its names; close both in any case, which begin as zeros.
+ * Statuses of opening, of its names, and of the check. */
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error);
+
+/* Marks of a picture: each named point, with how far it has moved; meshes as their vertices, and
+ * their name at the middle. */
+typedef struct supine_command_marks {
+  supine_marks marks;
+  supine_mark *mark;
+  char (*label)[48];
+} supine_command_marks;
+
+/* @param reference  weights and scales that moves count from; NULL: the file's surface
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_marks_make(const supine_basis *inside,
+                                        const supine_command_names *names, const double *weights,
+                                        const double *scales, const double *reference_weights,
+                                        const double *reference_scales, supine_command_marks *marks,
+                                        supine_error *error);
+void supine_command_marks_free(supine_command_marks *marks);
+
+#endif

@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Label maps in place of meshes. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/image/image.h"
+#include "mesh/labels/labels.h"
+
+#include "program/label_options.h"
+
+#define FILLS(member) SUPINE_FILLS(supine_label_options, member)
+
+const supine_option supine_command_label_options[] = {
+    {.help = "Label maps (.nrrd, .nii, .nii.gz) in place of surfaces, one map or a mask a file:"},
+    {"labels", 0, "WHICH",
+     "which labels are lungs; default: by those that are there, where they leave no doubt. "
+     "lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), totalsegmentator (10 to 14), "
+     "totalsegmentator-v1 (13 to 17), one (all but 0; both lungs, parted), or any, as "
+     "left=10+11,right=12+13+14; one lung alone: left=2",
+     FILLS(labels)},
+    {"edge", 0, "MM", "about this far from vertex to vertex; default 2", FILLS(edge),
+     .range = {0.2, 20.0}, .wants = "0.2 to 20 mm"},
+    {"close", 0, "MM",
+     "first close gaps and channels narrower than twice this, as vessels leave them; default 0",
+     FILLS(close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
+    {"surfaces-out", 0, "FILE", "keep the surfaces: .ply, .obj, .stl or .vtp", FILLS(surfaces),
+     .file = SUPINE_FILE_OUT, .endings = ".ply, .obj, .stl or .vtp"},
+    {.name = NULL}};
+
+int supine_command_labels_check(const supine_label_options *options, const char *command,
+                                char **paths, size_t count, bool *maps) {
+  size_t images = 0;
+  for (size_t i = 0; i < count; ++i) {
+    images += supine_image_is_named(paths[i]);
+  }
+  *maps = images == count;
+  if (images > 0 && images < count) {
+    return supine_options_usage(command, "label maps or surfaces, not both");
+  }
+  if (images == 0 && (options->labels != NULL || options->edge > 0.0 || options->close > 0.0 ||
+                      options->surfaces != NULL)) {
+    return supine_options_usage(command, "--labels, --edge, --close and --surfaces-out are of "
+                                         "label maps (.nrrd, .nii, .nii.gz)");
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static const char *side_name(const supine_labels_lung *lung) {
+  return lung->side > 0 ? "left" : "right";
+}
+
+/* Things that may be wrong with the map. */
+static void warn(const char *command, const char *path, const supine_labels_report *report) {
+  if (report->frames_differ) {
+    supine_options_say(command,
+                       "%s: warning: its qform and sform do not agree; the sform was taken", path);
+  }
+  if (report->apex < 0) {
+    supine_options_say(command,
+                       "%s: warning: by its header the lungs' narrow end is at the feet: it is "
+                       "upside down, or holds a part of the lungs alone",
+                       path);
+  }
+  if (report->back < 0) {
+    supine_options_say(command,
+                       "%s: warning: by its header the lungs reach deepest at the front: is it "
+                       "turned round?",
+                       path);
+  }
+  if (report->lung_count == 2 && report->lung[0].surface > report->lung[1].surface) {
+    supine_options_say(command,
+                       "%s: note: the left lung is the larger, which is rare: is the header "
+                       "mirrored?",
+                       path);
+  }
+  for (size_t i = 0; i < report->lung_count; ++i) {
+    const supine_labels_lung *lung = &report->lung[i];
+    if (lung->cut > 0) {
+      supine_options_say(command,
+                         "%s: warning: the %s lung is cut off at the image's border (%zu voxels)",
+                         path, side_name(lung), lung->cut);
+    }
+    if (lung->tunnels > 0) {
+      supine_options_say(command,
+                         "%s: note: %ld %s lead through the %s lung, or hollows in it to the "
+                         "outside; --close MM closes narrow ones",
+                         path, lung->tunnels, lung->tunnels == 1 ? "channel" : "channels",
+                         side_name(lung));
+    }
+  }
+}
+
+static void tell(const char *path, const supine_labels_report *report,
+                 const supine_mesh *surfaces) {
+  (void)printf("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
+               report->size[0], report->size[1], report->size[2], report->spacing[0],
+               report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
+  if (report->parted > 0.0) {
+    (void)printf("  the lungs touch: parted at necks up to %.3g mm wide\n", report->parted);
+  }
+  for (size_t i = 0; i < report->lung_count; ++i) {
+    const supine_labels_lung *lung = &report->lung[i];
+    (void)printf("%s lung: %.1f mL", side_name(lung), lung->mask);
+    if (lung->closed > 0.0) {
+      (void)printf("; closed gaps of %.2g mL", lung->closed);
+    }
+    (void)printf("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
+                 lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
+                 lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
+    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL), at most %.2g mm from the mask\n",
+                 surfaces[i].vertex_count, lung->surface, lung->surface - lung->mask,
+                 lung->farthest);
+  }
+  if (report->apex > 0 && report->back > 0) {
+    (void)printf("narrow at the head and deepest at the back, as lungs are: the header's axes "
+                 "hold\n");
+  }
+}
+
+/* Both lungs in one file. */
+static supine_status save(const char *path, const supine_mesh *surfaces, size_t count,
+                          supine_error *error) {
+  supine_mesh all = {0};
+  for (size_t i = 0; i < count; ++i) {
+    all.vertex_count += surfaces[i].vertex_count;
+    all.triangle_count += surfaces[i].triangle_count;
+  }
+  all.vertices = malloc(3 * all.vertex_count * sizeof *all.vertices);
+  all.triangles = malloc(3 * all.triangle_count * sizeof *all.triangles);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (all.vertices == NULL || all.triangles == NULL) {
+    (void)supine_error_set(error, status, "no memory for %zu vertices", all.vertex_count);
+  } else {
+    size_t vertices = 0;
+    size_t corners = 0;
+    for (size_t i = 0; i < count; ++i) {
+      memcpy(all.vertices + 3 * vertices, surfaces[i].vertices,
+             3 * surfaces[i].vertex_count * sizeof *all.vertices);
+      for (size_t c = 0; c < 3 * surfaces[i].triangle_count; ++c) {
+        all.triangles[corners++] = surfaces[i].triangles[c] + (uint32_t)vertices;
+      }
+      vertices += surfaces[i].vertex_count;
+    }
+    status = supine_mesh_save(path, &all, NULL, error);
+  }
+  supine_mesh_free(&all);
+  return status;
+}
+
+int supine_command_labels_load(const supine_label_options *options, const char *command,
+                               char **paths, size_t path_count, supine_mesh *surfaces,
+                               size_t *count, int *sides) {
+  supine_progress progress = supine_options_progress_begin("label map");
+  const supine_labels_options wanted = {.labels = options->labels,
+                                        .edge = options->edge,
+                                        .close = options->close,
+                                        .progress = supine_options_progress_step,
+                                        .progress_context = &progress};
+  supine_labels_report report;
+  supine_error error;
+  supine_status status = supine_labels_surfaces((const char *const *)paths, path_count, &wanted,
+                                                surfaces, &report, &error);
+  supine_options_progress_end(&progress);
+  if (status == SUPINE_OK) {
+    *count = report.lung_count;
+    for (size_t i = 0; i < report.lung_count; ++i) {
+      sides[i] = report.lung[i].side;
+    }
+    warn(command, paths[0], &report);
+    tell(paths[0], &report, surfaces);
+    if (options->surfaces != NULL) {
+      status = save(options->surfaces, surfaces, *count, &error);
+    }
+  }
+  return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(command, &error);
+}

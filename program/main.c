@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The program: picks the command. */
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_errno.h>
+#include <jansson.h>
+
+#include <supine/version.h>
+
+#include "program/options/command.h"
+#include "sh/base/output.h"
+
+static void print_help(void) {
+  (void)puts("supine - lungs that deform with gravity, in real time\n"
+             "\n"
+             "Usage: supine COMMAND [OPTIONS]\n"
+             "\n"
+             "Commands:");
+  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
+    (void)printf("  %-11s %s\n", supine_command_list[i]->name, supine_command_list[i]->summary);
+  }
+  (void)puts("\n"
+             "'supine COMMAND --help' teaches each. A first round, without any data:\n"
+             "\n"
+             "  supine phantom -o lungs.ply\n"
+             "  supine precompute lungs.ply -o lungs.safetensors\n"
+             "  supine deform lungs.safetensors --posture prone -o prone.vtp\n"
+             "\n"
+             "Lengths are millimetres and volumes millilitres; axes are the DICOM patient axes\n"
+             "(x to the left, y to the back, z to the head).\n"
+             "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
+}
+
+/* A command by its name, or NULL. */
+static const supine_command *find_command(const char *name) {
+  size_t i = 0;
+  while (supine_command_list[i] != NULL && strcmp(name, supine_command_list[i]->name) != 0) {
+    ++i;
+  }
+  return supine_command_list[i];
+}
+
+static int unknown_command(const char *name) {
+  enum { NAMES_MAX = 64 };
+  const char *names[NAMES_MAX];
+  size_t count = 0;
+  for (; count < NAMES_MAX && supine_command_list[count] != NULL; ++count) {
+    names[count] = supine_command_list[count]->name;
+  }
+  const char *nearest = supine_options_suggest(name, names, count);
+  if (nearest != NULL) {
+    (void)fprintf(stderr, "supine: no command '%s'; did you mean '%s'?\n", name, nearest);
+  } else {
+    (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists them\n", name);
+  }
+  return SUPINE_EXIT_USAGE;
+}
+
+/* A value that JSON lacks for want of memory would be missing in silence, and GSL tells a lack of
+ * it only to its handler: both end the program here, and unfinished outputs with it. */
+static _Noreturn void end_without_memory(void) {
+  supine_output_abandon_all();
+  (void)fputs("supine: out of memory\n", stderr);
+  exit(SUPINE_EXIT_NUMERICAL);
+}
+
+static void *allocate_json(size_t size) {
+  void *memory = malloc(size);
+  if (memory == NULL) {
+    end_without_memory();
+  }
+  return memory;
+}
+
+/* Every other error is in what the function returned. */
+static void hear_gsl(const char *reason, const char *file, int line, int code) {
+  (void)reason;
+  (void)file;
+  (void)line;
+  if (code == GSL_ENOMEM) {
+    end_without_memory();
+  }
+}
+
+int main(int argc, char **argv) {
+  (void)gsl_set_error_handler(hear_gsl);
+  json_set_alloc_funcs(allocate_json, free);
+  supine_options_signals_catch(false);
+  if (argc < 2) {
+    print_help();
+    return SUPINE_EXIT_USAGE;
+  }
+  const char *name = argv[1];
+  const bool help =
+      strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0;
+  if (help && argc == 2) {
+    print_help();
+    return supine_options_finish("help");
+  }
+  if (strcmp(name, "--version") == 0) {
+    (void)puts("supine " SUPINE_VERSION);
+    return supine_options_finish("version");
+  }
+  const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
+  const supine_command *command = find_command(wanted);
+  if (command == NULL) {
+    return unknown_command(wanted);
+  }
+  if (help) {
+    char option[] = "--help";
+    char *arguments[] = {argv[2], option, NULL};
+    return supine_options_run(command, 2, arguments);
+  }
+  return supine_options_run(command, argc - 1, argv + 1);
+}

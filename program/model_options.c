@@ -1,0 +1,639 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The options that choose the lungs and the model. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "sh/base/parallel.h"
+#include "sh/base/text.h"
+
+#include "program/model_options.h"
+#include "precompute/inside/surface.h"
+#include "program/options/posture_list.h"
+
+void supine_command_model_options_begin(supine_model_options *options) {
+  options->model = supine_physics_model(SUPINE_LAW_PAPER);
+  options->law_choice = SUPINE_LAW_COUNT;
+  options->resting = supine_reference_resting_default();
+  options->model.reach = options->model.force.base = options->model.force.gain = NAN;
+  options->model.force.box[0] = options->model.direction.c[0] = NAN;
+}
+
+/* The law, under the options of one's own. Full inflation is deep below rest's lungs, a scan at
+ * rest breathes quietly, and a scan that is nothing in particular is the paper's. */
+static void choose_law(supine_model_options *options) {
+  static const supine_law by_scan[] = {[SUPINE_SCAN_NONE] = SUPINE_LAW_PAPER,
+                                       [SUPINE_SCAN_FULL] = SUPINE_LAW_DEEP,
+                                       [SUPINE_SCAN_REST] = SUPINE_LAW_TIDAL,
+                                       [SUPINE_SCAN_VOLUME] = SUPINE_LAW_DEEP};
+  if (!options->has_scan && options->law_choice != SUPINE_LAW_PAPER) {
+    options->scan.kind = SUPINE_SCAN_FULL;
+  }
+  if (options->law_choice == SUPINE_LAW_COUNT) {
+    options->law_choice = (int)by_scan[options->scan.kind];
+  }
+  const supine_model law = supine_physics_model((supine_law)options->law_choice);
+  supine_model *model = &options->model;
+  model->law = law.law;
+  model->force.pair = law.force.pair;
+  model->reach = isnan(model->reach) ? law.reach : model->reach;
+  model->force.base = isnan(model->force.base) ? law.force.base : model->force.base;
+  model->force.gain = isnan(model->force.gain) ? law.force.gain : model->force.gain;
+  if (isnan(model->force.box[0])) {
+    memcpy(model->force.box, law.force.box, sizeof law.force.box);
+  }
+  if (isnan(model->direction.c[0])) {
+    memcpy(model->direction.c, law.direction.c, sizeof law.direction.c);
+  }
+}
+
+/* "supine:rest", "prone:-3000", "full", "none" */
+static int read_scan(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  supine_scan *scan = &options->scan;
+  const char *colon = strrchr(text, ':');
+  const char *state = colon == NULL ? text : colon + 1;
+  options->has_scan = true;
+  if (colon != NULL) {
+    char posture[SUPINE_POSTURE_NAME_MAX];
+    supine_posture_list one;
+    (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
+    const int result = supine_options_posture_list_parse(command, posture, &one);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+    memcpy(scan->gravity, one.item[0].gravity, sizeof scan->gravity);
+  }
+  scan->kind = strcmp(state, "none") == 0   ? SUPINE_SCAN_NONE
+               : strcmp(state, "full") == 0 ? SUPINE_SCAN_FULL
+               : strcmp(state, "rest") == 0 ? SUPINE_SCAN_REST
+                                            : SUPINE_SCAN_VOLUME;
+  if (scan->kind == SUPINE_SCAN_VOLUME &&
+      !(supine_options_parse_number(state, &scan->volume) && scan->volume <= 0.0)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  /* only what is not full needs to say in which posture */
+  return supine_options_fits(colon != NULL || scan->kind <= SUPINE_SCAN_FULL);
+}
+
+/* "supine=0.43,prone=0.47"; anything without an equals sign names a file. */
+static int read_resting(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  supine_error error;
+  char copy[256];
+  (void)snprintf(copy, sizeof copy, "%s", text);
+  if (strchr(text, '=') == NULL) {
+    return supine_reference_resting_load(text, &options->resting, &error) == SUPINE_OK
+               ? SUPINE_EXIT_OK
+               : supine_options_fail(command, &error);
+  }
+  for (char *rest = copy, *piece; (piece = strsep(&rest, ",")) != NULL;) {
+    char *value = strchr(piece, '=');
+    double share = 0.0;
+    if (value == NULL || !supine_options_parse_number(value + 1, &share)) {
+      return SUPINE_OPTION_MISFIT;
+    }
+    *value = '\0';
+    if (supine_reference_resting_set(&options->resting, piece, share, &error) != SUPINE_OK) {
+      return supine_options_usage(command, "--resting: %s", error.message);
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static int read_units(const char *command, const char *text, void *field) {
+  double *millimetres = field;
+  (void)command;
+  static const struct {
+    const char *name;
+    double millimetres;
+  } units[] = {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}};
+  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
+    if (strcmp(text, units[i].name) == 0) {
+      *millimetres = units[i].millimetres;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  return supine_options_fits(supine_options_parse_number(text, millimetres) && *millimetres > 0.0);
+}
+
+/* A model's name; anything with a dot or a slash is a file of vectors. */
+static int read_direction(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
+  static const char *const names[] = {"box", "normal", "radial"};
+  options->direction = NULL;
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    if (strcmp(text, names[i]) == 0) {
+      options->model.direction.model = (supine_direction_model)i;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  options->model.direction.model = SUPINE_DIRECTION_VECTORS;
+  options->direction = text;
+  return supine_options_fits(strpbrk(text, "./") != NULL);
+}
+
+/* "linear:z:0.5:1.5"; anything without such a beginning names a file. */
+static int read_expandability(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
+  options->expandability = NULL;
+  options->law = (supine_expandability_law){0};
+  if (strcmp(text, "uniform") == 0) {
+    return SUPINE_EXIT_OK;
+  }
+  if (strncmp(text, "linear:", strlen("linear:")) == 0) {
+    options->law.shape = SUPINE_EXPANDABILITY_LINEAR;
+  } else if (strncmp(text, "exp:", strlen("exp:")) == 0) {
+    options->law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
+  } else {
+    options->expandability = text;
+    return SUPINE_EXIT_OK;
+  }
+  const char *at = strchr(text, ':') + 1;
+  if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
+    return SUPINE_OPTION_MISFIT;
+  }
+  options->law.axis = at[0] - 'x';
+  char numbers[128];
+  (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
+  char *colon = strchr(numbers, ':');
+  if (colon == NULL) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  *colon = '\0';
+  return supine_options_fits(supine_options_parse_number(numbers, &options->law.from) &&
+                             supine_options_parse_number(colon + 1, &options->law.to) &&
+                             options->law.from > 0.0 && options->law.to > 0.0);
+}
+
+static int read_lesion(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
+  double v[5];
+  if (options->lesion_count == MODEL_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
+      !(v[3] > 0.0) || !(v[4] > 0.0)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  options->lesions[options->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
+  return SUPINE_EXIT_OK;
+}
+
+/* "left:0.3" */
+static int read_lung(const char *command, const char *text, void *field) {
+  supine_model_options *options = field;
+  (void)command;
+  const char *colon = strchr(text, ':');
+  const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
+  const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
+  double share;
+  if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
+      !(share > 0.0 && share <= 1.0)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  *(left ? &options->left_share : &options->right_share) = share;
+  return SUPINE_EXIT_OK;
+}
+
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL};               /* as supine_axes */
+static const char *const laws[] = {"deep", "tidal", "cohort", "paper", NULL}; /* as supine_law */
+
+#define FILLS(member) SUPINE_FILLS(supine_model_options, member)
+
+const supine_option supine_command_model_options[] = {
+    {.help = "Surfaces:"},
+    {"axes", 0, "LPS|RAS", "axes of the files; default: their SPACE tag, else LPS (DICOM)",
+     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {"units", 0, "UNIT", "mm, cm, m, um or in, or millimetres per unit; default mm",
+     FILLS(load.millimetres_per_unit), .read = read_units,
+     .wants = "mm, cm, m, um, in or millimetres per unit"},
+    {"midline", 0, "X",
+     "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
+     "the inner face of a single lung's",
+     FILLS(midline), SUPINE_SAYS_GIVEN(supine_model_options, has_midline), .wants = "an x in mm"},
+    {.table = supine_command_label_options, FILLS(maps)},
+    {.help = "The scan and the law:"},
+    {"scanned", 0, "POSTURE:STATE",
+     "what the surfaces show: full (a breath-hold at full inflation, the default; then the posture "
+     "does not matter), POSTURE:rest (the end of a quiet expiration), POSTURE:ML (mL relative to "
+     "full, as supine:-3000), or none (nothing is known: breaths are added to the scan, and "
+     "turning "
+     "alone moves nothing). Lungs have one shape at full inflation in every posture, and all that "
+     "gravity does is below it; from a scan in another state that shape is found first",
+     .read = read_scan,
+     .wants = "full, none, POSTURE:rest or POSTURE:ML with ML at most 0, as supine:-3000"},
+    {"law", 0, "LAW",
+     "deep: how lungs go from full inflation to rest and back (default where the scan is full or "
+     "some mL below); tidal: quiet breaths, mostly the diaphragm's (default for a scan at rest); "
+     "cohort: breaths of one posture, as deep but more by the diaphragm, from full breaths of five "
+     "people (of one left out 4 % less is left than by deep; at rest it leaves lungs flatter); "
+     "paper: Santhanam 2008 as published, breaths from "
+     "the scan's own state (implies --scanned "
+     "none). The options below change single constants of it",
+     FILLS(law_choice), .choices = laws},
+    {"resting", 0, "LIST|FILE",
+     "volume at rest as a share of the full one, by posture; default "
+     "left, right and prone 0.47, supine and inverted 0.43, upright 0.53. Name those that "
+     "differ, or a CSV file with the columns posture,share",
+     .read = read_resting, .file = SUPINE_FILE_NONE,
+     .wants = "POSTURE=SHARE,... or a CSV file with the columns posture,share"},
+    {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along "
+             "gravity (0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the "
+             "midline outwards, from the back, from the apex; 0 to 1):"},
+    {"base", 0, "B", "default by the law: deep 0.9, tidal 1.1, cohort 0.775, paper 0",
+     FILLS(model.force.base)},
+    {"gain", 0, "G", "default: paper 1, the others 0.4", FILLS(model.force.gain)},
+    {"box-force", 0, "X,Y,Z",
+     "cx, cy, cz: fixed to the body; default: deep 0,-0.2,0, tidal 0,-0.6,0, cohort "
+     "0.1,-0.05,0, paper 0,0,0",
+     FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ"},
+    {"soften", 0, "S",
+     "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. It hardly tells prone from "
+     "supine: at 1 the even bands carry 0.004 % of the energy",
+     FILLS(model.force.soften)},
+    {.help = "Direction of displacement:"},
+    {"direction", 0, "WHAT",
+     "box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
+     "FILE: any vectors: CSV with the columns dx,dy,dz, mm, a row a vertex in the order that "
+     "'supine solve' writes",
+     .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
+     .file = SUPINE_FILE_IN},
+    {"constants", 0, "C1,...,C6",
+     "of the box model; default: deep 6,2.6,15,1,16,1.3, tidal 3,2.5,2.5,2,16,1.2, cohort "
+     "2.3,3,8.6,0.8,16,1.15, paper "
+     "2,1.5,1.5,1,16,1.4. Fits to landmarks of ten 4-D CTs (DIR-Lab; of the squared displacement "
+     "of "
+     "a quiet breath tidal explains 62 to 88 %) and of ten full breaths (DIR-Lab COPDgene; deep "
+     "-35 "
+     "to 58 %, median 39); cohort's of five more (Lung250M-4B). The paper's own are lost",
+     FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6"},
+    {.help = "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only "
+             "ratios count: a = 2 beside a = 1 is twice as expandable, doubling all of them "
+             "changes nothing."},
+    {"expandability", 0, "WHAT",
+     "uniform (default)\n"
+     "linear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a goes from FROM to TO in a straight line, or by "
+     "equal ratios, along AXIS: x from the midline outwards, y from the back to the front, z from "
+     "the apex to the base; linear:z:0.5:1.5 expands most at the base\n"
+     "FILE: a of every vertex, CSV: a header line, then one value a line in the order of the "
+     "vertices (left lung first, each as its file first names them: the order that 'supine solve' "
+     "writes), or vertex,value counted from 0\n"
+     "ply:PROPERTY: a of every vertex, from a property of that name of the vertices of the "
+     "surfaces themselves, all of them PLY files",
+     .read = read_expandability, .file = SUPINE_FILE_IN,
+     .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
+              "above 0, ply:PROPERTY, or a file"},
+    {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
+     "a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to half of RADIUS (mm), less and less "
+     "from there, and not at all from RADIUS on. Above 1 stiffens: it moves less; 1 changes "
+     "nothing. May be repeated",
+     .read = read_lesion, .wants = "(at most 64) X,Y,Z,RADIUS,FACTOR, the last two above 0"},
+    {"lung", 0, "SIDE:SHARE",
+     "left or right lung collapsed (pneumothorax): its resting volume, and what it takes of a "
+     "breath, are SHARE (0 to 1) of what they were; a breath's volume stays exact, the other lung "
+     "takes the rest",
+     .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
+    {"reach", 0, "MM",
+     "forces spread over this length along the surface, whatever the mesh (about exp(-r/MM)); "
+     "default: 10; paper: over a few links, so that a finer mesh spreads less and "
+     "may look torn",
+     FILLS(model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+    {.name = NULL}};
+
+typedef struct load_work {
+  const supine_mesh_load_options *options;
+  char **paths;
+  supine_mesh *meshes;
+  supine_mesh_report *reports;
+  supine_error *errors; /* status SUPINE_OK where loading went well */
+} load_work;
+
+static void load_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const load_work *work = context;
+  for (size_t i = begin; i < end; ++i) {
+    work->errors[i].status = supine_mesh_load(work->paths[i], work->options, &work->meshes[i],
+                                              &work->reports[i], &work->errors[i]);
+  }
+}
+
+/* What a careful colleague would mention about a file. */
+static void mention(const char *command, const char *path, const supine_mesh_report *report) {
+  if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
+    supine_options_say(command, "%s: dropped %zu degenerate faces and %zu unreferenced vertices",
+                       path, report->degenerate_faces, report->unreferenced_vertices);
+  }
+  if (report->comment_names_ras) {
+    supine_options_say(command,
+                       "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
+                       "the right, add --axes RAS",
+                       path);
+  }
+  if (report->odd_side > 0.0) {
+    const char *unit = report->likely_unit;
+    supine_options_say(
+        command, "%s: warning: %.3g mm long, which no lung is: %s%s", path, report->odd_side,
+        unit == NULL ? "check its units" : "its unit is likely --units ", unit == NULL ? "" : unit);
+  }
+}
+
+static const char ply_prefix[] = "ply:";
+
+/* From the files themselves: each has some of the vertices. */
+static supine_status load_ply(const supine_model_options *options, const load_work *work,
+                              size_t count, const supine_lungs *lungs, double *a,
+                              supine_error *error) {
+  const char *property = options->expandability + strlen(ply_prefix);
+  supine_status status = SUPINE_OK;
+  memset(a, 0, lungs->mesh.vertex_count * sizeof *a);
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    status =
+        supine_tissue_expandability_load_ply(work->paths[i], property, work->reports[i].axes,
+                                             options->load.millimetres_per_unit, lungs, a, error);
+  }
+  return status;
+}
+
+static supine_status set_expandability(supine_model_options *options, const load_work *work,
+                                       size_t count, const supine_lungs *lungs,
+                                       supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->expandability == NULL && options->law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
+    return SUPINE_OK;
+  }
+  options->stiffness = malloc(n * sizeof *options->stiffness);
+  double *a = options->stiffness;
+  if (a == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  options->model.stiffness = a;
+  supine_status status = SUPINE_OK;
+  if (options->expandability == NULL) {
+    status = supine_tissue_expandability_regional(lungs, &options->law, a, error);
+  } else if (strncmp(options->expandability, ply_prefix, strlen(ply_prefix)) == 0) {
+    status = load_ply(options, work, count, lungs, a, error);
+  } else {
+    status = supine_tissue_expandability_load(options->expandability, n, a, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_tissue_expandability_stiffness(n, a, a, error);
+  }
+  return status;
+}
+
+static supine_status set_directions(supine_model_options *options, const supine_lungs *lungs,
+                                    supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->direction == NULL) {
+    return SUPINE_OK;
+  }
+  options->vectors = malloc(3 * n * sizeof *options->vectors);
+  if (options->vectors == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  options->model.direction.vectors = options->vectors;
+  return supine_physics_directions_load(options->direction, n, options->vectors, error);
+}
+
+/* Why a lesion changes nothing: stiffness is the surface's, and it reaches none of it. */
+static void mention_lesion(const char *command, const supine_lungs *lungs,
+                           const supine_lesion *lesion) {
+  supine_inside_surface *surface = NULL;
+  const double *c = lesion->centre;
+  if (supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                   lungs->mesh.triangles, &surface, NULL) != SUPINE_OK) {
+    return;
+  }
+  const supine_inside_place place = supine_inside_surface_find(surface, c, NULL);
+  supine_options_say(command,
+                     "warning: the lesion at %g,%g,%g is %s the lungs, %.0f mm from their surface: "
+                     "with a radius of %g mm it reaches none of it and changes nothing%s",
+                     c[0], c[1], c[2], place.depth > 0.0 ? "inside" : "outside", fabs(place.depth),
+                     lesion->radius, place.depth > 0.0 ? "; a larger RADIUS would" : "");
+  supine_inside_surface_destroy(surface);
+}
+
+static supine_status set_lesions(supine_model_options *options, const char *command,
+                                 const supine_lungs *lungs, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  if (options->lesion_count == 0) {
+    return SUPINE_OK;
+  }
+  options->factors = malloc(n * sizeof *options->factors);
+  if (options->factors == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    options->factors[i] = 1.0;
+  }
+  options->model.lesions = options->factors;
+  for (size_t l = 0; l < options->lesion_count; ++l) {
+    const supine_lesion *lesion = &options->lesions[l];
+    size_t reached = 0;
+    const supine_status status =
+        supine_tissue_add_lesion(lungs, lesion, options->factors, &reached, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    if (reached == 0) {
+      mention_lesion(command, lungs, lesion);
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status set_shares(supine_model_options *options, const supine_lungs *lungs,
+                                supine_error *error) {
+  static const char *const names[] = {"left", "right"};
+  const double shares[] = {options->left_share, options->right_share};
+  for (size_t side = 0; side < 2; ++side) {
+    size_t lung = 0;
+    while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
+      ++lung;
+    }
+    if (shares[side] == 0.0) {
+      continue;
+    }
+    if (lung == lungs->lung_count) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
+                              names[side], names[side]);
+    }
+    const supine_status status =
+        supine_tissue_collapse(lungs, lung, shares[side], options->model.share, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+  }
+  return SUPINE_OK;
+}
+
+void supine_command_model_options_free(supine_model_options *options) {
+  free(options->stiffness);
+  free(options->vectors);
+  free(options->factors);
+  options->stiffness = NULL;
+  options->vectors = NULL;
+  options->factors = NULL;
+  options->model.direction.vectors = NULL;
+  options->model.stiffness = NULL;
+  options->model.lesions = NULL;
+}
+
+/* The frame that all files share. */
+static supine_scan_frame frame_of(const supine_model_options *options,
+                                  const supine_mesh_report *reports, size_t count) {
+  for (size_t i = 1; i < count; ++i) {
+    if (reports[i].axes != reports[0].axes) {
+      return (supine_scan_frame){0};
+    }
+  }
+  const double unit = options->load.millimetres_per_unit;
+  return (supine_scan_frame){reports[0].axes, unit == 0.0 ? 1.0 : unit};
+}
+
+/* What was assumed of the scan, in one line that the user can check. */
+static void say_assumed(supine_model_options *options, const supine_lungs *lungs,
+                        const supine_mesh_report *report) {
+  const supine_reference *reference = &options->reference;
+  const size_t size = sizeof options->assumed;
+  char *text = options->assumed;
+  text[0] = '\0';
+  supine_text_add(
+      text, size, "%s axes (%s), %g mm a unit", report->axes == SUPINE_AXES_RAS ? "RAS" : "LPS",
+      options->load.axes != SUPINE_AXES_AUTO ? "as told"
+      : report->axes_from_tag                ? "the file's tag"
+                                             : "assumed",
+      options->load.millimetres_per_unit == 0.0 ? 1.0 : options->load.millimetres_per_unit);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    supine_text_add(text, size, "; %s lung in", supine_lungs_name(lungs, lung));
+    for (size_t axis = 0; axis < 3; ++axis) {
+      double low = INFINITY;
+      double high = -INFINITY;
+      for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
+        low = fmin(low, lungs->mesh.vertices[3 * i + axis]);
+        high = fmax(high, lungs->mesh.vertices[3 * i + axis]);
+      }
+      supine_text_add(text, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",", "xyz"[axis], low,
+                      high);
+    }
+    supine_text_add(text, size, " mm");
+  }
+  supine_text_add(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
+  if (!reference->known) {
+    supine_text_add(text, size, "taken as the reference of every posture");
+    return;
+  }
+  if (reference->scan.kind == SUPINE_SCAN_FULL) {
+    supine_text_add(text, size, "at full inflation, %.0f mL", reference->full_volume);
+  } else {
+    const double *g = reference->scan.gravity;
+    supine_text_add(text, size, "%s%.0f mL below full (%.0f mL), gravity along %.3g,%.3g,%.3g",
+                    reference->scan.kind == SUPINE_SCAN_REST ? "at rest, " : "",
+                    -reference->scan_volume, reference->full_volume, g[0], g[1], g[2]);
+  }
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const double share = supine_reference_along_axes(reference->resting.share, supine);
+  supine_text_add(text, size, "; rest supine %.0f mL", share * reference->full_volume);
+}
+
+/* Surfaces from files, all at once; an exit code. */
+static int load_meshes(const char *command, load_work *work, size_t count) {
+  supine_parallel_for(count, 1, count, load_range, work);
+  for (size_t i = 0; i < count; ++i) {
+    if (work->errors[i].status != SUPINE_OK) {
+      return supine_options_fail(command, &work->errors[i]);
+    }
+    mention(command, work->paths[i], &work->reports[i]);
+  }
+  return SUPINE_EXIT_OK;
+}
+
+/* Surfaces from label maps, whose headers say axes and units. A lung alone has its inner face for a
+ * midline. */
+static int load_maps(supine_model_options *options, const char *command, load_work *work,
+                     size_t *count) {
+  int sides[2];
+  if (options->load.axes != SUPINE_AXES_AUTO || options->load.millimetres_per_unit != 0.0) {
+    return supine_options_usage(command, "--axes and --units are of surfaces: a label map's header "
+                                         "says both");
+  }
+  const int result = supine_command_labels_load(&options->maps, command, work->paths, *count,
+                                                work->meshes, count, sides);
+  for (size_t i = 0; i < *count && result == SUPINE_EXIT_OK; ++i) {
+    work->reports[i] = (supine_mesh_report){.axes = SUPINE_AXES_LPS, .axes_from_tag = true};
+  }
+  if (result == SUPINE_EXIT_OK && *count == 1 && !options->has_midline) {
+    double low[3];
+    double high[3];
+    supine_mesh_box(&work->meshes[0], low, high);
+    options->midline = sides[0] > 0 ? low[0] : high[0];
+    options->has_midline = true;
+  }
+  return result;
+}
+
+/* Over 60 lines: one step after another, each with its message. */
+int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
+                              size_t count, bool keep, supine_lungs *lungs) {
+  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  bool maps = false;
+  int result = supine_command_labels_check(&options->maps, command, paths, count, &maps);
+  if (result != SUPINE_EXIT_OK) {
+    return result;
+  }
+  const size_t most = count > 2 ? count : 2; /* a map holds two lungs */
+  load_work work = {&options->load, paths, calloc(most, sizeof(supine_mesh)),
+                    calloc(most, sizeof(supine_mesh_report)), calloc(most, sizeof(supine_error))};
+  if (work.meshes == NULL || work.reports == NULL || work.errors == NULL) {
+    result = supine_options_fail(command, &error);
+    goto cleanup;
+  }
+  result = maps ? load_maps(options, command, &work, &count) : load_meshes(command, &work, count);
+  if (result != SUPINE_EXIT_OK) {
+    goto cleanup;
+  }
+  if (supine_lungs_create(work.meshes, count, options->has_midline ? &options->midline : NULL,
+                          lungs, &error) != SUPINE_OK) {
+    result = supine_options_fail(command, &error);
+    goto cleanup;
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    if (lungs->turned[lung]) {
+      supine_options_say(command, "note: the triangles of the %s lung faced inwards: turned round",
+                         supine_lungs_name(lungs, lung));
+    }
+  }
+  if (!lungs->topology.closed) {
+    supine_options_say(command,
+                       "note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
+                       "inconsistent edges): no volumes, only --scale",
+                       lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
+                       lungs->topology.inconsistent_edges);
+  }
+  if (keep) {
+    options->scan.kind = SUPINE_SCAN_NONE;
+    options->has_scan = true;
+  }
+  choose_law(options);
+  if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
+      set_directions(options, lungs, &error) != SUPINE_OK ||
+      set_lesions(options, command, lungs, &error) != SUPINE_OK ||
+      set_shares(options, lungs, &error) != SUPINE_OK ||
+      supine_reference_find(lungs, &options->model, &options->scan, &options->resting,
+                            &options->reference, &error) != SUPINE_OK) {
+    result = supine_options_fail(command, &error);
+    goto cleanup;
+  }
+  options->frame = frame_of(options, work.reports, count);
+  say_assumed(options, lungs, &work.reports[0]);
+cleanup:
+  for (size_t i = 0; work.meshes != NULL && i < most; ++i) {
+    supine_mesh_free(&work.meshes[i]);
+  }
+  free(work.meshes);
+  free(work.reports);
+  free(work.errors);
+  return result;
+}

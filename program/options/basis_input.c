@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What commands that read a basis share. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/options/basis_input.h"
+
+const supine_option supine_options_as_scanned[] = {
+    {"as-scanned", 0, NULL,
+     "in the axes and units that the scan came in, to lie on top of it; default LPS and mm",
+     .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
+    {.name = NULL}};
+
+int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
+                               supine_mesh_save_options *save) {
+  const char *axes = supine_basis_metadata(basis, "scan_axes");
+  const char *unit = supine_basis_metadata(basis, "scan_unit_mm");
+  if (!wanted) {
+    return SUPINE_EXIT_OK;
+  }
+  if (axes == NULL || unit == NULL ||
+      !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
+      !(save->millimetres_per_unit > 0.0)) {
+    supine_options_say(command, "the file does not say in which axes and units its scan came");
+    return SUPINE_EXIT_INPUT;
+  }
+  save->axes = strcmp(axes, "RAS") == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
+  return SUPINE_EXIT_OK;
+}
+
+supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const float *vertices = supine_basis_vertices(basis);
+  supine_mesh made = {.vertex_count = info->vertex_count, .triangle_count = info->triangle_count};
+  made.vertices = malloc(3 * info->vertex_count * sizeof *made.vertices);
+  made.triangles = malloc(3 * info->triangle_count * sizeof *made.triangles);
+  if (made.vertices == NULL || made.triangles == NULL) {
+    supine_mesh_free(&made);
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+    made.vertices[i] = (double)vertices[i];
+  }
+  memcpy(made.triangles, supine_basis_triangles(basis),
+         3 * info->triangle_count * sizeof *made.triangles);
+  *mesh = made;
+  return SUPINE_OK;
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What commands that read a basis share: its surface as a mesh. */
+#ifndef SUPINE_BASIS_INPUT_H
+#define SUPINE_BASIS_INPUT_H
+
+#include "mesh/mesh.h"
+#include <supine/runtime.h>
+
+#include "program/options/command.h"
+
+/* --as-scanned, into a bool: outputs lie on top of the scan. */
+extern const supine_option supine_options_as_scanned[];
+
+/* Files in the axes and units that the scan came in, where they are wanted; an exit code after a
+ * message where the basis does not know them. */
+int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
+                               supine_mesh_save_options *save);
+
+/* The rest surface as a mesh of its own. */
+supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
+
+#endif

@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How every command fails, reads numbers and suggests. */
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/version.h>
+
+#include "program/options/command.h"
+#include "runtime/words.h"
+
+int supine_options_exit_code(supine_status status) {
+  switch (status) {
+  case SUPINE_OK:
+    return SUPINE_EXIT_OK;
+  case SUPINE_ERROR_ARGUMENT:
+    return SUPINE_EXIT_USAGE;
+  case SUPINE_ERROR_READ:
+  case SUPINE_ERROR_FORMAT:
+  case SUPINE_ERROR_MESH:
+  case SUPINE_ERROR_OPEN_SURFACE:
+    return SUPINE_EXIT_INPUT;
+  case SUPINE_ERROR_UNSUPPORTED:
+    return SUPINE_EXIT_UNSUPPORTED;
+  case SUPINE_ERROR_WRITE:
+  case SUPINE_ERROR_INTERRUPTED:
+    return SUPINE_EXIT_OUTPUT;
+  case SUPINE_ERROR_MEMORY:
+  case SUPINE_ERROR_NUMERICAL:
+  case SUPINE_STATUS_COUNT:
+    break;
+  }
+  return SUPINE_EXIT_NUMERICAL;
+}
+
+static void say(const char *command, const char *format, va_list arguments) {
+  (void)fprintf(stderr, "supine %s: ", command);
+  (void)vfprintf(stderr, format, arguments);
+  (void)fputc('\n', stderr);
+}
+
+void supine_options_say(const char *command, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  say(command, format, arguments);
+  va_end(arguments);
+}
+
+int supine_options_fail(const char *command, const supine_error *error) {
+  supine_options_say(command, "%s", error->message);
+  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL
+                                    : supine_options_exit_code(error->status);
+}
+
+int supine_options_usage(const char *command, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  say(command, format, arguments);
+  va_end(arguments);
+  (void)fprintf(stderr, "Try 'supine %s --help'.\n", command);
+  return SUPINE_EXIT_USAGE;
+}
+
+int supine_options_finish(const char *command) {
+  errno = 0;
+  if (ferror(stdout) != 0 || fflush(stdout) != 0) {
+    supine_options_say(command, "standard output: %s",
+                       strerror(errno == 0 ? EIO : errno)); /* NOLINT(concurrency-mt-unsafe) */
+    return SUPINE_EXIT_OUTPUT;
+  }
+  return SUPINE_EXIT_OK;
+}
+
+void supine_options_describe(int argc, char **argv, char *text, size_t size) {
+  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc && used < size; ++i) {
+    const char *slash = strrchr(argv[i], '/');
+    used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
+  }
+}
+
+/* The number at the front of `text`; NULL where there is none, else where it ends. */
+static const char *scan_number(const char *text, double *value) {
+  char *end = NULL;
+  *value = strtod(text, &end);
+  return end == text || !isfinite(*value) ? NULL : end;
+}
+
+bool supine_options_parse_number(const char *text, double *value) {
+  return supine_options_parse_numbers(text, 1, value);
+}
+
+bool supine_options_parse_numbers(const char *text, size_t count, double *values) {
+  const char *at = text;
+  for (size_t i = 0; i < count; ++i) {
+    at = scan_number(at, &values[i]);
+    if (at == NULL || *at != (i + 1 < count ? ',' : '\0')) {
+      return false;
+    }
+    ++at;
+  }
+  return true;
+}
+
+bool supine_options_parse_count(const char *text, size_t *value) {
+  char *end = NULL;
+  errno = 0;
+  const unsigned long long number = strtoull(text, &end, 10);
+  if (end == text || *end != '\0' || errno != 0 || strchr(text, '-') != NULL) {
+    return false;
+  }
+  *value = (size_t)number;
+  return true;
+}
+
+const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
+  const char *best = NULL;
+  size_t fewest = 1 + strlen(text) / 2; /* farther than this is another word */
+  for (size_t i = 0; i < count; ++i) {
+    const size_t edits = supine_words_distance(text, candidates[i]);
+    if (edits < fewest || (edits == fewest && best == NULL)) {
+      fewest = edits;
+      best = candidates[i];
+    }
+  }
+  return best;
+}

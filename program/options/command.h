@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the commands of the program share: how they fail, read their arguments and show progress. */
+#ifndef SUPINE_COMMAND_H
+#define SUPINE_COMMAND_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include <supine/status.h>
+
+#include "program/options/option.h"
+
+/* Exit codes of the program. */
+enum {
+  SUPINE_EXIT_OK = 0,
+  SUPINE_EXIT_USAGE = 1,
+  SUPINE_EXIT_INPUT = 2,
+  SUPINE_EXIT_UNSUPPORTED = 3,
+  SUPINE_EXIT_OUTPUT = 4,
+  SUPINE_EXIT_NUMERICAL = 5
+};
+
+/* The commands, in the order of the program's help. */
+extern const supine_command supine_command_phantom, supine_command_precompute, supine_command_info,
+    supine_command_deform, supine_command_compare, supine_command_render, supine_command_breathe,
+    supine_command_export, supine_command_bench, supine_command_solve, supine_command_pv,
+    supine_command_stream, supine_command_fit, supine_command_validate, supine_command_embed;
+
+/* The same, ended by NULL. */
+extern const supine_command *const supine_command_list[];
+
+/* The exit code that a status ends the program with. */
+int supine_options_exit_code(supine_status status);
+
+/* Prints "supine COMMAND: MESSAGE" to stderr. */
+void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+
+/* Prints the error's message and returns its exit code. */
+int supine_options_fail(const char *command, const supine_error *error);
+
+/* Prints a message and "Try 'supine COMMAND --help'."; returns SUPINE_EXIT_USAGE. */
+int supine_options_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+
+/* Results reached stdout? Flushes; a full disk or closed pipe ends with SUPINE_EXIT_OUTPUT. */
+int supine_options_finish(const char *command);
+
+/* The command line in one line, for what a file says of how it was made; names of files without
+ * their folders. */
+void supine_options_describe(int argc, char **argv, char *text, size_t size);
+
+/* Reads a finite number, or a whole one, that takes up the whole text. */
+bool supine_options_parse_number(const char *text, double *value);
+bool supine_options_parse_count(const char *text, size_t *value);
+
+/* Reads exactly `count` finite numbers separated by commas. */
+bool supine_options_parse_numbers(const char *text, size_t count, double *values);
+
+/* The candidate that is fewest edits from `text`, or NULL where all are far. */
+const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
+
+/* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches
+ * supine_progress_function; false after SIGINT or SIGTERM. */
+typedef struct supine_progress {
+  const char *label;
+  double start;  /* seconds */
+  double shown;  /* when last rewritten */
+  bool terminal; /* stderr is one */
+} supine_progress;
+
+supine_progress supine_options_progress_begin(const char *label);
+bool supine_options_progress_step(void *progress, double fraction);
+void supine_options_progress_end(supine_progress *progress);
+
+/* Signals that end the program leave no unfinished file behind. With an orderly end SIGINT, SIGTERM
+ * and SIGHUP ask for it instead, once: progress says so. */
+void supine_options_signals_catch(bool orderly_end);
+bool supine_options_interrupted(void);
+
+#endif

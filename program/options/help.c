@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A command's --help, from its table. */
+#include <string.h>
+
+#include "program/options/option.h"
+
+enum { WIDTH = 80, TEXT_COLUMN = 23 };
+
+/* Prints one line's words between the columns `left` and WIDTH, from `column` on. */
+static void print_words(const char *line, size_t length, size_t column, size_t left, FILE *file) {
+  for (size_t at = 0; at < length;) {
+    const char *word = line + at;
+    const char *space = memchr(word, ' ', length - at);
+    const size_t letters = space != NULL ? (size_t)(space - word) : length - at;
+    const bool first = at == 0 || column == left;
+    if (!first && column + 1 + letters > WIDTH) {
+      (void)fprintf(file, "\n%*s%.*s", (int)left, "", (int)letters, word);
+      column = left + letters;
+    } else {
+      (void)fprintf(file, "%s%.*s", first ? "" : " ", (int)letters, word);
+      column += letters + (first ? 0 : 1);
+    }
+    at += letters + 1;
+  }
+}
+
+/* Prints text between the columns `left` and WIDTH, the first line from `column` on; lines that
+ * begin with a space stay as they are. */
+static void print_text(const char *text, size_t column, size_t left, FILE *file) {
+  for (;;) {
+    const size_t length = strcspn(text, "\n");
+    if (text[0] == ' ') {
+      (void)fprintf(file, "%.*s", (int)length, text);
+    } else {
+      print_words(text, length, column, left, file);
+    }
+    (void)fputc('\n', file);
+    if (text[length] == '\0' || text[length + 1] == '\0') {
+      return;
+    }
+    text += length + 1;
+    (void)fprintf(file, "%*s", text[0] == '\n' ? 0 : (int)left, "");
+    column = left;
+  }
+}
+
+void supine_options_help_text(const supine_option *option, char *text, size_t size) {
+  (void)snprintf(text, size, "%s%s%s", option->help, option->standard != NULL ? "; default " : "",
+                 option->standard != NULL ? option->standard : "");
+}
+
+static void print_row(void *context, const supine_option *option, size_t base) {
+  FILE *file = context;
+  char text[2048];
+  (void)base;
+  if (option->name == NULL) {
+    (void)fputc('\n', file);
+    print_text(option->help, 0, 0, file);
+    return;
+  }
+  const char letter[] = {'-', option->letter, ',', ' ', '\0'};
+  const int used = fprintf(file, "  %s--%s%s%s", option->letter != 0 ? letter : "", option->name,
+                           option->argument != NULL ? " " : "",
+                           option->argument != NULL ? option->argument : "");
+  const bool beside = used + 2 <= TEXT_COLUMN;
+  (void)fprintf(file, "%s%*s", beside ? "" : "\n", beside ? TEXT_COLUMN - used : TEXT_COLUMN, "");
+  supine_options_help_text(option, text, sizeof text);
+  print_text(text, TEXT_COLUMN, TEXT_COLUMN, file);
+}
+
+void supine_options_print_help(const supine_command *command, FILE *file) {
+  const char *lead = "Usage:";
+  for (const char *usage = command->usage; *usage != '\0'; lead = "      ") {
+    const size_t length = strcspn(usage, "\n");
+    (void)fprintf(file, "%s supine %s %.*s\n", lead, command->name, (int)length, usage);
+    usage += length + (usage[length] == '\n' ? 1 : 0);
+  }
+  (void)fputc('\n', file);
+  print_text(command->about, 0, 0, file);
+  (void)fputc('\n', file);
+  supine_options_visit(command->options, 0, print_row, file);
+  if (command->notes != NULL) {
+    (void)fputc('\n', file);
+    print_text(command->notes, 0, 0, file);
+  }
+}

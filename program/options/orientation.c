@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The options that say where gravity points. */
+#include <math.h>
+#include <string.h>
+
+#include <supine/posture.h>
+
+#include "program/options/orientation.h"
+
+static int unknown_posture(const char *command, const char *name) {
+  enum { NAMES_MAX = 32 };
+  const char *names[NAMES_MAX];
+  const size_t count = supine_posture_count() < NAMES_MAX ? supine_posture_count() : NAMES_MAX;
+  for (size_t i = 0; i < count; ++i) {
+    names[i] = supine_posture_name(i);
+  }
+  const char *nearest = supine_options_suggest(name, names, count);
+  if (nearest != NULL) {
+    return supine_options_usage(command, "no posture '%s'; did you mean '%s'?", name, nearest);
+  }
+  return supine_options_usage(command,
+                              "no posture '%s': there are supine, prone, left, right, upright, "
+                              "inverted and the DICOM patient positions",
+                              name);
+}
+
+/* Makes a direction of a vector of any length, which it returns; 0 where it has none. */
+static double make_unit(double g[3]) {
+  const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
+  double square = 0.0;
+  for (int i = 0; i < 3 && largest > 0.0; ++i) {
+    g[i] /= largest; /* so that no square overflows or vanishes */
+    square += g[i] * g[i];
+  }
+  for (int i = 0; i < 3 && largest > 0.0; ++i) {
+    g[i] /= sqrt(square);
+  }
+  return largest * sqrt(square);
+}
+
+/* "supine+15", "prone-20"; untouched where it is none. */
+static bool parse_tilted(const char *name, double gravity[3]) {
+  const char *sign = name + strcspn(name, "+-");
+  char front[SUPINE_POSTURE_NAME_MAX];
+  double degrees = 0.0;
+  double level[3];
+  (void)snprintf(front, sizeof front, "%.*s", (int)(sign - name), name);
+  return supine_options_parse_number(sign, &degrees) &&
+         supine_posture_gravity(front, level) == SUPINE_OK &&
+         supine_posture_tilt(level, degrees, gravity) == SUPINE_OK;
+}
+
+int supine_options_posture(const char *command, const char *text, double gravity[3]) {
+  if (supine_posture_gravity(text, gravity) == SUPINE_OK || parse_tilted(text, gravity)) {
+    return SUPINE_EXIT_OK;
+  }
+  if (strchr(text, ':') == NULL) {
+    return unknown_posture(command, text);
+  }
+  char commas[SUPINE_POSTURE_NAME_MAX];
+  (void)snprintf(commas, sizeof commas, "%s", text);
+  for (char *c = commas; *c != '\0'; ++c) {
+    *c = (char)(*c == ':' ? ',' : *c);
+  }
+  if (!supine_options_parse_numbers(commas, 3, gravity)) {
+    return supine_options_usage(command, "'%s': gravity is three finite numbers, X:Y:Z", text);
+  }
+  return make_unit(gravity) > 0.0
+             ? SUPINE_EXIT_OK
+             : supine_options_usage(command, "gravity 0:0:0 has no direction; supine is 0:1:0");
+}
+
+static int read_posture(const char *command, const char *value, void *field) {
+  return supine_options_posture(command, value, field);
+}
+
+static int read_gravity(const char *command, const char *value, void *field) {
+  if (!supine_options_parse_numbers(value, 3, field)) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  const double length = make_unit(field);
+  if (length == 0.0) {
+    return supine_options_usage(command, "gravity 0,0,0 has no direction; supine is 0,1,0");
+  }
+  if (fabs(length - 1.0) > 1e-6) {
+    supine_options_say(command, "note: gravity has length %g; only its direction counts", length);
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static int read_quaternion(const char *command, const char *value, void *field) {
+  double q[4];
+  (void)command;
+  return supine_options_fits(supine_options_parse_numbers(value, 4, q) &&
+                             supine_posture_quaternion(q, field) == SUPINE_OK);
+}
+
+#define GRAVITY                                                                                    \
+  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+      .rivals = "gravity"
+
+static const char *const postures[] = {"supine",  "prone",    "left", "right",
+                                       "upright", "inverted", NULL};
+
+const supine_option supine_options_orientation[] = {
+    {.help = "Where gravity points (one of the first three):"},
+    {"posture", 0, "NAME",
+     "supine, prone, left, right (lying on that side), upright, inverted, or a DICOM patient "
+     "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR; supine+15: tilted, as by --tilt 15",
+     GRAVITY, .read = read_posture, .choices = postures},
+    {"gravity", 0, "X,Y,Z",
+     "a direction in body axes: x to the left, y to the back, z to the head; supine is 0,1,0",
+     GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
+    {"quaternion", 0, "W,X,Y,Z",
+     "rotation from body axes to a world whose z points up; 1,0,0,0 is upright", GRAVITY,
+     .read = read_quaternion, .wants = "four finite numbers, W,X,Y,Z, not all 0"},
+    {"tilt", 0, "DEGREES",
+     "turns gravity in the sagittal plane from the back towards the head: from supine, 15 is "
+     "Trendelenburg, head down",
+     SUPINE_FILLS(supine_orientation, tilt), .wants = "degrees"},
+    {.name = NULL}};
+
+int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
+                                      double gravity[3]) {
+  if (!orientation->given && orientation->tilt == 0.0) {
+    return supine_options_usage(command, "where does gravity point? Give --posture, for example");
+  }
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  (void)supine_posture_tilt(orientation->given ? orientation->gravity : supine, orientation->tilt,
+                            gravity); /* both are finite */
+  return SUPINE_EXIT_OK;
+}

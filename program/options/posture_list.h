@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lists of orientations on the command line: names, tilted names, gravity triples. */
+#ifndef SUPINE_POSTURE_LIST_H
+#define SUPINE_POSTURE_LIST_H
+
+#include "program/options/orientation.h"
+
+enum { SUPINE_POSTURE_LIST_MAX = 32 };
+
+/* One orientation: as the user wrote it, and its unit direction of gravity. */
+typedef struct supine_posture_item {
+  char name[SUPINE_POSTURE_NAME_MAX];
+  double gravity[3];
+} supine_posture_item;
+
+typedef struct supine_posture_list {
+  size_t count;
+  supine_posture_item item[SUPINE_POSTURE_LIST_MAX];
+} supine_posture_list;
+
+/* What a list may hold, for a command's help. */
+#define SUPINE_POSTURE_LIST_HELP                                                                   \
+  "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
+  "position), a name tilted by degrees towards the head (supine+15: Trendelenburg), or gravity "   \
+  "in body axes with colons, X:Y:Z (0.6:0:-0.8)."
+
+/* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
+int supine_options_posture_list_parse(const char *command, const char *text,
+                                      supine_posture_list *list);
+
+#endif

@@ -1,0 +1,340 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine precompute: lung surfaces in, basis file out. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/csv.h"
+#include "sh/base/output.h"
+#include <supine/sh.h>
+
+#include "program/model_options.h"
+#include "precompute/patient/patient_file.h"
+
+static const char name[] = "precompute";
+
+typedef struct request {
+  supine_model_options model;
+  supine_precompute_options basis;
+  const char *path;
+  const char *fields, *patient;
+  char summary[256];
+  bool has_band;
+  unsigned kind; /* 1: scalar */
+} request;
+
+static int read_modes(const char *command, const char *text, void *field) {
+  size_t *modes = field;
+  (void)command;
+  if (strcmp(text, "harmonics") == 0) {
+    *modes = 0;
+    return SUPINE_EXIT_OK;
+  }
+  return supine_options_fits(supine_options_parse_count(text, modes) && *modes >= 1 &&
+                             *modes <= SUPINE_MODES_MADE_MAX);
+}
+
+static const char *const routes[] = {"auto", "linear", "sampled", "smooth",
+                                     NULL}; /* as supine_route */
+static const char *const kinds[] = {"vector", "scalar", NULL};
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "basis file (safetensors)", SUPINE_FILLS(request, path),
+     .required = true, .file = SUPINE_FILE_OUT},
+    {"band", 0, "L", "highest spherical-harmonic band, 0 to 64", SUPINE_FILLS(request, basis.band),
+     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX}},
+    {"modes", 0, "K|harmonics",
+     "functions of orientation, and so multiplications per vertex, at run time: the best K of the "
+     "band (fewer where fewer do), or the (L+1)^2 harmonics themselves. The paper's form is --band "
+     "3 --modes harmonics",
+     SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
+     .wants = "1 to 64 or 'harmonics'"},
+    {"route", 0, "ROUTE",
+     "linear: a few solves for all directions, exact while --soften is 0 (default there); smooth: "
+     "a "
+     "polynomial through some 100 directions, for --soften up to some 2.5 (default there); "
+     "sampled: "
+     "a solve for each direction of a grid",
+     SUPINE_FILLS(request, basis.route), .choices = routes},
+    {"held-out", 0, "N", "directions that the error is measured on; default 100 to 1000",
+     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}},
+    {"patient", 0, "FILE",
+     "a person's own law, as 'supine fit' found it, in place of the directions and the force below",
+     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
+    {.help = "Instead of the built-in physics, fields that another simulator computed:"},
+    {"fields", 0, "LIST",
+     "CSV with the columns gx,gy,gz,file: directions of gravity and the same surface deformed; or "
+     "a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the rest surface. "
+     "The highest band that the directions determine and cross-validation favours is taken, "
+     "unless --band names one",
+     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions"},
+    {"kind", 0, "vector|scalar",
+     "keep three components, or magnitude x best direction, a third of the size, with the loss "
+     "stated",
+     SUPINE_FILLS(request, kind), .choices = kinds, .standard = "vector"},
+    {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
+    {.name = NULL}};
+
+/* Share of turned triangles that is worth a word. */
+static const double turned_over_limit = 0.01;
+
+static void report_result(const char *path, const supine_lungs *lungs,
+                          const supine_precompute_options *options,
+                          const supine_precompute_report *report) {
+  const supine_accuracy *accuracy = &report->accuracy;
+  char state[48];
+  if (!options->reference->known) {
+    (void)snprintf(state, sizeof state, "%g mL", accuracy->volume);
+  } else if (accuracy->volume == 1.0) {
+    (void)snprintf(state, sizeof state, "rest");
+  } else {
+    (void)snprintf(state, sizeof state, "%g of the way to rest", accuracy->volume);
+  }
+  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s\n", path,
+               lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
+               options->band, report->mode_count, options->modes == 0 ? "harmonics" : "modes");
+  (void)printf("assumed: %s\n", options->assumed);
+  (void)printf("error against the full solve, on %zu directions that no grid used:\n"
+               "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n",
+               accuracy->direction_count, 100.0 * accuracy->relative_rms,
+               100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
+  if (accuracy->volume > 0.0) {
+    (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %s\n",
+                 accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
+  }
+  if (report->turned_over > turned_over_limit) {
+    (void)printf("the surface looks torn: %.3g %% of its triangles turn over at %s in the worst of "
+                 "six\npostures. %s\n",
+                 100.0 * report->turned_over, state,
+                 options->model.reach == 0.0
+                     ? "The paper's forces spread over a few links, however short they are;\n"
+                       "--reach 10 spreads them over 10 mm and leaves next to none"
+                     : "A longer --reach spreads forces further");
+  }
+}
+
+/* What the directions of a fit can and cannot carry. */
+static void report_fit(const char *path, const supine_fields *fields, const supine_fit_report *fit,
+                       size_t mode_count, bool scalar) {
+  const size_t highest = fit->band_highest;
+  (void)printf("%s: %s field of %zu vertices from %zu %s directions, band %zu, %zu modes\n", path,
+               scalar ? "scalar" : "vector", fields->vertex_count, fields->direction_count,
+               fit->grid ? "gridded" : "scattered", fit->band, mode_count);
+  (void)printf("the directions determine bands up to %zu (%zu harmonics); leave-one-out error:\n",
+               highest, (highest + 1) * (highest + 1));
+  for (size_t band = 0; band <= highest; ++band) {
+    (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
+                 band == fit->band ? "  <- taken" : "");
+  }
+  (void)printf("condition of the harmonics at these directions: %.3g\n", fit->condition);
+  if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
+    (void)printf("the error still falls there: detail beyond band %zu is not carried; some %zu\n"
+                 "directions, evenly spread, would reach band %zu\n",
+                 highest, 2 * (highest + 2) * (highest + 2), highest + 1);
+  }
+  if (scalar) {
+    (void)printf("one direction a vertex loses %.3g %% RMS of the displacement\n",
+                 100.0 * fit->scalar_loss);
+  }
+  (void)printf("error of the basis, each direction predicted from the others:\n"
+               "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
+               "  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest\n",
+               100.0 * fit->accuracy.relative_rms, 100.0 * fit->accuracy.relative_p95,
+               100.0 * fit->accuracy.relative_max, fit->accuracy.rms_mm, fit->accuracy.p95_mm,
+               fit->accuracy.max_mm);
+}
+
+/* The output must be none of the surfaces that a list of fields names. */
+static int check_fields(const char *list, const char *output) {
+  static const char *const columns[] = {"gx", "gy", "gz", "file"};
+  supine_csv csv;
+  bool more = true;
+  int result = SUPINE_EXIT_OK;
+  if (supine_csv_open(list, columns, 4, 4, &csv, NULL) != SUPINE_OK) {
+    return SUPINE_EXIT_OK; /* no list: what is wrong with it is said when it is loaded */
+  }
+  while (result == SUPINE_EXIT_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
+    char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
+    if (path == NULL) {
+      supine_options_say(name, "out of memory");
+      result = SUPINE_EXIT_NUMERICAL;
+    } else {
+      result = supine_options_check_output(name, output, path);
+    }
+    free(path);
+  }
+  supine_csv_close(&csv);
+  return result;
+}
+
+static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
+  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
+                                      .modes = wanted->basis.modes,
+                                      .scalar = wanted->kind == 1};
+  supine_fields fields = {0};
+  supine_fit_report report;
+  size_t mode_count = 0;
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  if (supine_fields_load(wanted->fields, lungs, &wanted->model.load, &fields, &error) !=
+          SUPINE_OK ||
+      supine_precompute_fields(lungs, &fields, &options, made_by, wanted->path, &report,
+                               &mode_count, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    report_fit(wanted->path, &fields, &report, mode_count, options.scalar);
+    result = supine_options_finish(name);
+  }
+  supine_fields_free(&fields);
+  return result;
+}
+
+static int compute(const supine_lungs *lungs, request *wanted, const char *made_by) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_precompute_report report;
+  supine_error error;
+  wanted->basis.model = wanted->model.model;
+  wanted->basis.reference = &wanted->model.reference;
+  wanted->basis.made_by = made_by;
+  wanted->basis.assumed = wanted->model.assumed;
+  wanted->basis.frame = wanted->model.frame;
+  wanted->basis.progress = supine_options_progress_step;
+  wanted->basis.progress_context = &progress;
+  supine_options_signals_catch(true);
+  const supine_status status =
+      supine_precompute(lungs, &wanted->basis, wanted->path, &report, &error);
+  supine_options_progress_end(&progress);
+  if (status != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
+  report_result(wanted->path, lungs, &wanted->basis, &report);
+  return supine_options_finish(name);
+}
+
+/* Directions and force of a person's own law; what is kept of it in the file is owned by the
+ * caller.
+ */
+static supine_status take_patient(const supine_lungs *lungs, request *wanted, char **text,
+                                  supine_error *error) {
+  supine_model_options *model = &wanted->model;
+  supine_patient_record record;
+  supine_status status = supine_patient_read(wanted->patient, &record, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  model->vectors = malloc(3 * lungs->mesh.vertex_count * sizeof *model->vectors);
+  *text = supine_patient_text(&record, NULL, NULL);
+  if (model->vectors == NULL || *text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                            lungs->mesh.vertex_count);
+  }
+  if (supine_patient_is_uneven(&record)) {
+    if (model->stiffness != NULL) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s brings its own stiffness: leave --expandability out",
+                              wanted->patient);
+    }
+    model->stiffness = malloc(lungs->mesh.vertex_count * sizeof *model->stiffness);
+    if (model->stiffness == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              lungs->mesh.vertex_count);
+    }
+    supine_patient_stiffness_of(&record.stiffness, lungs, model->stiffness);
+    model->model.stiffness = model->stiffness;
+  }
+  status = supine_patient_directions(&record, lungs, &model->model, model->vectors, error);
+  model->model.direction.model = SUPINE_DIRECTION_VECTORS;
+  model->model.direction.vectors = model->vectors;
+  wanted->basis.patient = *text;
+  if (status == SUPINE_OK) {
+    (void)snprintf(wanted->summary, sizeof wanted->summary,
+                   "%s: %s law from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
+                   record.name, supine_patient_law_names[record.patient.law], record.points,
+                   record.held_out, record.held_out_baseline, 100.0 * record.explained);
+    wanted->basis.patient_summary = wanted->summary;
+    (void)printf("%s\n", wanted->summary);
+  }
+  return status;
+}
+
+static void begin(void *chosen) {
+  supine_command_model_options_begin(&((request *)chosen)->model);
+}
+
+/* Constants beside a patient's: which of the two is meant? Only before loading, which fills in what
+ * was not given. */
+static int check_patient(const request *wanted) {
+  const supine_model_options *options = &wanted->model;
+  const supine_model *model = &options->model;
+  const supine_resting usual = supine_reference_resting_default();
+  const struct {
+    bool given;
+    const char *option;
+  } brought[] = {{options->law_choice != SUPINE_LAW_COUNT, "law"},
+                 {!isnan(model->force.base), "base"},
+                 {!isnan(model->force.gain), "gain"},
+                 {!isnan(model->force.box[0]), "box-force"},
+                 {!isnan(model->direction.c[0]), "constants"},
+                 {model->direction.model != SUPINE_DIRECTION_BOX, "direction"},
+                 {options->has_scan, "scanned"},
+                 {memcmp(&options->resting, &usual, sizeof usual) != 0, "resting"}};
+  for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
+    if (brought[i].given) {
+      return supine_options_usage(
+          name, "--patient brings its own law, force and scan: leave --%s out%s", brought[i].option,
+          strcmp(brought[i].option, "gain") == 0 ? ", or give it to 'supine fit'" : "");
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  supine_lungs lungs = {0};
+  supine_error error;
+  char *text = NULL;
+  if (supine_mesh_save_supports(wanted->path)) {
+    return supine_options_usage(
+        name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
+  }
+  int result = wanted->fields != NULL    ? check_fields(wanted->fields, wanted->path)
+               : wanted->patient != NULL ? check_patient(wanted)
+                                         : SUPINE_EXIT_OK;
+  if (result == SUPINE_EXIT_OK) {
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
+                                       wanted->fields != NULL || wanted->patient != NULL, &lungs);
+  }
+  if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
+      take_patient(&lungs, wanted, &text, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  }
+  if (result == SUPINE_EXIT_OK) {
+    result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)
+                                    : compute(&lungs, wanted, given->made_by);
+  }
+  free(text);
+  supine_lungs_free(&lungs);
+  supine_command_model_options_free(&wanted->model);
+  return result;
+}
+
+const supine_command supine_command_precompute = {
+    name,
+    "turn lung surfaces into a basis file (offline)",
+    .usage = "MESH... -o FILE [OPTIONS]\n"
+             "LABELS... -o FILE [OPTIONS]",
+    .about =
+        "Solves the physics of one or two lungs for every direction of gravity at once and writes "
+        "a basis file, which 'supine deform' and the run-time library turn into deformed lungs in "
+        "real time. Both lungs may be in one file or in two; any surface that assimp reads will do "
+        "(PLY, OBJ, STL, OFF, ...), or the label map of a segmenter (NRRD, NIfTI). Closed surfaces "
+        "can be asked for exact volumes later.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine precompute left.ply right.ply -o lungs.safetensors\n"
+             "  supine precompute lungs.nii.gz -o lungs.safetensors\n"
+             "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors",
+    SUPINE_SURFACES,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine pv: fit a lung's pressure-volume relation to samples, and show one. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include "program/breath/pv.h"
+
+#include "program/options/command.h"
+
+static const char command[] = "pv";
+
+typedef struct request {
+  const char *output;
+  double confidence;
+  double step;
+  bool json;
+} request;
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "write the parameters (CSV, one row a limb)",
+     SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
+    {"confidence", 'c', "SHARE", "of the intervals printed, between 0 and 1",
+     SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
+     .wants = "a number between 0 and 1"},
+    {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
+    {"step", 's', "CMH2O", "pressure step of show", SUPINE_FILLS(request, step), .standard = "1",
+     SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
+    {.name = NULL}};
+
+/* What is not finite is null, as JSON has no word for it. */
+static json_t *json_numbers(size_t count, const double *numbers) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
+  }
+  return list;
+}
+
+static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
+  return json_pack("{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f}", "samples",
+                   (json_int_t)report->samples, "pressure_cmH2O", json_numbers(2, curve->pressure),
+                   "volume_mL", json_numbers(2, curve->volume), "volume_interval_mL",
+                   json_numbers(2, report->volume_interval), "control",
+                   json_numbers(SUPINE_PV_CONTROLS, curve->control), "control_interval",
+                   json_numbers(SUPINE_PV_CONTROLS, report->control_interval), "rms_mL",
+                   report->rms, "rms_percent", report->rms_percent, "condition", report->condition);
+}
+
+static void print_json(const supine_pv *pv, const supine_pv_report *reports, double confidence) {
+  json_t *root = json_pack("{s:f}", "confidence", confidence);
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    if (reports[limb].samples > 0) {
+      (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
+                                json_limb(&pv->limb[limb], &reports[limb]));
+    }
+  }
+  (void)json_dumpf(root, stdout, JSON_REAL_PRECISION(17));
+  (void)putchar('\n');
+  json_decref(root);
+}
+
+static void print_limb(const char *name, const supine_pv_curve *curve,
+                       const supine_pv_report *report) {
+  if (report->samples == 0) {
+    (void)printf("%s: no samples, the other limb's curve\n", name);
+    return;
+  }
+  (void)printf("%s: %zu samples, %g to %g cmH2O\n", name, report->samples, curve->pressure[0],
+               curve->pressure[1]);
+  (void)printf("  misfit     %.4g mL RMS, %.3g %% of the volume range\n", report->rms,
+               report->rms_percent);
+  (void)printf("  condition  %.3g\n", report->condition);
+  (void)printf("  V_low      %12.6g +- %.3g mL\n  V_high     %12.6g +- %.3g mL\n", curve->volume[0],
+               report->volume_interval[0], curve->volume[1], report->volume_interval[1]);
+  for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
+    (void)printf("  c%d         %12.6g +- %.3g\n", i + 1, curve->control[i],
+                 report->control_interval[i]);
+  }
+}
+
+static int run_fit(const char *path, const request *chosen) {
+  supine_error error = {0};
+  supine_pv pv = {0};
+  supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
+  supine_pv_samples samples = {0};
+  supine_status status = supine_breath_samples_load(path, &samples, &error);
+  if (status == SUPINE_OK) {
+    status = supine_breath_fit_samples(&samples, chosen->confidence, &pv, reports, &error);
+  }
+  supine_breath_samples_clear(&samples);
+  if (status == SUPINE_OK && chosen->output != NULL) {
+    status = supine_breath_save(chosen->output, &pv, &error);
+  }
+  if (status != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    if (reports[limb].rms_percent > 1.0) {
+      supine_options_say(command, "note: the %s samples scatter %.2g %% about their curve",
+                         supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
+    }
+  }
+  if (chosen->json) {
+    print_json(&pv, reports, chosen->confidence);
+    return supine_options_finish(command);
+  }
+  (void)printf("intervals at %g %% confidence\n", 100.0 * chosen->confidence);
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    print_limb(supine_breath_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
+  }
+  return supine_options_finish(command);
+}
+
+/* One row of show; nothing where the pressure is outside a limb. */
+static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
+  (void)printf("%.10g", pressure);
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    const supine_pv_curve *curve = &pv->limb[limb];
+    if (pressure < curve->pressure[0] || pressure > curve->pressure[1]) {
+      (void)printf(",,");
+      continue;
+    }
+    double volume = 0.0;
+    double compliance = 0.0;
+    const supine_status status =
+        supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    (void)printf(",%.7g,%.7g", volume, compliance);
+  }
+  (void)putchar('\n');
+  return SUPINE_OK;
+}
+
+static int run_show(const char *path, const request *chosen) {
+  enum { ROWS_MAX = 1000000 };
+  supine_error error = {0};
+  supine_pv pv = *supine_breath_normal();
+  supine_status status = path != NULL ? supine_breath_load(path, &pv, &error) : SUPINE_OK;
+  if (status != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
+  const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
+  const double steps = (high - low) / chosen->step;
+  if (!(steps < ROWS_MAX)) {
+    return supine_options_usage(command, "--step is too small for this range");
+  }
+  (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
+  for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
+    status = print_row(&pv, low + (double)j * chosen->step, &error);
+  }
+  if (status == SUPINE_OK) {
+    status = print_row(&pv, high, &error);
+  }
+  return status == SUPINE_OK ? supine_options_finish(command)
+                             : supine_options_fail(command, &error);
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const char *verb = given->operand[0];
+  const char *file = given->count > 1 ? given->operand[1] : NULL;
+  if (strcmp(verb, "fit") == 0) {
+    return file != NULL ? run_fit(file, chosen)
+                        : supine_options_usage(command, "fit takes one file of samples");
+  }
+  return strcmp(verb, "show") == 0 ? run_show(file, chosen)
+                                   : supine_options_usage(command, "fit or show, not '%s'", verb);
+}
+
+const supine_command supine_command_pv = {
+    command,
+    "fit a pressure-volume relation to samples, and show one",
+    .usage = "fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
+             "show [FILE] [--step CMH2O]",
+    .about =
+        "The lung's pressure-volume relation, measured or built in, as `supine breathe --pv FILE` "
+        "uses it.\n"
+        "\n"
+        "fit finds the five control parameters of each limb from samples, and says how sure they "
+        "are and how far the curve misses the samples (RMS, in mL and as a percentage of the "
+        "volume range; Venegas' and Salazar-Knowles' curves are followed to under 1 %).\n"
+        "\n"
+        "show prints volume and compliance against pressure as CSV; without FILE, of the built-in "
+        "normal adult lung.\n"
+        "\n"
+        "SAMPLES.csv has one sample a line, in order of pressure within each limb:\n"
+        "\n"
+        "      # static manoeuvre; lines like this one are comments\n"
+        "      pressure_cmH2O,volume_mL,limb\n"
+        "      0,2250,inhale\n"
+        "      2.5,2390,inhale\n"
+        "      ...\n"
+        "      30,5980,exhale\n"
+        "\n"
+        "Without the column limb all samples are inhale. A limb needs at least 8 samples; where "
+        "one limb has none it takes the other's curve. With much noise, 1 % of the volume range "
+        "say, take 20 or more. Volumes may be absolute or above any reference: breathing uses "
+        "differences alone.",
+    .options = table,
+    .notes =
+        "The model, each limb on its own: V'' = u V' over the pressures of its samples, mapped to "
+        "x from -1 to 1, u = c1 P0(x) + ... + c5 P4(x) with Legendre polynomials P0 to P4. V' is "
+        "the compliance, u how fast it changes: c1 < 0 stiffens towards high pressure, c2 < 0 "
+        "puts the greatest compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 "
+        "sharpen its knees.\n"
+        "\n"
+        "Examples:\n"
+        "  supine pv fit patient.csv -o patient.pv.csv\n"
+        "  supine breathe lungs.safetensors --pv patient.pv.csv -o breath.pvd\n"
+        "  supine pv show patient.pv.csv --step 0.5 > curve.csv",
+    .operands_least = 1,
+    .operands_most = 2,
+    .operands_missing = "fit or show what? One file at most",
+    .request_size = sizeof(request),
+    .run = run};

@@ -1,0 +1,515 @@
+/* SPDX-License-Identifier: MIT */
+/* Postures side by side, composed by cairo. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cairo.h>
+
+#include "program/render/render.h"
+
+static const double pi = 3.14159265358979323846;
+
+typedef struct theme {
+  double top[3], bottom[3]; /* ground */
+  double card[3], edge[3];
+  double text[3], faint[3];
+} theme;
+
+static const theme themes[2] = {
+    {{0.985, 0.988, 0.992},
+     {0.925, 0.941, 0.957},
+     {1, 1, 1},
+     {0.86, 0.885, 0.91},
+     {0.09, 0.13, 0.18},
+     {0.37, 0.43, 0.49}},
+    {{0.075, 0.09, 0.115},
+     {0.045, 0.055, 0.07},
+     {0.105, 0.125, 0.155},
+     {0.17, 0.2, 0.24},
+     {0.94, 0.955, 0.97},
+     {0.6, 0.655, 0.71}},
+};
+static const double accent[3] = {0.91, 0.33, 0.17}; /* gravity */
+
+/* Where things go, in pixels. */
+typedef struct layout {
+  double font;
+  double margin;
+  double top; /* below the heading */
+  double cell_width, cell_height;
+  double strip; /* a cell's head, above its lungs */
+  double bar;   /* height of the foot with the bar of colours */
+} layout;
+
+typedef struct bar_scale {
+  double largest;
+  double step;
+} bar_scale;
+
+static void colour(cairo_t *cr, const double rgb[3]) {
+  cairo_set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
+}
+
+static void font(cairo_t *cr, double size, bool bold) {
+  cairo_select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                         bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size(cr, size);
+}
+
+static double text_width(cairo_t *cr, const char *text) {
+  cairo_text_extents_t extents;
+  cairo_text_extents(cr, text, &extents);
+  return extents.x_advance;
+}
+
+/* Text whose left end, middle or right end (align 0, 0.5, 1) is at x. */
+static void text(cairo_t *cr, double x, double y, double align, const char *words) {
+  cairo_move_to(cr, x - align * text_width(cr, words), y);
+  cairo_show_text(cr, words);
+}
+
+/* The same, made smaller where it is wider than `room`. */
+static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
+                        const char *words) {
+  font(cr, size, bold);
+  const double width = text_width(cr, words);
+  if (width > room) {
+    font(cr, size * room / width, bold);
+  }
+  text(cr, x, y, 0, words);
+}
+
+static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
+  cairo_new_sub_path(cr);
+  cairo_arc(cr, x + width - radius, y + radius, radius, -pi / 2, 0);
+  cairo_arc(cr, x + width - radius, y + height - radius, radius, 0, pi / 2);
+  cairo_arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
+  cairo_arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
+  cairo_close_path(cr);
+}
+
+static void ground(cairo_t *cr, const supine_picture *picture, const theme *look) {
+  cairo_pattern_t *fade = cairo_pattern_create_linear(0, 0, 0, (double)picture->height);
+  cairo_pattern_add_color_stop_rgb(fade, 0, look->top[0], look->top[1], look->top[2]);
+  cairo_pattern_add_color_stop_rgb(fade, 1, look->bottom[0], look->bottom[1], look->bottom[2]);
+  cairo_set_source(cr, fade);
+  cairo_paint(cr);
+  cairo_pattern_destroy(fade);
+}
+
+/* An arrow from the centre of the ball; towards or away from the viewer: a dot or a cross. */
+static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
+  const double flat = hypot(seen[0], seen[1]);
+  cairo_new_path(cr);
+  colour(cr, accent);
+  cairo_set_line_width(cr, radius * 0.13);
+  if (flat < 0.35) {
+    const double r = radius * 0.3;
+    cairo_arc(cr, x, y, r, 0, 2 * pi);
+    cairo_stroke(cr);
+    if (seen[2] > 0) {
+      cairo_arc(cr, x, y, r * 0.42, 0, 2 * pi);
+      cairo_fill(cr);
+      return;
+    }
+    const double d = r * 0.6;
+    cairo_move_to(cr, x - d, y - d);
+    cairo_line_to(cr, x + d, y + d);
+    cairo_move_to(cr, x - d, y + d);
+    cairo_line_to(cr, x + d, y - d);
+    cairo_stroke(cr);
+    return;
+  }
+  const double dx = seen[0] / flat;
+  const double dy = -seen[1] / flat;
+  const double length = radius * fmax(flat, 0.55);
+  const double head = radius * 0.42;
+  const double neck = length - head;
+  cairo_move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
+  cairo_line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
+  cairo_stroke(cr);
+  cairo_move_to(cr, x + length * dx, y + length * dy);
+  cairo_line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
+  cairo_line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
+  cairo_close_path(cr);
+  cairo_fill(cr);
+}
+
+/* The ball that says how the body lies to the viewer, and gravity to the body. */
+static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
+                 const double gravity[3], const theme *look) {
+  static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
+  double axes[3][3];
+  double seen[3] = {0, 0, 0};
+  supine_render_view_axes(view, axes);
+  cairo_arc(cr, x, y, radius, 0, 2 * pi);
+  cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.13);
+  cairo_fill_preserve(cr);
+  cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.5);
+  cairo_set_line_width(cr, fmax(0.6, radius * 0.035));
+  cairo_stroke(cr);
+  font(cr, radius * 0.4, false);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double dx = axes[0][axis];
+    const double dy = -axes[1][axis];
+    for (int row = 0; row < 3; ++row) {
+      seen[row] += axes[row][axis] * gravity[axis];
+    }
+    if (hypot(dx, dy) < 0.3) {
+      continue;
+    }
+    cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.45);
+    cairo_move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
+    cairo_line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
+    cairo_stroke(cr);
+    for (int end = 0; end < 2; ++end) {
+      const double reach = (end == 0 ? 0.8 : -0.8) * radius;
+      cairo_set_source_rgba(cr, look->text[0], look->text[1], look->text[2], 0.8);
+      text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
+    }
+  }
+  gravity_arrow(cr, x, y, radius * 0.66, seen);
+}
+
+/* Discs and specks at what is inside, then the names, so that none is covered. Eight parameters:
+ * where, what, and in which colours. */
+static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
+                                const supine_marks *marks, double size, double x, double y,
+                                const theme *look) {
+  double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
+  if (pixel == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_render_project(renderer, scene, marks, pixel);
+  for (int names = 0; names < 2; ++names) {
+    for (size_t i = 0; i < marks->count; ++i) {
+      const supine_mark *mark = &marks->mark[i];
+      const double *at = pixel[i];
+      double rgb[3];
+      if (names == 1 ? mark->label == NULL : mark->label != NULL && !mark->point) {
+        continue;
+      }
+      supine_render_colour(scene->colours, fmin(1, (double)mark->value / scene->largest), rgb);
+      if (names == 0) {
+        cairo_new_path(cr);
+        cairo_arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
+        colour(cr, rgb);
+        cairo_fill_preserve(cr);
+        cairo_set_line_width(cr, size * 0.1);
+        colour(cr, mark->point ? look->text : rgb);
+        cairo_stroke(cr);
+        continue;
+      }
+      font(cr, size * 0.75, false);
+      const double beside = at[0] + size * 0.5;
+      const double room = (double)scene->width - text_width(cr, mark->label);
+      cairo_move_to(cr, x + fmax(0, fmin(beside, room)), y + at[1] - size * 0.3);
+      cairo_text_path(cr, mark->label);
+      cairo_set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
+      cairo_set_line_width(cr, size * 0.25);
+      cairo_stroke_preserve(cr);
+      colour(cr, look->text);
+      cairo_fill(cr);
+    }
+  }
+  free(pixel);
+  return SUPINE_OK;
+}
+
+/* Thirteen parameters: a panel, the view of it, and its place in the picture, which cell() has
+ * just worked out. */
+static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                           const supine_panel *panel, supine_view view, const bar_scale *bar,
+                           double x, double y, double width, double height, double size,
+                           const double *extent, supine_error *error) {
+  const supine_scene scene = {.weights = panel->weights,
+                              .scales = panel->scales,
+                              .value = panel->value,
+                              .largest = bar->largest,
+                              .line_step = bar->step,
+                              .colours = picture->colours,
+                              .view = view,
+                              .dark = picture->dark,
+                              .width = (size_t)width,
+                              .height = (size_t)height,
+                              .extent = extent};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  cairo_surface_t *image =
+      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene.width, (int)scene.height);
+  if (cairo_surface_status(image) != CAIRO_STATUS_SUCCESS ||
+      (size_t)cairo_image_surface_get_stride(image) != 4 * scene.width) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  cairo_surface_flush(image);
+  status = supine_render_draw(renderer, &scene,
+                              (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
+  if (status == SUPINE_OK) {
+    cairo_surface_mark_dirty(image);
+    cairo_set_source_surface(cr, image, floor(x), floor(y));
+    cairo_paint_with_alpha(cr, 1 - picture->transparency);
+    if (panel->marks != NULL) {
+      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
+                          &themes[picture->dark ? 1 : 0]);
+    }
+  }
+cleanup:
+  cairo_surface_destroy(image);
+  return status;
+}
+
+/* Nine parameters: the picture, and which part of it. */
+static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                          const layout *at, const bar_scale *bar, size_t column, size_t row,
+                          const double extent[4], supine_error *error) {
+  const theme *look = &themes[picture->dark ? 1 : 0];
+  const supine_panel *panel = &picture->panel[column];
+  const supine_view view = picture->view[row];
+  const double gap = at->margin / 2;
+  const double x = at->margin + (double)column * (at->cell_width + gap);
+  const double y = at->top + (double)row * (at->cell_height + gap);
+  const double radius = at->strip * 0.4;
+  const double words = x + 2 * radius + at->font * 1.5;
+  const double room = x + at->cell_width - words - at->font;
+  rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
+  colour(cr, look->card);
+  cairo_fill_preserve(cr);
+  colour(cr, look->edge);
+  cairo_set_line_width(cr, 1);
+  cairo_stroke(cr);
+  ball(cr, x + radius + at->font * 0.7, y + at->strip / 2 + at->font * 0.2, radius, view,
+       panel->gravity, look);
+  colour(cr, look->text);
+  fitted_text(cr, words, y + at->strip / 2 - at->font * 0.25, at->font * 1.3, true, room,
+              panel->title);
+  colour(cr, look->faint);
+  fitted_text(cr, words, y + at->strip / 2 + at->font * 0.95, at->font * 0.82, false, room,
+              panel->subtitle);
+  fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
+              supine_render_view_name(view));
+  return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->strip,
+               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, at->font,
+               extent, error);
+}
+
+static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
+                       const bar_scale *bar) {
+  enum { STOPS = 64 };
+  const theme *look = &themes[picture->dark ? 1 : 0];
+  const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
+  const double x = ((double)picture->width - width) / 2;
+  const double y = (double)picture->height - at->bar + at->font * 1.65;
+  const double height = at->font * 0.8;
+  cairo_pattern_t *fade = cairo_pattern_create_linear(x, 0, x + width, 0);
+  for (int i = 0; i <= STOPS; ++i) {
+    double rgb[3];
+    supine_render_colour(picture->colours, i / (double)STOPS, rgb);
+    cairo_pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
+  }
+  cairo_rectangle(cr, x, y, width, height);
+  if (picture->beyond) {
+    cairo_move_to(cr, x + width, y);
+    cairo_line_to(cr, x + width + 0.9 * height, y + height / 2);
+    cairo_line_to(cr, x + width, y + height);
+  }
+  cairo_set_source(cr, fade);
+  cairo_fill(cr);
+  cairo_pattern_destroy(fade);
+  font(cr, at->font * 0.85, false);
+  colour(cr, look->text);
+  text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
+  colour(cr, look->faint);
+  cairo_set_line_width(cr, 1);
+  for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
+    char number[32];
+    const double tick = x + width * i * bar->step / bar->largest;
+    (void)snprintf(number, sizeof number, "%g", i * bar->step);
+    cairo_move_to(cr, tick, y + height + at->font * 0.15);
+    cairo_line_to(cr, tick, y + height + at->font * 0.4);
+    cairo_stroke(cr);
+    text(cr, tick, y + height + at->font * 1.3, 0.5, number);
+  }
+}
+
+static layout make_layout(const supine_picture *picture) {
+  layout at;
+  const double width = (double)picture->width;
+  const double height = (double)picture->height;
+  at.font =
+      fmin(width / (double)picture->panel_count / 19, height / (double)picture->view_count / 24);
+  at.font = fmin(28, at.font);
+  at.margin = at.font * 0.9;
+  at.top = at.margin + (picture->heading != NULL ? at.font * 2.4 : 0);
+  at.strip = at.font * 5.2;
+  at.bar = at.font * 4.6;
+  const double gap = at.margin / 2;
+  at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
+                  (double)picture->panel_count;
+  at.cell_height = (height - at.top - at.bar - gap * (double)(picture->view_count - 1)) /
+                   (double)picture->view_count;
+  return at;
+}
+
+/* Widens an extent to what one view of a picture shows. */
+static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
+                  double extent[4]) {
+  for (size_t column = 0; column < picture->panel_count; ++column) {
+    const supine_scene scene = {.weights = picture->panel[column].weights,
+                                .scales = picture->panel[column].scales,
+                                .view = picture->view[row]};
+    supine_render_extent(renderer, &scene, extent);
+  }
+}
+
+void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+                                  double (*extent)[4]) {
+  for (size_t row = 0; row < picture->view_count; ++row) {
+    widen(renderer, picture, row, extent[row]);
+  }
+}
+
+static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                             supine_error *error) {
+  const theme *look = &themes[picture->dark ? 1 : 0];
+  const layout at = make_layout(picture);
+  const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
+  supine_status status = SUPINE_OK;
+  if (at.font < 4) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT, "%zu x %zu pixels are too few for %zu postures and %zu views",
+        picture->width, picture->height, picture->panel_count, picture->view_count);
+  }
+  ground(cr, picture, look);
+  if (picture->heading != NULL) {
+    colour(cr, look->text);
+    fitted_text(cr, at.margin * 1.2, at.margin + at.font * 1.5, at.font * 1.5, true,
+                (double)picture->width - 2.4 * at.margin, picture->heading);
+  }
+  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
+    double extent[4] = SUPINE_EXTENT_NONE;
+    if (picture->extent != NULL) {
+      memcpy(extent, picture->extent[row], sizeof extent);
+    } else {
+      widen(renderer, picture, row, extent);
+    }
+    for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
+      status = cell(cr, renderer, picture, &at, &bar, column, row, extent, error);
+    }
+  }
+  colour_bar(cr, picture, &at, &bar);
+  return status;
+}
+
+static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned length) {
+  return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
+}
+
+/* The picture on a surface, which the caller destroys; its pixels are cairo's or the caller's. */
+static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
+                             const supine_picture *picture, supine_error *error) {
+  supine_status status = SUPINE_ERROR_MEMORY;
+  cairo_t *cr = cairo_create(surface);
+  if (cairo_status(cr) == CAIRO_STATUS_SUCCESS) {
+    status = compose(cr, renderer, picture, error);
+    cairo_surface_flush(surface);
+  } else {
+    (void)supine_error_set(error, status, "out of memory");
+  }
+  cairo_destroy(cr);
+  return status;
+}
+
+static supine_status check_size(const supine_picture *picture, supine_error *error) {
+  enum { SIZE_MAX_CAIRO = 32767 };
+  return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "a picture has at most %d x %d pixels", SIZE_MAX_CAIRO,
+                                SIZE_MAX_CAIRO);
+}
+
+supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+                                         uint32_t *pixels, supine_error *error) {
+  supine_status status = check_size(picture, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *surface = cairo_image_surface_create_for_data(
+      (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
+      (int)(4 * picture->width));
+  status = draw_on(surface, renderer, picture, error);
+  cairo_surface_destroy(surface);
+  return status;
+}
+
+supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
+                                          FILE *file, supine_error *error) {
+  supine_status status = check_size(picture, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *surface =
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
+  status = draw_on(surface, renderer, picture, error);
+  if (status == SUPINE_OK) {
+    const cairo_status_t written = cairo_surface_write_to_png_stream(surface, to_file, file);
+    if (written != CAIRO_STATUS_SUCCESS) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s", cairo_status_to_string(written));
+    }
+  }
+  cairo_surface_destroy(surface);
+  return status;
+}
+
+/* Bytes of a growing file. */
+typedef struct buffer {
+  unsigned char *bytes;
+  size_t size, room;
+} buffer;
+
+static cairo_status_t to_buffer(void *closure, const unsigned char *bytes, unsigned length) {
+  buffer *out = closure;
+  if (out->room - out->size < length) {
+    const size_t room = 2 * out->room + length;
+    unsigned char *larger = realloc(out->bytes, room);
+    if (larger == NULL) {
+      return CAIRO_STATUS_NO_MEMORY;
+    }
+    out->bytes = larger;
+    out->room = room;
+  }
+  memcpy(out->bytes + out->size, bytes, length);
+  out->size += length;
+  return CAIRO_STATUS_SUCCESS;
+}
+
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
+                                unsigned char **bytes, size_t *size, supine_error *error) {
+  buffer out = {NULL, 0, 0};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  cairo_surface_t *image =
+      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
+  if (cairo_surface_status(image) == CAIRO_STATUS_SUCCESS &&
+      (size_t)cairo_image_surface_get_stride(image) == 4 * scene->width) {
+    cairo_surface_flush(image);
+    status = supine_render_draw(renderer, scene,
+                                (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
+    cairo_surface_mark_dirty(image);
+  } else {
+    (void)supine_error_set(error, status, "out of memory");
+  }
+  if (status == SUPINE_OK &&
+      cairo_surface_write_to_png_stream(image, to_buffer, &out) != CAIRO_STATUS_SUCCESS) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  cairo_surface_destroy(image);
+  if (status != SUPINE_OK) {
+    free(out.bytes);
+    return status;
+  }
+  *bytes = out.bytes;
+  *size = out.size;
+  return SUPINE_OK;
+}

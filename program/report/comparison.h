@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What 'supine compare' finds out, and the forms in which it tells. */
+#ifndef SUPINE_COMPARISON_H
+#define SUPINE_COMPARISON_H
+
+#include <stdio.h>
+
+#include <supine/compare.h>
+
+#include "program/options/posture_list.h"
+
+enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
+
+/* One posture at the inflation. */
+typedef struct supine_compared_posture {
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  supine_distance_statistics displacement;   /* from the file's surface */
+  double volume[SUPINE_LUNGS_MAX];           /* mL that each lung holds, tissue included; closed */
+  double gain[SUPINE_LUNGS_MAX];             /* mL that each takes of the breath; closed */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
+} supine_compared_posture;
+
+typedef struct supine_comparison {
+  const char *path;    /* of the basis, for showing */
+  const char *command; /* that compares, for what it says */
+  bool allow_folds;
+  const supine_basis *basis;
+  supine_inflation inflation;
+  double breath; /* mL, on top of the inflation where rest is known; else it is the breath */
+  supine_posture_list postures;
+  supine_compare *compare;
+  supine_compared_posture *posture; /* [count] */
+  supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
+  double constant, odd, even;       /* shares of energy: l = 0, odd bands, even bands beyond 0 */
+  supine_extremes extremes;         /* farthest: from supine */
+} supine_comparison;
+
+/* Fills in everything after `postures`. Release with supine_report_free also after failure. */
+supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
+void supine_report_free(supine_comparison *comparison);
+
+/* "rest", "rest +300 mL", "500 mL" or "5 mm RMS displacement". */
+void supine_report_inflation(const supine_comparison *comparison, char *text, size_t size);
+
+/* Whether the basis knows what rest is: then the inflation is a state, and breaths begin there. */
+bool supine_report_knows_rest(const supine_comparison *comparison);
+
+/* What all lungs together take of the breath in a posture, mL. */
+double supine_report_gain(const supine_comparison *comparison, size_t posture);
+
+/* The forms. They leave errors of writing to be found when the file is closed. */
+void supine_report_text(const supine_comparison *comparison, FILE *file);
+bool supine_report_json(const supine_comparison *comparison, FILE *file);
+void supine_report_csv(const supine_comparison *comparison, FILE *file);
+
+/* Without pictures, and why, where nothing can draw. */
+supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
+                                 supine_error *error);
+
+#endif

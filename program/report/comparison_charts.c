@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Charts of the HTML report: where their lines and dots go, in page/profile.html and page/map.html.
+ */
+#include <math.h>
+
+#include "program/render/render.h"
+#include "program/report/comparison_parts.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* What a profile shows of a slab, in %. */
+typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
+
+static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
+  const supine_slab *s = &c->posture[posture].slab[slab];
+  return s->volume > 0.0 ? 100.0 * s->gain / s->volume : 0.0;
+}
+
+static double share(const supine_comparison *c, size_t posture, size_t slab) {
+  const double gain = supine_report_gain(c, posture);
+  return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
+}
+
+/* The plot's box in page/profile.html. */
+enum { LEFT = 46, RIGHT = 404, TOP = 14, BOTTOM = 286 };
+
+static double across(double value, double low, double high) {
+  return LEFT + (RIGHT - LEFT) * (value - low) / (high - low);
+}
+
+static double down(double height) {
+  return BOTTOM - (BOTTOM - TOP) * height / 100.0;
+}
+
+static json_t *profile(const supine_comparison *c, const char *title, slab_value *value) {
+  double low = 0.0;
+  double high = 0.0;
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+      low = fmin(low, value(c, i, s));
+      high = fmax(high, value(c, i, s));
+    }
+  }
+  const double step = supine_render_bar_step(high - low);
+  low = step * floor(low / step);
+  high = step * fmax(1.0 + low / step, ceil(high / step));
+  json_t *heights = json_array();
+  json_t *ticks = json_array();
+  json_t *lines = json_array();
+  for (int height = 0; height <= 100; height += 20) {
+    (void)json_array_append_new(
+        heights, json_pack("{s:o, s:o, s:i}", "y", json_sprintf("%.1f", down(height)), "below",
+                           json_sprintf("%.1f", down(height) + 4), "height", height));
+  }
+  for (int i = 0; low + i * step <= high + 1e-9 * step; ++i) {
+    (void)json_array_append_new(
+        ticks, json_pack("{s:o, s:o}", "x", json_sprintf("%.1f", across(low + i * step, low, high)),
+                         "value", json_sprintf("%g", low + i * step)));
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    json_t *dots = json_array();
+    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+      (void)json_array_append_new(
+          dots,
+          json_pack("{s:o, s:o, s:o}", "x", json_sprintf("%.1f", across(value(c, i, s), low, high)),
+                    "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
+                    json_sprintf("%.2f", value(c, i, s))));
+    }
+    (void)json_array_append_new(
+        lines, json_pack("{s:s, s:s, s:b, s:o}", "line", supine_report_line(i), "name",
+                         c->postures.item[i].name, "dashed", (int)(i >= 7), "dots", dots));
+  }
+  return json_pack("{s:s, s:o, s:o, s:o}", "title", title, "heights", heights, "ticks", ticks,
+                   "lines", lines);
+}
+
+json_t *supine_report_profiles(const supine_comparison *c) {
+  return json_pack("[o, o]", profile(c, "regional expansion, %", expansion),
+                   profile(c, "share of the volume gained, %", share));
+}
+
+/* RMS distance from supine in mm, or NaN where the inflation cannot be reached. */
+static double from_supine(const supine_comparison *c, const double g[3]) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  double weights[2][SUPINE_MODES_MAX];
+  double scales[2][SUPINE_LUNGS_MAX];
+  const double *direction[2] = {supine, g};
+  for (int side = 0; side < 2; ++side) {
+    double scale = 0.0;
+    if (supine_basis_weights(c->basis, direction[side], weights[side]) != SUPINE_OK ||
+        supine_compare_scale(c->compare, &c->inflation, direction[side], weights[side], &scale,
+                             NULL) != SUPINE_OK) {
+      return NAN;
+    }
+    for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+      scales[side][lung] = scale;
+    }
+  }
+  return supine_compare_rms(c->compare, weights[0], scales[0], weights[1], scales[1]);
+}
+
+/* The map of page/map.html. */
+enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
+
+/* The map's place of a direction: across, rolling from right over supine and left to prone; down,
+ * tilting from head down to feet down. */
+static void place(const double g[3], double *x, double *y) {
+  const double roll = atan2(g[0], g[1]) / pi; /* supine 0, left 1/2 */
+  const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;
+  *x = MAP_LEFT + COLUMNS * CELL * (0.5 + roll / 2.0);
+  *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);
+}
+
+static json_t *map_cells(const supine_comparison *c) {
+  json_t *cells = json_array();
+  for (int row = 0; row < ROWS; ++row) {
+    for (int column = 0; column < COLUMNS; ++column) {
+      const double roll = 2.0 * pi * ((column + 0.5) / COLUMNS - 0.5);
+      const double tilt = pi * (0.5 - (row + 0.5) / ROWS);
+      const double g[3] = {cos(tilt) * sin(roll), cos(tilt) * cos(roll), sin(tilt)};
+      const double rms = from_supine(c, g);
+      if (!isnan(rms)) {
+        (void)json_array_append_new(
+            cells,
+            json_pack("{s:o, s:i, s:i}", "hex",
+                      supine_report_hex(
+                          SUPINE_COLOURS_DIFFERENCE,
+                          c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0),
+                      "x", MAP_LEFT + column * CELL, "y", MAP_TOP + row * CELL));
+      }
+    }
+  }
+  return cells;
+}
+
+json_t *supine_report_map(const supine_comparison *c) {
+  static const char *const rolls[] = {"prone", "right", "supine", "left", "prone"};
+  static const char *const tilts[] = {"inverted", "45°", "level", "45°", "upright"};
+  json_t *across_names = json_array();
+  json_t *down_names = json_array();
+  json_t *dots = json_array();
+  for (int i = 0; i < 5; ++i) {
+    (void)json_array_append_new(
+        across_names,
+        json_pack("{s:i, s:s}", "x", MAP_LEFT + i * COLUMNS * CELL / 4, "name", rolls[i]));
+    (void)json_array_append_new(
+        down_names,
+        json_pack("{s:i, s:s}", "y", MAP_TOP + 8 + i * (ROWS * CELL - 8) / 4, "name", tilts[i]));
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    double x;
+    double y;
+    place(c->postures.item[i].gravity, &x, &y);
+    (void)json_array_append_new(dots,
+                                json_pack("{s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", x), "y",
+                                          json_sprintf("%.1f", y), "line", supine_report_line(i),
+                                          "name", c->postures.item[i].name));
+  }
+  return json_pack("{s:o, s:o, s:o, s:o}", "cells", map_cells(c), "rolls", across_names, "tilts",
+                   down_names, "dots", dots);
+}

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A comparison for spreadsheets: one number a row. */
+#include "program/options/basis_input.h"
+#include "program/report/comparison.h"
+
+static void row(FILE *file, const char *quantity, const char *posture, const char *other,
+                const char *part, double value, const char *unit) {
+  (void)fprintf(file, "%s,%s,%s,%s,%.9g,%s\n", quantity, posture, other, part, value, unit);
+}
+
+static void statistics(FILE *file, const char *quantity, const char *posture, const char *other,
+                       const supine_distance_statistics *d) {
+  row(file, quantity, posture, other, "mean", d->mean, "mm");
+  row(file, quantity, posture, other, "rms", d->rms, "mm");
+  row(file, quantity, posture, other, "p95", d->p95, "mm");
+  row(file, quantity, posture, other, "max", d->max, "mm");
+}
+
+static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
+  const supine_compared_posture *posture = &c->posture[i];
+  const char *name = c->postures.item[i].name;
+  const double *g = c->postures.item[i].gravity;
+  row(file, "gravity", name, "", "left", g[0] + 0.0, "1");
+  row(file, "gravity", name, "", "posterior", g[1] + 0.0, "1");
+  row(file, "gravity", name, "", "head", g[2] + 0.0, "1");
+  row(file, "scale", name, "", "", posture->scales[0], "1");
+  const char *surface = supine_report_knows_rest(c) ? "full inflation" : "rest";
+  const char *before = supine_report_knows_rest(c) ? "before the breath" : "rest";
+  statistics(file, "displacement", name, surface, &posture->displacement);
+  if (!supine_basis_get_info(c->basis)->has_volume) {
+    return;
+  }
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    const char *lung_name = supine_basis_get_info(c->basis)->lung_names[lung];
+    row(file, "volume", name, "", lung_name, posture->volume[lung], "mL");
+    row(file, "gain", name, before, lung_name, posture->gain[lung], "mL");
+  }
+  const double total = supine_report_gain(c, i);
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    char part[32];
+    (void)snprintf(part, sizeof part, "height %zu-%zu %%", 100 - 10 * (s + 1), 100 - 10 * s);
+    row(file, "slab volume", name, before, part, posture->slab[s].volume, "mL");
+    row(file, "slab gain", name, before, part, posture->slab[s].gain, "mL");
+    row(file, "slab expansion", name, before, part,
+        posture->slab[s].volume > 0.0 ? posture->slab[s].gain / posture->slab[s].volume : 0.0, "1");
+    row(file, "slab share", name, before, part, total != 0.0 ? posture->slab[s].gain / total : 0.0,
+        "1");
+  }
+}
+
+/* A direction that the search found, and its RMS distance from another. */
+static void extreme(FILE *file, const char *quantity, const char *part, const double g[3],
+                    const char *other, double rms) {
+  static const char *const axes[] = {"left", "posterior", "head"};
+  for (int axis = 0; axis < 3; ++axis) {
+    char name[32];
+    (void)snprintf(name, sizeof name, "%s%s", part, axes[axis]);
+    row(file, quantity, "all", other, name, g[axis] + 0.0, "1");
+  }
+  row(file, quantity, "all", other, "rms", rms, "mm");
+}
+
+/* The file's name goes with its vertices, quoted [RFC 4180]: names may hold anything. */
+static void vertices_row(const supine_comparison *c, FILE *file) {
+  (void)fputs("vertices,rest,,\"", file);
+  for (const char *at = c->path; *at != '\0'; ++at) {
+    (void)fputs(*at == '"' ? "\"" : "", file);
+    (void)fputc(*at, file);
+  }
+  (void)fprintf(file, "\",%zu,1\n", supine_basis_get_info(c->basis)->vertex_count);
+}
+
+void supine_report_csv(const supine_comparison *c, FILE *file) {
+  const char *const kinds[] = {[SUPINE_INFLATION_REST] = "above rest",
+                               [SUPINE_INFLATION_VOLUME] =
+                                   supine_report_knows_rest(c) ? "above full" : "above the surface",
+                               [SUPINE_INFLATION_RMS] = "RMS displacement"};
+  const size_t count = c->postures.count;
+  (void)fputs("quantity,posture,other,part,value,unit\n", file);
+  for (size_t i = 0; i < count; ++i) {
+    posture_rows(c, i, file);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = i + 1; j < count; ++j) {
+      statistics(file, "distance", c->postures.item[i].name, c->postures.item[j].name,
+                 &c->pair[i * count + j]);
+    }
+  }
+  row(file, "energy", "all", "", "constant", c->constant, "1");
+  row(file, "energy", "all", "", "odd", c->odd, "1");
+  row(file, "energy", "all", "", "even", c->even, "1");
+  const supine_extremes *e = &c->extremes;
+  extreme(file, "differ most", "a ", e->pair[0], "", e->pair_rms);
+  extreme(file, "differ most", "b ", e->pair[1], "", e->pair_rms);
+  extreme(file, "farthest", "", e->farthest, "supine", e->farthest_rms);
+  row(file, "directions", "all", "", "", (double)e->directions, "1");
+  row(file, "area", "rest", "", "", supine_compare_area(c->compare), "mm2");
+  vertices_row(c, file);
+  row(file, "inflation", "all", "", kinds[c->inflation.kind], c->inflation.amount,
+      c->inflation.kind == SUPINE_INFLATION_RMS ? "mm" : "mL");
+}

@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A comparison for programs. */
+#include <jansson.h>
+
+#include "program/options/basis_input.h"
+#include "program/report/comparison.h"
+
+static json_t *statistics(const supine_distance_statistics *d) {
+  return json_pack("{s:f, s:f, s:f, s:f}", "mean", d->mean, "rms", d->rms, "p95", d->p95, "max",
+                   d->max);
+}
+
+static json_t *direction(const double g[3]) {
+  return json_pack("[f, f, f]", g[0], g[1], g[2]);
+}
+
+/* A number for each lung, by its name. */
+static json_t *by_lung(const supine_comparison *c, const double *values) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  json_t *list = json_object();
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(list, info->lung_names[lung], json_real(values[lung]));
+  }
+  return list;
+}
+
+static json_t *slabs(const supine_comparison *c, size_t posture) {
+  json_t *list = json_array();
+  const double total = supine_report_gain(c, posture);
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    const supine_slab *slab = &c->posture[posture].slab[s];
+    const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
+    (void)json_array_append_new(
+        list,
+        json_pack("{s:[f, f], s:f, s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
+                  1.0 - thickness * (double)s, "volume_ml", slab->volume, "gain_ml", slab->gain,
+                  "expansion", slab->volume > 0.0 ? slab->gain / slab->volume : 0.0, "share",
+                  total != 0.0 ? slab->gain / total : 0.0));
+  }
+  return list;
+}
+
+static json_t *postures(const supine_comparison *c) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const supine_posture_item *item = &c->postures.item[i];
+    json_t *posture = json_pack("{s:s, s:o, s:f, s:o}", "name", item->name, "gravity",
+                                direction(item->gravity), "scale", c->posture[i].scales[0],
+                                "displacement_mm", statistics(&c->posture[i].displacement));
+    if (supine_basis_get_info(c->basis)->has_volume) {
+      (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
+      (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
+      (void)json_object_set_new(posture, "slabs", slabs(c, i));
+    }
+    (void)json_array_append_new(list, posture);
+  }
+  return list;
+}
+
+static json_t *pairs(const supine_comparison *c) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    for (size_t j = i + 1; j < c->postures.count; ++j) {
+      (void)json_array_append_new(list, json_pack("{s:s, s:s, s:o}", "a", c->postures.item[i].name,
+                                                  "b", c->postures.item[j].name, "distance_mm",
+                                                  statistics(&c->pair[i * c->postures.count + j])));
+    }
+  }
+  return list;
+}
+
+bool supine_report_json(const supine_comparison *c, FILE *file) {
+  const supine_extremes *e = &c->extremes;
+  const char *kind = c->inflation.kind == SUPINE_INFLATION_REST     ? "rest_plus_ml"
+                     : c->inflation.kind == SUPINE_INFLATION_VOLUME ? "volume_ml"
+                                                                    : "rms_mm";
+  json_t *root =
+      json_pack("{s:s, s:{s:s, s:f}, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
+                "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
+                "file", c->path, "inflation", "kind", kind, "amount", c->inflation.amount,
+                "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
+                supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
+                "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",
+                "directions", (json_int_t)e->directions, "differ_most", "a", direction(e->pair[0]),
+                "b", direction(e->pair[1]), "rms_mm", e->pair_rms, "farthest_from_supine",
+                "gravity", direction(e->farthest), "rms_mm", e->farthest_rms);
+  const bool good =
+      root != NULL && json_dumpf(root, file, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+  (void)fputc('\n', file);
+  json_decref(root);
+  return good;
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What stands in the HTML report's templates (page/), by their names. */
+#ifndef SUPINE_COMPARISON_PARTS_H
+#define SUPINE_COMPARISON_PARTS_H
+
+#include <jansson.h>
+
+#include "program/render/render.h"
+#include "program/report/comparison.h"
+
+/* "#rrggbb" of a colour map at 0 <= t <= 1. */
+json_t *supine_report_hex(supine_colours map, double t);
+
+/* Black or white, whichever reads on that colour. */
+const char *supine_report_ink(supine_colours map, double t);
+
+/* Colour of a posture's line in charts. */
+const char *supine_report_line(size_t posture);
+
+enum { SUPINE_REPORT_COLUMNS = 6 }; /* of a table or a row of pictures, so that they fit a sheet */
+
+/* A table of `rows` (objects with a list `cells`, one of each posture) in {{parts}} that fit a
+ * sheet: each with the names of its {{columns}}, and what they are in words, {{part}}. Takes
+ * `rows`. */
+json_t *supine_report_parts(const supine_comparison *comparison, json_t *rows);
+
+/* A bar of colours up to `largest`, its end pointed where values lie beyond: {{stops}}, {{ticks}},
+ * {{beyond}} and {{words}}. */
+json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words);
+
+/* A direction of gravity in words: a posture's name, or how far it is from the nearest and the
+ * numbers that commands take. */
+json_t *supine_report_direction(const double g[3]);
+
+/* {{profiles}}: regional expansion and share of the volume gained, by height. */
+json_t *supine_report_profiles(const supine_comparison *comparison);
+
+/* {{map}}: distance from supine for every direction of gravity. */
+json_t *supine_report_map(const supine_comparison *comparison);
+
+/* {{pictures}} of each lung; NULL, and why in `error`, where none can be drawn. */
+json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
+
+#endif

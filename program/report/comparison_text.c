@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A comparison for the terminal. */
+#include <math.h>
+#include <string.h>
+
+#include "program/options/basis_input.h"
+#include "program/report/comparison.h"
+
+static int widest_name(const supine_comparison *c) {
+  size_t width = strlen("posture");
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const size_t length = strlen(c->postures.item[i].name);
+    width = length > width ? length : width;
+  }
+  return (int)width;
+}
+
+static void print_statistics(const supine_distance_statistics *d, FILE *file) {
+  (void)fprintf(file, "%9.3f %9.3f %9.3f %9.3f", d->mean, d->rms, d->p95, d->max);
+}
+
+static void print_postures(const supine_comparison *c, int width, FILE *file) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s",
+                supine_report_knows_rest(c) ? "full inflation" : "rest",
+                info->has_volume ? ", and what each lung holds, mL" : "", width, "posture", "mean",
+                "RMS", "95 %", "largest");
+  for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+    (void)fprintf(file, " %9s", info->lung_names[lung]);
+  }
+  (void)fputc('\n', file);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)fprintf(file, "%-*s ", width, c->postures.item[i].name);
+    print_statistics(&c->posture[i].displacement, file);
+    for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+      (void)fprintf(file, " %9.2f", c->posture[i].volume[lung]);
+    }
+    (void)fputc('\n', file);
+  }
+}
+
+static void print_pairs(const supine_comparison *c, int width, FILE *file) {
+  (void)fprintf(file, "\nBetween postures, mm\n%-*s  %-*s %9s %9s %9s %9s\n", width, "posture",
+                width, "and", "mean", "RMS", "95 %", "largest");
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    for (size_t j = i + 1; j < c->postures.count; ++j) {
+      (void)fprintf(file, "%-*s  %-*s ", width, c->postures.item[i].name, width,
+                    c->postures.item[j].name);
+      print_statistics(&c->pair[i * c->postures.count + j], file);
+      (void)fputc('\n', file);
+    }
+  }
+}
+
+/* What each lung takes of the breath. */
+static void print_gains(const supine_comparison *c, int width, FILE *file) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
+                supine_report_gain(c, 0), width, "posture");
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)fprintf(file, " %9s", info->lung_names[lung]);
+  }
+  (void)fputc('\n', file);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)fprintf(file, "%-*s", width, c->postures.item[i].name);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      (void)fprintf(file, " %9.2f", c->posture[i].gain[lung]);
+    }
+    (void)fputc('\n', file);
+  }
+}
+
+static void print_slabs(const supine_comparison *c, FILE *file) {
+  (void)fputs("\nVentilation by height along gravity: regional expansion, % of the volume before "
+              "the\nbreath, and share of the breath, %\n  height  ",
+              file);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)fprintf(file, " %15.15s", c->postures.item[i].name);
+  }
+  (void)fputc('\n', file);
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    (void)fprintf(file, "%3zu-%-3zu %% ", 100 - 10 * (s + 1), 100 - 10 * s);
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      const supine_slab *slab = &c->posture[i].slab[s];
+      const double total = supine_report_gain(c, i);
+      (void)fprintf(file, "  %7.2f %6.2f",
+                    slab->volume > 0.0 ? 100.0 * slab->gain / slab->volume : 0.0,
+                    total != 0.0 ? 100.0 * slab->gain / total : 0.0);
+    }
+    (void)fputs(s == 0                             ? "  uppermost\n"
+                : s + 1 == SUPINE_COMPARISON_SLABS ? "  lowermost\n"
+                                                   : "\n",
+                file);
+  }
+}
+
+/* A share as %; what rounds to nothing is 0. */
+static const char *percent(double share, char text[32]) {
+  if (fabs(share) < 5e-6) {
+    return "0 %";
+  }
+  (void)snprintf(text, 32, "%.3f %%", 100.0 * share);
+  return text;
+}
+
+void supine_report_text(const supine_comparison *c, FILE *file) {
+  char text[3][32];
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  const supine_extremes *e = &c->extremes;
+  const int width = widest_name(c);
+  char inflation[64];
+  supine_report_inflation(c, inflation, sizeof inflation);
+  (void)fprintf(file, "%s at %s: %zu vertices, %.0f cm2\n", c->path, inflation, info->vertex_count,
+                supine_compare_area(c->compare) / 100.0);
+  print_postures(c, width, file);
+  if (c->postures.count > 1) {
+    print_pairs(c, width, file);
+  }
+  if (info->has_volume) {
+    print_gains(c, width, file);
+    print_slabs(c, file);
+  }
+  (void)fprintf(file,
+                "\nOver all directions of gravity (%zu sampled, the best refined)\n"
+                "  differ most           %6.3f,%6.3f,%6.3f  and %6.3f,%6.3f,%6.3f  %9.3f mm RMS\n"
+                "  farthest from supine  %6.3f,%6.3f,%6.3f  %33.3f mm RMS\n",
+                e->directions, e->pair[0][0], e->pair[0][1], e->pair[0][2], e->pair[1][0],
+                e->pair[1][1], e->pair[1][2], e->pair_rms, e->farthest[0], e->farthest[1],
+                e->farthest[2], e->farthest_rms);
+  (void)fprintf(file,
+                "  energy                constant %s, odd %s (turns over with gravity), even %s\n",
+                percent(c->constant, text[0]), percent(c->odd, text[1]), percent(c->even, text[2]));
+}

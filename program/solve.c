@@ -1,0 +1,253 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine solve: the full physics for one direction of gravity. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/lungs/disease.h"
+#include "sh/base/output.h"
+#include <supine/volume.h>
+
+#include "program/model_options.h"
+#include "program/options/basis_input.h"
+#include "program/options/orientation.h"
+#include "program/options/volume.h"
+
+static const char name[] = "solve";
+
+typedef struct request {
+  supine_model_options model;
+  supine_orientation orientation;
+  const char *path;
+  const char *volume; /* as given, or NULL */
+  bool has_scale, has_vertex, as_scanned;
+  double scale;
+  size_t vertex;
+} request;
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
+    {"volume", 0, "VOLUME",
+     "rest (default: the end of a quiet expiration in that posture), full, rest+500, rest-200, or "
+     "a number: mL relative to the scan, all lungs together",
+     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {"scale", 0, "MM",
+     "largest displacement instead, mm; negative: the other way. Default where no rest is known: F "
+     "d as it is, F what a vertex catches of the force, d in mm",
+     SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
+     .rivals = "breath"},
+    {"unit-force", 0, "VERTEX",
+     "instead of a posture: the response of every vertex to a unit force on this one (from 0), a "
+     "column of the transfer matrix T, as CSV",
+     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex"},
+    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
+    {.name = NULL}};
+
+/* Writes one column of T as CSV. */
+static supine_status write_column(const supine_lungs *lungs, const request *wanted,
+                                  supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  supine_network *network = NULL;
+  supine_equilibrium *equilibrium = NULL;
+  supine_output output = {0};
+  double *column = malloc(n * sizeof *column);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (column == NULL ||
+      supine_physics_model_network(lungs, &wanted->model.model, &network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory for %zu vertices", n);
+    goto cleanup;
+  }
+  status =
+      supine_physics_equilibrium_set_stiffness(equilibrium, wanted->model.model.stiffness, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_transfer_column(equilibrium, wanted->vertex, column, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_output_open(wanted->path, &output, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)fputs("vertex,x_mm,y_mm,z_mm,response\n", output.file);
+    for (size_t i = 0; i < n; ++i) {
+      const double *p = lungs->mesh.vertices + 3 * i;
+      (void)fprintf(output.file, "%zu,%.9g,%.9g,%.9g,%.17g\n", i, p[0], p[1], p[2], column[i]);
+    }
+    status = supine_output_commit(&output, error);
+  }
+cleanup:
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
+  free(column);
+  return status;
+}
+
+/* The breath scale at which lungs rest: that of the pair, healthy (see precompute/rest.h). */
+static supine_status resting_scale(const supine_lungs *lungs, const request *wanted,
+                                   const double g[3], double *scale, supine_error *error) {
+  const supine_reference *reference = &wanted->model.reference;
+  const bool alone = lungs->lung_count == 1;
+  supine_model healthy = wanted->model.model;
+  double cubic[3] = {0.0, 0.0, 0.0};
+  supine_status status = SUPINE_OK;
+  healthy.share[0] = healthy.share[1] = 1.0;
+  for (int image = 0; image < (alone ? 2 : 1) && status == SUPINE_OK; ++image) {
+    const double seen[3] = {image == 0 ? g[0] : -g[0], g[1], g[2]};
+    supine_solution solution = {0};
+    status = supine_physics_solve(lungs, &healthy, seen, &solution, error);
+    for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
+      cubic[i] += solution.cubic[i];
+    }
+    supine_physics_solution_free(&solution);
+  }
+  const double share = supine_reference_along_axes(reference->resting.share, g);
+  return status == SUPINE_OK
+             ? supine_volume_scale(cubic,
+                                   (share - 1.0) * (alone ? 2.0 : 1.0) * reference->full_volume,
+                                   scale, error)
+             : status;
+}
+
+/* The breath scale that was asked for, or 1. */
+static supine_status find_scale(const supine_lungs *lungs, const request *wanted, const double g[3],
+                                const supine_solution *solution, double *scale,
+                                supine_error *error) {
+  const supine_reference *reference = &wanted->model.reference;
+  supine_volume volume = {SUPINE_VOLUME_REST, 0.0};
+  *scale = 1.0;
+  if (wanted->has_scale) {
+    const double largest = supine_physics_solution_largest(solution);
+    *scale = wanted->scale / largest;
+    return largest > 0.0
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
+  }
+  if (wanted->volume == NULL && !reference->known) {
+    return SUPINE_OK;
+  }
+  if (!solution->has_volume) {
+    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                            "--volume needs a closed surface: close it, or give --scale");
+  }
+  if (wanted->volume != NULL) {
+    (void)supine_options_volume_parse(wanted->volume, &volume);
+  }
+  double state = volume.from == SUPINE_VOLUME_SCAN ? reference->scan_volume : 0.0;
+  if (volume.from == SUPINE_VOLUME_REST && reference->known) {
+    const supine_status status = resting_scale(lungs, wanted, g, scale, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    state = supine_volume_at(solution->cubic, *scale);
+  }
+  return supine_volume_scale(solution->cubic, state + volume.offset, scale, error);
+}
+
+static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
+                                    const double g[3], supine_error *error) {
+  supine_solution solution = {0};
+  supine_mesh deformed = lungs->mesh;
+  supine_mesh rest = lungs->mesh;
+  double scale = 1.0;
+  deformed.vertices = NULL;
+  rest.vertices = NULL;
+  supine_status status = supine_physics_solve(lungs, &wanted->model.model, g, &solution, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  status = find_scale(lungs, wanted, g, &solution, &scale, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  deformed.vertices = malloc(3 * deformed.vertex_count * sizeof(double));
+  rest.vertices = malloc(3 * rest.vertex_count * sizeof(double));
+  if (deformed.vertices == NULL || rest.vertices == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              deformed.vertex_count);
+    goto cleanup;
+  }
+  supine_tissue_rest(lungs, wanted->model.model.share, rest.vertices);
+  supine_physics_solution_apply(&solution, &rest, scale, deformed.vertices);
+  supine_mesh_save_options save = {.rest = rest.vertices};
+  if (wanted->as_scanned) {
+    save.axes = wanted->model.frame.axes;
+    save.millimetres_per_unit = wanted->model.frame.millimetres_per_unit;
+  }
+  status = supine_mesh_save(wanted->path, &deformed, &save, error);
+  if (status == SUPINE_OK) {
+    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
+                 wanted->path, g[0], g[1], g[2], scale,
+                 fabs(scale) * supine_physics_solution_largest(&solution));
+    if (solution.has_volume) {
+      (void)printf(", %+.2f mL",
+                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
+    }
+    (void)printf("; %zu steps to residual %.1e\n", solution.report.iterations,
+                 solution.report.residual);
+  }
+cleanup:
+  free(deformed.vertices);
+  free(rest.vertices);
+  supine_physics_solution_free(&solution);
+  return status;
+}
+
+static void begin(void *chosen) {
+  supine_command_model_options_begin(&((request *)chosen)->model);
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  request *wanted = chosen;
+  double g[3] = {0.0, 0.0, 0.0};
+  supine_lungs lungs = {0};
+  int result = SUPINE_EXIT_OK;
+  if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
+    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+                                wanted->path);
+  }
+  supine_volume volume;
+  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
+    return supine_options_usage(
+        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
+        wanted->volume);
+  }
+  if (!wanted->has_vertex) {
+    result = supine_options_orientation_finish(&wanted->orientation, name, g);
+  }
+  if (result == SUPINE_EXIT_OK) {
+    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
+                                       wanted->has_vertex, &lungs);
+  }
+  if (result == SUPINE_EXIT_OK && wanted->as_scanned &&
+      wanted->model.frame.millimetres_per_unit == 0.0) {
+    supine_options_say(name, "--as-scanned: the surfaces came in different axes");
+    result = SUPINE_EXIT_INPUT;
+  }
+  if (result == SUPINE_EXIT_OK) {
+    supine_error error;
+    const supine_status status = wanted->has_vertex ? write_column(&lungs, wanted, &error)
+                                                    : write_solution(&lungs, wanted, g, &error);
+    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  }
+  supine_lungs_free(&lungs);
+  supine_command_model_options_free(&wanted->model);
+  return result;
+}
+
+const supine_command supine_command_solve = {
+    name,
+    "full physics for one posture: the reference",
+    .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
+             "LABELS... --posture NAME -o FILE [OPTIONS]",
+    .about = "Runs the full physics for one direction of gravity, without any harmonics, and "
+             "writes the deformed surface: the reference that a basis is measured against.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine solve left.ply right.ply --posture prone --volume 500 -o prone.vtp\n"
+             "  supine solve lungs.ply --unit-force 0 -o column.csv",
+    SUPINE_SURFACES,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

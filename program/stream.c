@@ -1,0 +1,332 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine stream: poses of a tracked patient in, the lungs for each of them out. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "program/options/command.h"
+#include "program/stream/address.h"
+#include "program/stream/live_page.h"
+#include "program/stream/server.h"
+#include "sh/base/output.h"
+
+static const char name[] = "stream";
+
+static const double budget = 15e-3; /* s a frame */
+
+typedef struct request {
+  const char *listen, *connect, *device, *called;
+  double down[3], body[4]; /* body: quaternion W, X, Y, Z */
+  int send, space;
+  const char *volume, *pv;
+  supine_pv_breath breath;
+  double smooth, fps, seconds;
+  size_t peers;
+  const char *record, *replay;
+  const char *web, *certificate, *key;
+} request;
+
+static const char *const sends[] = {"weights", "points", "surface", "nothing", NULL};
+static const char *const spaces[] = {"lps", "ras", NULL};
+
+static const supine_option table[] = {
+    {"listen", 0, "[ADDRESS:]PORT",
+     "waits for peers there; a port alone is reached from this machine only; 0: any that is free. "
+     "18944, the protocol's own, unless --connect is given",
+     SUPINE_FILLS(request, listen)},
+    {"connect", 0, "HOST:PORT", "goes to a peer that waits: a tracker's server, 3D Slicer",
+     SUPINE_FILLS(request, connect)},
+    {"device", 0, "NAME", "whose poses are followed; default: any", SUPINE_FILLS(request, device)},
+    {.help = "Where gravity points:"},
+    {"world-down", 0, "X,Y,Z", "where things fall, in the tracker's world",
+     SUPINE_FILLS(request, down), .standard = "0,0,-1"},
+    {"body-from-tracker", 0, "W,X,Y,Z",
+     "the rotation from the tracked marker's axes to the body's (left, back, head), as a "
+     "quaternion; 0,0,0,1 where the marker's are right, front, head",
+     SUPINE_FILLS(request, body), .standard = "1,0,0,0"},
+    {"smooth", 0, "MS", "steadies a trembling tracker; a turning body is shown so much later",
+     SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms"},
+    {.help = "How full the lungs are:"},
+    {"volume", 0, "V",
+     "rest, full, rest+ML, or mL from the basis' reference; default: they breathe, on top of the "
+     "posture's rest. A STRING of device VOLUME sets it too, and an NDARRAY of one number, mL "
+     "above "
+     "rest",
+     SUPINE_FILLS(request, volume)},
+    {"tidal", 0, "ML", "air of a breath; default 500", SUPINE_FILLS(request, breath.tidal),
+     SUPINE_ABOVE_ZERO},
+    {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
+     SUPINE_ABOVE_ZERO},
+    {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
+     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
+    {.help = "What is sent:"},
+    {"send", 0, "WHAT",
+     "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's scale; "
+     "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come "
+     "once. A "
+     "peer chooses by a STRING of "
+     "device SEND that says one of these words",
+     SUPINE_FILLS(request, send), .choices = sends, .standard = "weights"},
+    {"space", 0, "NAME", "of the points: lps (left, back, head), or ras as 3D Slicer has them",
+     SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
+    {"name", 0, "NAME", "device name of what is sent", SUPINE_FILLS(request, called),
+     .standard = "SUPINE"},
+    {"fps", 0, "N", "most frames a second", SUPINE_FILLS(request, fps), .range = {1.0, 1000.0},
+     .standard = "200"},
+    {"peers", 0, "N", "most peers, and most viewers of the page, at a time",
+     SUPINE_FILLS(request, peers), .range = {1.0, 1000.0}, .standard = "64"},
+    {.help = "A page that follows:"},
+    {"web", 0, "[ADDRESS:]PORT",
+     "serves the basis as a page that shows each moment, to any number of viewers; a phone that "
+     "looks at it may send its own tilt. A port alone is reached from this machine only",
+     SUPINE_FILLS(request, web)},
+    {"certificate", 0, "PEM",
+     "and --key: serves it encrypted; browsers ask for that before they give a phone's tilt to "
+     "another machine",
+     SUPINE_FILLS(request, certificate), .file = SUPINE_FILE_IN},
+    {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
+     .file = SUPINE_FILE_IN},
+    {.help = "Poses kept:"},
+    {"record", 0, "POSES.csv", "writes each pose that was followed, when it ends",
+     SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
+    {"replay", 0, "POSES.csv",
+     "follows these, from when the first peer or viewer is there, and ends",
+     SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
+    {"seconds", 0, "S", "how long it runs; default: until it is interrupted",
+     SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {.name = NULL}};
+
+static void begin(void *chosen) {
+  ((request *)chosen)->breath = supine_breath_default();
+}
+
+static void warn(void *context, const char *text) {
+  (void)context;
+  supine_options_say(name, "%s", text);
+}
+
+static bool stop(void *context) {
+  (void)context;
+  return supine_options_interrupted();
+}
+
+/* On a terminal: the last second's state, over the one before. */
+static void show(void *context, supine_stream_server *server) {
+  const supine_stream_counts *counts = supine_stream_server_counts(server);
+  (void)context;
+  (void)fprintf(stderr, "\r%llu poses, %zu peers", (unsigned long long)counts->poses,
+                counts->present);
+  for (int surfaces = 0; surfaces < 2; ++surfaces) {
+    const supine_stream_latency *latency = supine_stream_server_latency(
+        server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
+    if (latency->count > 0) {
+      (void)fprintf(stderr, ", %s %.2f ms (99 %% %.2f, worst %.2f)",
+                    surfaces != 0 ? "surface" : "weights",
+                    1e3 * supine_stream_latency_share(latency, 0.5),
+                    1e3 * supine_stream_latency_share(latency, 0.99), 1e3 * latency->worst);
+    }
+  }
+  (void)fputs("\033[K", stderr);
+}
+
+static void report(const supine_stream_server *server, const request *wanted) {
+  const supine_stream_counts *n = supine_stream_server_counts(server);
+  (void)printf("%llu poses (%llu repaired, %llu refused), %llu frames, %llu sent to %llu peers\n",
+               (unsigned long long)n->poses, (unsigned long long)n->repaired,
+               (unsigned long long)n->refused, (unsigned long long)n->frames,
+               (unsigned long long)n->sent, (unsigned long long)n->peers);
+  if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
+    (void)printf("%llu messages malformed, %llu of other types; %llu peers lost, %llu turned away; "
+                 "%llu frames whose volume could not be reached\n",
+                 (unsigned long long)n->malformed, (unsigned long long)n->skipped,
+                 (unsigned long long)n->lost, (unsigned long long)n->turned_away,
+                 (unsigned long long)n->unreachable);
+  }
+  for (int surfaces = 0; surfaces < 2; ++surfaces) {
+    const supine_stream_latency *latency = supine_stream_server_latency(
+        server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
+    if (latency->count > 0) {
+      (void)printf(
+          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms, "
+          "of %.0f ms\n",
+          surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_share(latency, 0.5),
+          1e3 * supine_stream_latency_share(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
+    }
+  }
+  if (wanted->smooth > 0.0) {
+    (void)printf("smoothing shows a steady turn %.0f ms later on top of that\n", wanted->smooth);
+  }
+}
+
+/* Opens the page, where it was asked for. */
+static supine_status open_page(const request *wanted, const char *basis, char **page,
+                               supine_stream_web **web, supine_error *error) {
+  const char *colon = wanted->web == NULL ? NULL : strrchr(wanted->web, ':');
+  char address[256] = "";
+  supine_stream_address checked;
+  supine_stream_site site = {
+      .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->peers};
+  if (wanted->web == NULL) {
+    return SUPINE_OK;
+  }
+  supine_status status = supine_stream_address_read(wanted->web, true, &checked, error);
+  if (status == SUPINE_OK) {
+    status = supine_stream_live_page(basis, wanted->breath.tidal, "Lungs, live", page,
+                                     &site.page_size, error);
+  }
+  if (status == SUPINE_OK) {
+    if (colon != NULL) {
+      const int bracket = wanted->web[0] == '[' ? 1 : 0; /* of version 6 */
+      (void)snprintf(address, sizeof address, "%.*s", (int)(colon - wanted->web) - 2 * bracket,
+                     wanted->web + bracket);
+      site.address = address;
+    }
+    site.port = (int)strtol(colon == NULL ? wanted->web : colon + 1, NULL, 10);
+    site.page = *page;
+    status = supine_stream_web_create(&site, web, error);
+  }
+  if (status == SUPINE_OK) {
+    const bool six = strchr(address, ':') != NULL;
+    (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
+                 six ? "[" : "", site.address != NULL ? address : "127.0.0.1", six ? "]" : "",
+                 supine_stream_web_port(*web));
+  }
+  return status;
+}
+
+static supine_status set_volume(const request *wanted, supine_stream_volume *volume,
+                                supine_error *error) {
+  supine_pv pv = *supine_breath_normal();
+  if (wanted->volume != NULL) {
+    return supine_stream_volume_fix(volume, wanted->volume, error);
+  }
+  const supine_status status =
+      wanted->pv == NULL ? SUPINE_OK : supine_breath_load(wanted->pv, &pv, error);
+  return status == SUPINE_OK ? supine_stream_volume_breathe(volume, &pv, &wanted->breath, error)
+                             : status;
+}
+
+static supine_status stream(const supine_basis *basis, const char *path, const request *wanted,
+                            const supine_stream_options *given, supine_error *error) {
+  supine_stream_options options = *given;
+  supine_stream_volume *volume = calloc(1, sizeof *volume);
+  supine_stream_poses poses = {0};
+  supine_output record = {0};
+  supine_stream_server *server = NULL;
+  char *page = NULL;
+  supine_status status = volume != NULL ? set_volume(wanted, volume, error)
+                                        : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory");
+  options.volume = volume;
+  if (status == SUPINE_OK && wanted->replay != NULL) {
+    status = supine_stream_poses_load(wanted->replay, &poses, error);
+    options.replay = &poses;
+  }
+  if (status == SUPINE_OK && wanted->record != NULL) {
+    status = supine_output_open(wanted->record, &record, error);
+    options.record = record.file;
+    if (status == SUPINE_OK) {
+      supine_stream_poses_begin(record.file);
+    }
+  }
+  if (status == SUPINE_OK) {
+    status = open_page(wanted, path, &page, &options.web, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_stream_server_create(basis, &options, &server, error);
+  }
+  if (status == SUPINE_OK) {
+    if (supine_stream_server_port(server) != 0) {
+      (void)printf("listening on port %d\n", supine_stream_server_port(server));
+    }
+    (void)fflush(stdout);
+    supine_options_signals_catch(true);
+    status = supine_stream_server_run(server, error);
+    (void)fputs(options.shown != NULL ? "\n" : "", stderr);
+    report(server, wanted);
+  }
+  if (status == SUPINE_OK && wanted->record != NULL) {
+    status = supine_output_commit(&record, error);
+  }
+  supine_output_abandon(&record);
+  supine_stream_server_destroy(server);
+  supine_stream_web_destroy(options.web);
+  supine_stream_poses_free(&poses);
+  free(volume);
+  free(page);
+  return status;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  const char *why = NULL;
+  supine_stream_options options = {.listen = wanted->listen,
+                                   .connect = wanted->connect,
+                                   .device = wanted->device,
+                                   .name = wanted->called,
+                                   .setup = supine_stream_setup_default(),
+                                   .what = (supine_stream_what)wanted->send,
+                                   .ras = wanted->space == 1,
+                                   .rate = wanted->fps,
+                                   .peers = wanted->peers,
+                                   .smooth = 1e-3 * wanted->smooth,
+                                   .seconds = wanted->seconds,
+                                   .warn = warn,
+                                   .stop = stop,
+                                   .shown = isatty(STDERR_FILENO) ? show : NULL};
+  if (wanted->listen == NULL && wanted->connect == NULL) {
+    options.listen = "18944";
+  }
+  if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
+    return supine_options_usage(name, "--certificate and --key belong together");
+  }
+  const double size = sqrt(wanted->body[0] * wanted->body[0] + wanted->body[1] * wanted->body[1] +
+                           wanted->body[2] * wanted->body[2] + wanted->body[3] * wanted->body[3]);
+  if (!(size > 1e-6) || supine_stream_gravity_down(&options.setup, wanted->down, options.setup.down,
+                                                   &why) != SUPINE_STREAM_EXACT) {
+    return supine_options_usage(name, "--world-down and --body-from-tracker must not be zero");
+  }
+  const double unit[4] = {wanted->body[0] / size, wanted->body[1] / size, wanted->body[2] / size,
+                          wanted->body[3] / size};
+  supine_stream_rotation(unit, options.setup.body);
+  supine_basis *basis = NULL;
+  supine_error error;
+  supine_status status = supine_basis_open(given->operand[0], &basis, &error);
+  if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
+    status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
+                              "%s: its surface is open and encloses no volume: close the mesh "
+                              "before 'supine precompute'",
+                              given->operand[0]);
+  }
+  if (status == SUPINE_OK) {
+    status = stream(basis, given->operand[0], wanted, &options, &error);
+  }
+  const int result =
+      status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  supine_basis_close(basis);
+  return result;
+}
+
+const supine_command supine_command_stream = {
+    name,
+    "follow a tracked patient live, over OpenIGTLink",
+    .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
+    .about =
+        "A tracker says how the patient lies; the lungs for each pose are sent on as they come, to "
+        "any number of peers, by OpenIGTLink (headers of version 1 and 2). Poses are TRANSFORM, "
+        "QTDATA or POSITION messages, or a tilt sensor's: an NDARRAY [3], where things fall, or a "
+        "SENSOR [3], an accelerometer at rest. The newest pose wins: nothing queues, and a slow "
+        "peer "
+        "misses frames instead of holding up the others. In the end it says how long it took from "
+        "pose received to frame sent.",
+    .options = table,
+    .notes =
+        "Examples:\n"
+        "  supine stream lungs.safetensors --device Patient\n"
+        "  supine stream lungs.safetensors --send surface --space ras --connect localhost:18944\n"
+        "  supine stream lungs.safetensors --web 8080 --record night.csv\n"
+        "  supine stream lungs.safetensors --web 8080 --replay night.csv",
+    SUPINE_ONE_BASIS,
+    .request_size = sizeof(request),
+    .begin = begin,
+    .run = run};

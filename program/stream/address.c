@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Addresses and sockets. */
+#include <errno.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "program/stream/address.h"
+
+supine_status supine_stream_address_read(const char *text, bool numeric,
+                                         supine_stream_address *address, supine_error *error) {
+  char host[256] = "127.0.0.1";
+  const char *colon = strrchr(text, ':');
+  const char *port = colon == NULL ? text : colon + 1;
+  if (colon != NULL) {
+    const bool bracketed = text[0] == '[' && colon > text + 1 && colon[-1] == ']';
+    const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
+    if (length == 0 || length >= sizeof host) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' names no host before its port",
+                              text);
+    }
+    memcpy(host, text + (bracketed ? 1 : 0), length);
+    host[length] = '\0';
+  }
+  char *end = NULL;
+  const long number = strtol(port, &end, 10);
+  if (end == port || *end != '\0' || number < 0 || number > 65535) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' is no port from 0 to 65535", port);
+  }
+  const struct addrinfo wanted = {.ai_socktype = SOCK_STREAM,
+                                  .ai_flags = AI_NUMERICSERV | (numeric ? AI_NUMERICHOST : 0)};
+  struct addrinfo *found = NULL;
+  const int failure = getaddrinfo(host, port, &wanted, &found);
+  if (failure != 0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: %s", host, gai_strerror(failure));
+  }
+  memcpy(&address->where, found->ai_addr, found->ai_addrlen);
+  address->size = found->ai_addrlen;
+  freeaddrinfo(found);
+  return SUPINE_OK;
+}
+
+int supine_stream_address_listen(const supine_stream_address *address, int *port,
+                                 supine_error *error) {
+  const int yes = 1;
+  const int s = socket(address->where.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  struct sockaddr_storage given;
+  socklen_t size = sizeof given;
+  if (s < 0 || setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
+      bind(s, (const struct sockaddr *)&address->where, address->size) != 0 || listen(s, 64) != 0 ||
+      getsockname(s, (struct sockaddr *)&given, &size) != 0) {
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "the port cannot be listened on: %s",
+                           strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    if (s >= 0) {
+      (void)close(s);
+    }
+    return -1;
+  }
+  /* sin_port and sin6_port lie at the same place. */
+  *port = ntohs(((const struct sockaddr_in *)(const void *)&given)->sin_port);
+  return s;
+}
+
+int supine_stream_address_connect(const supine_stream_address *address) {
+  const int s = socket(address->where.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (s >= 0 && connect(s, (const struct sockaddr *)&address->where, address->size) != 0 &&
+      errno != EINPROGRESS) {
+    (void)close(s);
+    return -1;
+  }
+  return s;
+}

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* CRC-64 through tables, 16 bytes a step; by carry-less multiplication, 64 bytes a step. */
+#include <pthread.h>
+#include <string.h>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#define CRC64_CARRY_LESS 1
+#endif
+
+#include "program/stream/crc64.h"
+
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* x^64 is understood */
+
+/* What is worked out once: tables [k][b] = b(x) x^(64 + 8 k) mod P, and powers of x for folding. */
+static struct {
+  uint64_t table[16][256];
+  uint64_t far[2], near[2]; /* x^(512 + 64), x^512; x^(128 + 64), x^128 */
+} known;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static uint64_t times_x(uint64_t a) {
+  return (a << 1) ^ ((a >> 63) != 0 ? polynomial : 0);
+}
+
+static uint64_t multiply(uint64_t a, uint64_t b) {
+  uint64_t product = 0;
+  for (int bit = 63; bit >= 0; --bit) {
+    product = times_x(product) ^ ((b >> bit & 1) != 0 ? a : 0);
+  }
+  return product;
+}
+
+uint64_t supine_stream_crc64_power(size_t size) {
+  uint64_t power = 1;
+  uint64_t square = 1u << 8; /* x^8, then its square, ... */
+  for (; size != 0; size >>= 1) {
+    power = (size & 1) != 0 ? multiply(power, square) : power;
+    square = multiply(square, square);
+  }
+  return power;
+}
+
+uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power) {
+  return multiply(first, power) ^ second;
+}
+
+static void work_out(void) {
+  for (unsigned b = 0; b < 256; ++b) {
+    uint64_t value = (uint64_t)b << 56;
+    for (int bit = 0; bit < 8; ++bit) {
+      value = times_x(value);
+    }
+    known.table[0][b] = value;
+  }
+  for (int k = 1; k < 16; ++k) {
+    for (unsigned b = 0; b < 256; ++b) {
+      const uint64_t value = known.table[k - 1][b];
+      known.table[k][b] = (value << 8) ^ known.table[0][value >> 56];
+    }
+  }
+  known.far[0] = supine_stream_crc64_power(72);
+  known.far[1] = supine_stream_crc64_power(64);
+  known.near[0] = supine_stream_crc64_power(24);
+  known.near[1] = supine_stream_crc64_power(16);
+}
+
+static uint64_t load(const unsigned char *bytes) {
+  uint64_t word = 0;
+  for (int i = 0; i < 8; ++i) {
+    word = word << 8 | bytes[i];
+  }
+  return word;
+}
+
+static uint64_t by_tables(uint64_t crc, const unsigned char *at, size_t size) {
+  for (; size >= 16; at += 16, size -= 16) {
+    const uint64_t word[2] = {load(at) ^ crc, load(at + 8)};
+    crc = 0;
+    for (int j = 0; j < 8; ++j) {
+      crc ^= known.table[15 - j][word[0] >> (56 - 8 * j) & 255] ^
+             known.table[7 - j][word[1] >> (56 - 8 * j) & 255];
+    }
+  }
+  for (; size != 0; ++at, --size) {
+    crc = (crc << 8) ^ known.table[0][(crc >> 56) ^ *at];
+  }
+  return crc;
+}
+
+uint64_t supine_stream_crc64_tables(uint64_t crc, const void *bytes, size_t size) {
+  (void)pthread_once(&once, work_out);
+  return by_tables(crc, bytes, size);
+}
+
+#ifdef CRC64_CARRY_LESS
+typedef __m128i lane; /* 128 bits of the message, the first in front */
+
+#define CARRY_LESS __attribute__((target("pclmul,ssse3")))
+
+CARRY_LESS static lane take(const unsigned char *at) {
+  const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  return _mm_shuffle_epi8(_mm_loadu_si128((const lane *)(const void *)at), front);
+}
+
+/* What `a` is worth where `next` stands: a_high x^(n + 64) + a_low x^n + next. */
+CARRY_LESS static lane fold(lane a, lane powers, lane next) {
+  return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
+                                           _mm_clmulepi64_si128(a, powers, 0x00)));
+}
+
+/* At least 64 bytes, a multiple of 16. */
+CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
+  const lane far = _mm_set_epi64x((long long)known.far[0], (long long)known.far[1]);
+  const lane near = _mm_set_epi64x((long long)known.near[0], (long long)known.near[1]);
+  lane part[4] = {take(at), take(at + 16), take(at + 32), take(at + 48)};
+  part[0] = _mm_xor_si128(part[0], _mm_set_epi64x((long long)crc, 0));
+  for (at += 64, size -= 64; size >= 64; at += 64, size -= 64) {
+    for (int i = 0; i < 4; ++i) {
+      part[i] = fold(part[i], far, take(at + 16 * i));
+    }
+  }
+  lane sum = part[0];
+  for (int i = 1; i < 4; ++i) {
+    sum = fold(sum, near, part[i]);
+  }
+  for (; size != 0; at += 16, size -= 16) {
+    sum = fold(sum, near, take(at));
+  }
+  unsigned char rest[16]; /* worth the same as the whole message */
+  const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  _mm_storeu_si128((lane *)(void *)rest, _mm_shuffle_epi8(sum, front));
+  return by_tables(0, rest, sizeof rest);
+}
+#endif
+
+uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size) {
+  (void)pthread_once(&once, work_out);
+  const unsigned char *at = bytes;
+#ifdef CRC64_CARRY_LESS
+  if (size >= 64 && __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("ssse3")) {
+    const size_t most = size & ~(size_t)15;
+    crc = by_folding(crc, at, most);
+    at += most;
+    size -= most;
+  }
+#endif
+  return by_tables(crc, at, size);
+}

@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Frames as messages. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/stream/crc64.h"
+#include "program/stream/frame.h"
+#include "program/stream/strips.h"
+
+/* Positions, their bytes and their checksum are done while a piece is in the first cache. */
+enum { PIECE = 1024 };
+
+struct supine_stream_frames {
+  const supine_basis *basis;
+  const supine_basis_info *info;
+  char device[21];
+  bool ras;
+  uint64_t number;
+  supine_stream_strips triangles;
+  uint64_t triangles_crc, triangles_power;
+  uint64_t points_power;
+  supine_stream_frame *unused;
+};
+
+const char *supine_stream_what_name(supine_stream_what what) {
+  static const char *const names[] = {"weights", "points", "surface", "nothing"};
+  return (size_t)what < SUPINE_STREAM_WHAT_COUNT ? names[what] : NULL;
+}
+
+supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
+                                          supine_stream_frames **frames, supine_error *error) {
+  supine_stream_frames *f = calloc(1, sizeof *f);
+  if (f == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  f->basis = basis;
+  f->info = supine_basis_get_info(basis);
+  strncpy(f->device, device, sizeof f->device - 1);
+  f->ras = ras;
+  f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
+  /* Now: 0.1 s for a million triangles would hold up every peer when the first asks for a surface.
+   */
+  if (supine_stream_strips_make(supine_basis_triangles(basis), f->info->triangle_count,
+                                f->info->vertex_count, &f->triangles) != SUPINE_OK) {
+    free(f);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  f->triangles_crc = supine_stream_crc64(0, f->triangles.bytes, f->triangles.size);
+  f->triangles_power = supine_stream_crc64_power(f->triangles.size);
+  *frames = f;
+  return SUPINE_OK;
+}
+
+void supine_stream_frames_destroy(supine_stream_frames *frames) {
+  if (frames == NULL) {
+    return;
+  }
+  while (frames->unused != NULL) {
+    supine_stream_frame *frame = frames->unused;
+    frames->unused = frame->next;
+    free(frame->points);
+    free(frame);
+  }
+  free(frames->triangles.bytes);
+  free(frames);
+}
+
+supine_stream_frame *supine_stream_frame_take(supine_stream_frames *frames,
+                                              const supine_stream_moment *moment) {
+  supine_stream_frame *frame = frames->unused;
+  if (frame != NULL) {
+    frames->unused = frame->next;
+  } else {
+    frame = calloc(1, sizeof *frame);
+    if (frame == NULL) {
+      return NULL;
+    }
+  }
+  frame->users = 1;
+  frame->number = ++frames->number;
+  frame->moment = *moment;
+  frame->points_crc = 0;
+  frame->next = NULL;
+  return frame;
+}
+
+void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame *frame) {
+  if (frame != NULL && --frame->users == 0) {
+    frame->placed = false;
+    frame->next = frames->unused;
+    frames->unused = frame;
+  }
+}
+
+/* The points of a frame, once for all peers. */
+static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
+  const size_t count = f->info->vertex_count;
+  float xyz[3 * PIECE];
+  if (frame->points == NULL) {
+    frame->points = malloc(12 * count + 1);
+    if (frame->points == NULL) {
+      return false;
+    }
+  }
+  uint64_t crc = 0;
+  for (size_t begin = 0; begin < count && !frame->placed; begin += PIECE) {
+    const size_t end = begin + PIECE < count ? begin + PIECE : count;
+    unsigned char *bytes = frame->points + 12 * begin;
+    supine_deform_range(f->basis, frame->moment.weights, frame->moment.scales, begin, end, xyz);
+    supine_stream_put_points(end - begin, xyz, f->ras, bytes);
+    crc = supine_stream_crc64(crc, bytes, 12 * (end - begin));
+  }
+  if (!frame->placed) {
+    frame->points_crc = crc;
+    frame->placed = true;
+  }
+  return true;
+}
+
+/* Weights and scales, as floats of the wire; returns their bytes. */
+static size_t put_weights(const supine_stream_frames *f, const supine_stream_moment *moment,
+                          unsigned char *bytes) {
+  const size_t modes = f->info->mode_count;
+  const size_t count = modes + f->info->lung_count;
+  const size_t head = supine_stream_ndarray_head(count, bytes);
+  for (size_t i = 0; i < count; ++i) {
+    const float value = (float)(i < modes ? moment->weights[i] : moment->scales[i - modes]);
+    uint32_t word;
+    memcpy(&word, &value, sizeof word);
+    supine_stream_put32(bytes + head + 4 * i, word);
+  }
+  return head + 4 * count;
+}
+
+static void add_piece(supine_stream_parcel *parcel, void *bytes, size_t size) {
+  parcel->piece[parcel->count++] = (struct iovec){bytes, size};
+  parcel->size += size;
+}
+
+bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame *frame,
+                              supine_stream_what what, bool triangles, unsigned version,
+                              supine_stream_parcel *parcel) {
+  static unsigned char metadata[SUPINE_STREAM_METADATA];
+  const bool weights = what == SUPINE_STREAM_WEIGHTS;
+  if (!weights && !place_points(frames, frame)) {
+    return false;
+  }
+  unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
+  size_t size = 0;
+  if (version == 2) {
+    supine_stream_extension((uint32_t)frame->number, body);
+    size += SUPINE_STREAM_EXTENSION;
+  }
+  size += weights
+              ? put_weights(frames, &frame->moment, body + size)
+              : supine_stream_polydata_head(frames->info->vertex_count,
+                                            triangles ? frames->triangles.count : 0,
+                                            triangles ? frames->triangles.size : 0, body + size);
+  parcel->count = 0;
+  parcel->size = 0;
+  add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
+  uint64_t crc = supine_stream_crc64(0, body, size);
+  if (!weights) {
+    add_piece(parcel, frame->points, 12 * frames->info->vertex_count);
+    crc = supine_stream_crc64_join(crc, frame->points_crc, frames->points_power);
+  }
+  if (!weights && triangles) {
+    add_piece(parcel, frames->triangles.bytes, frames->triangles.size);
+    crc = supine_stream_crc64_join(crc, frames->triangles_crc, frames->triangles_power);
+  }
+  if (version == 2) {
+    add_piece(parcel, metadata, sizeof metadata);
+    crc = supine_stream_crc64(crc, metadata, sizeof metadata);
+  }
+  supine_stream_header header = {.version = version,
+                                 .stamp = frame->moment.stamp,
+                                 .size = parcel->size - SUPINE_STREAM_HEADER,
+                                 .crc = crc};
+  (void)snprintf(header.type, sizeof header.type, "%s", weights ? "NDARRAY" : "POLYDATA");
+  memcpy(header.device, frames->device, sizeof header.device);
+  supine_stream_header_write(&header, parcel->front);
+  return true;
+}

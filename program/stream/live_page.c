@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The exported page, allowed to open a socket to where it came from, and with live.js in it. */
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/export/export.h"
+#include "program/stream/live_page.h"
+#include "program/template/assets.h"
+
+extern const supine_asset supine_stream_assets[]; /* live.js, put in by the build */
+
+/* The page may talk to nobody; this one to its server. 'self' means its WebSocket too, but not in
+ * every browser. */
+static const char silent[] = "default-src 'none';";
+static const char talking[] = "default-src 'none'; connect-src 'self' ws: wss:;";
+
+/* `page` with the first `from` replaced by `to`. */
+static char *replace(char *page, size_t *size, const char *from, const void *to, size_t to_size) {
+  const size_t from_size = strlen(from);
+  char *at = page == NULL ? NULL : memmem(page, *size, from, from_size);
+  char *changed = at == NULL ? NULL : malloc(*size - from_size + to_size + 1);
+  if (changed != NULL) {
+    const size_t before = (size_t)(at - page);
+    memcpy(changed, page, before);
+    memcpy(changed + before, to, to_size);
+    memcpy(changed + before + to_size, at + from_size, *size - before - from_size);
+    *size += to_size - from_size;
+  }
+  free(page);
+  return changed;
+}
+
+static supine_status print_page(const export_source *source, const export_page *shown, char **page,
+                                size_t *size, supine_error *error) {
+  FILE *file = open_memstream(page, size);
+  supine_status status = SUPINE_OK;
+  bool whole = file != NULL;
+  if (whole) {
+    status = supine_export_html_print(file, source, shown, error);
+    whole = ferror(file) == 0;
+    whole = fclose(file) == 0 && whole;
+  }
+  if (status == SUPINE_OK && !whole) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
+  }
+  if (status != SUPINE_OK) {
+    free(*page);
+    *page = NULL;
+  }
+  return status;
+}
+
+supine_status supine_stream_live_page(const char *basis, double breath, const char *title,
+                                      char **page, size_t *size, supine_error *error) {
+  export_source source = {0};
+  export_page shown = {.title = title};
+  *page = NULL;
+  *size = 0;
+  supine_status status = supine_export_source_open(basis, &source, error);
+  if (status == SUPINE_OK) {
+    status = supine_export_breath_set(&source, breath, 20.0, &shown.breath, error);
+  }
+  if (status == SUPINE_OK) {
+    status = print_page(&source, &shown, page, size, error);
+  }
+  supine_export_source_close(&source);
+  if (status == SUPINE_OK) {
+    static const char end[] = "</body>";
+    char *script = NULL;
+    const int length = asprintf(&script, "<script type=\"module\">\n%s</script>\n%s",
+                                supine_stream_assets[0].bytes, end);
+    *page = replace(*page, size, silent, talking, strlen(talking));
+    *page = replace(*page, size, end, script, length < 0 ? 0 : (size_t)length);
+    free(script);
+    if (*page == NULL) {
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "the page cannot be made to follow");
+    }
+  }
+  return status;
+}

@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Messages become a pose and a volume, and these a moment of the lungs. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "program/stream/patient.h"
+
+supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
+                                                  const supine_stream_options *options,
+                                                  supine_stream_counts *counts, double now) {
+  return (supine_stream_patient){.basis = basis,
+                                 .options = options,
+                                 .counts = counts,
+                                 .begun = now,
+                                 .gravity = {0, 1, 0},
+                                 .smooth = {0, 1, 0},
+                                 .smoothed = now,
+                                 .received = -1.0,
+                                 .warned = now - 1.0};
+}
+
+void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format,
+                                ...) {
+  if (now - patient->warned < 1.0) {
+    ++patient->unsaid;
+    return;
+  }
+  char text[512];
+  va_list arguments;
+  va_start(arguments, format);
+  const int length = vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  if (patient->unsaid > 0 && length > 0 && (size_t)length < sizeof text) {
+    (void)snprintf(text + length, sizeof text - (size_t)length, " (and %llu more)",
+                   (unsigned long long)patient->unsaid);
+  }
+  patient->warned = now;
+  patient->unsaid = 0;
+  patient->options->warn(patient->options->context, text);
+}
+
+static void take(supine_stream_patient *p, const double gravity[3], double received,
+                 uint64_t stamp) {
+  memcpy(p->gravity, gravity, sizeof p->gravity);
+  if (!p->posed) { /* nothing to turn from */
+    memcpy(p->smooth, gravity, sizeof p->smooth);
+    p->smoothed = received;
+    p->first = received;
+  }
+  p->posed = p->fresh = true;
+  p->received = received;
+  p->stamp = stamp;
+  ++p->counts->poses;
+  if (p->options->record != NULL) {
+    const supine_stream_pose pose = {fmax(0.0, received - p->first),
+                                     {gravity[0], gravity[1], gravity[2]}};
+    supine_stream_poses_add(p->options->record, &pose);
+  }
+}
+
+static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const char *why,
+                  const double gravity[3], double received, uint64_t stamp) {
+  if (verdict == SUPINE_STREAM_REFUSED) {
+    ++p->counts->refused;
+    supine_stream_patient_warn(p, received, "a pose is refused: %s", why);
+    return;
+  }
+  if (verdict == SUPINE_STREAM_REPAIRED) {
+    ++p->counts->repaired;
+    supine_stream_patient_warn(p, received, "a pose is no rotation, its nearest is taken: %s", why);
+  }
+  take(p, gravity, received, stamp);
+}
+
+void supine_stream_patient_hear(supine_stream_patient *patient,
+                                const supine_stream_message *message, double received,
+                                uint64_t stamp) {
+  const supine_stream_setup *setup = &patient->options->setup;
+  supine_stream_volume *volume = patient->options->volume;
+  supine_stream_verdict verdict = SUPINE_STREAM_EXACT;
+  supine_error error;
+  double gravity[3];
+  const char *why = NULL;
+  switch (message->kind) {
+  case SUPINE_STREAM_ROTATION:
+    verdict = supine_stream_gravity_rotation(setup, message->number, gravity, &why);
+    judge(patient, verdict, why, gravity, received, stamp);
+    break;
+  case SUPINE_STREAM_QUATERNION:
+    verdict = supine_stream_gravity_quaternion(setup, message->number, gravity, &why);
+    judge(patient, verdict, why, gravity, received, stamp);
+    break;
+  case SUPINE_STREAM_DOWN:
+    verdict = supine_stream_gravity_down(setup, message->number, gravity, &why);
+    judge(patient, verdict, why, gravity, received, stamp);
+    break;
+  case SUPINE_STREAM_VOLUME:
+    if (isfinite(message->number[0])) {
+      *volume = (supine_stream_volume){.fixed = message->number[0]};
+      patient->fresh = true;
+    } else {
+      supine_stream_patient_warn(patient, received, "a volume is refused: it is not finite");
+    }
+    break;
+  case SUPINE_STREAM_VOLUME_TEXT:
+    if (supine_stream_volume_fix(volume, message->text, &error) != SUPINE_OK) {
+      supine_stream_patient_warn(patient, received, "%s", error.message);
+    } else {
+      patient->fresh = true;
+    }
+    break;
+  case SUPINE_STREAM_NOTHING:
+  case SUPINE_STREAM_WISH:
+    break;
+  }
+}
+
+void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
+                                double received) {
+  const supine_stream_setup body = supine_stream_setup_default();
+  double unit[3];
+  const char *why = NULL;
+  const supine_stream_verdict verdict = supine_stream_gravity_down(&body, gravity, unit, &why);
+  judge(patient, verdict, why, unit, received, 0);
+}
+
+bool supine_stream_patient_moves(const supine_stream_patient *patient) {
+  return patient->options->volume->breathes || patient->turning;
+}
+
+static uint64_t stamp_now(void) {
+  struct timespec now;
+  (void)clock_gettime(CLOCK_REALTIME, &now);
+  return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
+}
+
+void supine_stream_patient_moment(supine_stream_patient *patient, double now,
+                                  supine_stream_moment *moment) {
+  const supine_basis *basis = patient->basis;
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const double left =
+      supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed),
+                                   patient->options->smooth, patient->smooth);
+  patient->smoothed = now;
+  patient->turning = left > 1e-6; /* a thousandth of a millimetre where a metre turns */
+  memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
+  moment->volume = supine_stream_volume_at(patient->options->volume, basis, moment->gravity,
+                                           now - patient->begun);
+  double resting = 0.0;
+  (void)supine_basis_resting_volume(basis, moment->gravity,
+                                    &resting); /* a unit direction has one */
+  moment->above = moment->volume - resting;
+  moment->received = patient->fresh ? patient->received : -1.0;
+  moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
+  (void)supine_basis_weights(basis, moment->gravity, moment->weights);
+  double scale = 0.0;
+  if (info->has_volume &&
+      supine_basis_scale(basis, moment->weights, moment->volume, &scale, NULL) == SUPINE_OK) {
+    for (size_t j = 0; j < info->lung_count; ++j) {
+      patient->scales[j] = scale;
+    }
+  } else {
+    ++patient->counts->unreachable;
+    supine_stream_patient_warn(patient, now,
+                               "no breath of %.0f mL in this posture: the surface would fold",
+                               moment->volume);
+  }
+  memcpy(moment->scales, patient->scales, sizeof moment->scales);
+  patient->fresh = false;
+}

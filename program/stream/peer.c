@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A peer's socket, read and written without waiting. */
+#include <errno.h>
+#include <linux/sockios.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "program/stream/peer.h"
+
+static const uint64_t body_most = 256u << 20; /* an image passed over; more is no message */
+
+supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                                       supine_stream_what what, double now, supine_error *error) {
+  const int yes = 1;
+  unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
+  if (body == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
+  memset(peer, 0, sizeof *peer);
+  peer->socket = socket;
+  peer->connecting = connecting;
+  peer->took = peer->said = peer->heard = now;
+  peer->body = body;
+  peer->what = what;
+  peer->version = 1;
+  return SUPINE_OK;
+}
+
+void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames) {
+  if (peer->socket >= 0) {
+    (void)close(peer->socket);
+  }
+  supine_stream_frame_leave(frames, peer->frame);
+  free(peer->body);
+  peer->socket = -1;
+  peer->frame = NULL;
+  peer->body = NULL;
+}
+
+/* Up to `size` bytes into `bytes`: what came, 0 where nothing has, -1 where the peer is gone. */
+static ssize_t receive(int socket, void *bytes, size_t size) {
+  for (;;) {
+    const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
+    if (got > 0) {
+      return got;
+    }
+    if (got == 0) {
+      return -1;
+    }
+    if (errno != EINTR) {
+      return errno == EAGAIN || errno == EWOULDBLOCK ? 0 : -1;
+    }
+  }
+}
+
+/* A header is whole: read its body, or pass over it? */
+static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
+  if (supine_stream_header_read(peer->raw, &peer->header, error) != SUPINE_OK) {
+    return false;
+  }
+  const uint64_t size = peer->header.size;
+  if (size > body_most) {
+    (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "a message of %llu bytes",
+                           (unsigned long long)size);
+    return false;
+  }
+  peer->version = peer->header.version;
+  peer->got = 0;
+  peer->in_body = supine_stream_message_wanted(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
+  if (!peer->in_body) {
+    peer->skip = size;
+    ++*skipped;
+  }
+  return true;
+}
+
+supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
+                                              supine_stream_hear *hear, void *context,
+                                              uint64_t *skipped, supine_error *error) {
+  unsigned char waste[4096];
+  size_t share = 65536;
+  while (share > 0) {
+    unsigned char *into = peer->in_body ? peer->body + peer->got : peer->raw + peer->got;
+    size_t size = (peer->in_body ? (size_t)peer->header.size : SUPINE_STREAM_HEADER) - peer->got;
+    if (peer->skip > 0) {
+      into = waste;
+      size = peer->skip < sizeof waste ? (size_t)peer->skip : sizeof waste;
+    }
+    ssize_t got = 0;
+    if (size > 0) {
+      got = receive(peer->socket, into, size < share ? size : share);
+      if (got < 0) {
+        return SUPINE_STREAM_LOST;
+      }
+      if (got == 0) {
+        peer->heard = now;
+        return SUPINE_STREAM_DONE;
+      }
+      share -= (size_t)got;
+      peer->said = now;
+    }
+    if (peer->skip > 0) {
+      peer->skip -= (uint64_t)got;
+      continue;
+    }
+    peer->got += (size_t)got;
+    if ((size_t)got < size) {
+      continue;
+    }
+    if (!peer->in_body) {
+      if (!begin_body(peer, skipped, error)) {
+        return SUPINE_STREAM_LOST;
+      }
+      continue;
+    }
+    peer->in_body = false;
+    peer->got = 0;
+    hear(context, peer);
+  }
+  return SUPINE_STREAM_MORE;
+}
+
+bool supine_stream_peer_ready(const supine_stream_peer *peer) {
+  int queued = 0;
+  return peer->frame == NULL && !peer->connecting && peer->what != SUPINE_STREAM_SILENCE &&
+         ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
+}
+
+bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
+                             supine_stream_frame *frame, double now) {
+  const bool triangles = peer->what == SUPINE_STREAM_SURFACE ||
+                         (peer->what == SUPINE_STREAM_POINTS && !peer->knows_triangles);
+  if (!supine_stream_frame_wrap(frames, frame, peer->what, triangles, peer->version,
+                                &peer->parcel)) {
+    return false;
+  }
+  peer->knows_triangles = peer->what == SUPINE_STREAM_POINTS;
+  peer->begun = frame->number;
+  peer->frame = frame;
+  peer->sent = 0;
+  peer->took = now;
+  ++frame->users;
+  return true;
+}
+
+supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double now) {
+  size_t share = 1u << 20;
+  while (peer->sent < peer->parcel.size && share > 0) {
+    struct iovec rest[SUPINE_STREAM_PIECES];
+    int count = 0;
+    size_t passed = peer->sent;
+    size_t allowed = share;
+    for (int i = 0; i < peer->parcel.count && allowed > 0; ++i) {
+      const struct iovec *piece = &peer->parcel.piece[i];
+      if (passed >= piece->iov_len) {
+        passed -= piece->iov_len;
+        continue;
+      }
+      const size_t size = piece->iov_len - passed < allowed ? piece->iov_len - passed : allowed;
+      rest[count++] = (struct iovec){(unsigned char *)piece->iov_base + passed, size};
+      allowed -= size;
+      passed = 0;
+    }
+    const struct msghdr message = {.msg_iov = rest, .msg_iovlen = (size_t)count};
+    const ssize_t sent = sendmsg(peer->socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent < 0) {
+      if (errno == EINTR) {
+        continue;
+      }
+      return errno == EAGAIN || errno == EWOULDBLOCK ? SUPINE_STREAM_MORE : SUPINE_STREAM_LOST;
+    }
+    peer->sent += (size_t)sent;
+    share -= (size_t)sent;
+    peer->took = now;
+  }
+  return peer->sent == peer->parcel.size ? SUPINE_STREAM_DONE : SUPINE_STREAM_MORE;
+}

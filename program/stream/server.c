@@ -1,0 +1,452 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The loop: what has come is read, the newest pose becomes a frame, and the frame leaves. */
+#include <errno.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "program/stream/address.h"
+#include "program/stream/patient.h"
+#include "program/stream/peer.h"
+#include "program/stream/server.h"
+#include "sh/base/clock.h"
+
+static const double frame_time = 15e-3; /* s: while the lungs move though no pose comes */
+static const double retry_time = 20e-3; /* s: peers whose kernel still holds the last frame */
+static const double again_time = 1.0;   /* s: connecting, and accepting where that failed */
+static const double asked_time = 0.1;   /* s: whether to stop */
+
+struct supine_stream_server {
+  const supine_stream_options *options;
+  supine_stream_counts counts;
+  supine_stream_patient patient;
+  supine_stream_frames *frames;
+  supine_stream_frame *latest;
+  double framed; /* s of the clock, when `latest` was made */
+  int listener;  /* -1: none */
+  int port;
+  supine_stream_address target;
+  double connect_at; /* s of the clock, of the next attempt; INFINITY while there is one */
+  double accept_at;
+  double shown;
+  supine_stream_peer *connected;
+  supine_stream_peer *peer;   /* [options->peers] */
+  struct pollfd *polled;      /* [peers + 2] */
+  supine_stream_peer **owner; /* of each polled */
+  size_t replayed;
+  double replay_begun;            /* s of the clock; < 0: not yet */
+  double waited;                  /* s of the clock when poll() began, and */
+  double woke;                    /* when it ended */
+  supine_stream_latency *latency; /* weights, surfaces */
+};
+
+static bool lagging(const supine_stream_server *s, const supine_stream_peer *peer) {
+  return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
+         peer->what != SUPINE_STREAM_SILENCE && s->latest != NULL &&
+         peer->begun != s->latest->number;
+}
+
+static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
+  if (peer == s->connected) {
+    s->connected = NULL;
+    s->connect_at = s->woke + again_time;
+  }
+  supine_stream_peer_end(peer, s->frames);
+  --s->counts.present;
+}
+
+/* A place for a socket; NULL, and the socket is closed, where there is none. */
+static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
+  supine_error error;
+  for (size_t i = 0; i < s->options->peers; ++i) {
+    supine_stream_peer *peer = &s->peer[i];
+    if (peer->socket < 0 && supine_stream_peer_begin(peer, socket, connecting, s->options->what,
+                                                     s->woke, &error) == SUPINE_OK) {
+      ++s->counts.present;
+      s->counts.peers += connecting ? 0 : 1;
+      return peer;
+    }
+  }
+  (void)close(socket);
+  ++s->counts.turned_away;
+  supine_stream_patient_warn(&s->patient, s->woke, "a peer is turned away: there are %zu",
+                             s->options->peers);
+  return NULL;
+}
+
+static void accept_peers(supine_stream_server *s) {
+  for (size_t i = 0; i < s->options->peers; ++i) {
+    const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (socket < 0) {
+      if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
+        s->accept_at = s->woke + again_time; /* out of descriptors, say */
+      }
+      return;
+    }
+    (void)begin_peer(s, socket, false);
+  }
+}
+
+static void connect_peer(supine_stream_server *s) {
+  const int socket = supine_stream_address_connect(&s->target);
+  s->connected = socket < 0 ? NULL : begin_peer(s, socket, true);
+  s->connect_at = s->connected == NULL ? s->woke + again_time : (double)INFINITY;
+}
+
+/* The socket of a peer on its way is writable: it is there, or it failed. */
+static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
+  int failure = 0;
+  socklen_t size = sizeof failure;
+  if (getsockopt(peer->socket, SOL_SOCKET, SO_ERROR, &failure, &size) != 0 || failure != 0) {
+    end_peer(s, peer);
+    return;
+  }
+  peer->connecting = false;
+  peer->took = peer->said = s->woke;
+  ++s->counts.peers;
+}
+
+static void hear_wish(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
+  for (int what = 0; what < SUPINE_STREAM_WHAT_COUNT; ++what) {
+    if (strcmp(text, supine_stream_what_name((supine_stream_what)what)) == 0) {
+      peer->what = (supine_stream_what)what;
+      peer->knows_triangles = false;
+      peer->begun = 0;
+      return;
+    }
+  }
+  supine_stream_patient_warn(&s->patient, s->woke,
+                             "a peer asks for '%s': weights, points, surface or nothing", text);
+}
+
+static void hear(void *context, supine_stream_peer *peer) {
+  supine_stream_server *s = context;
+  supine_stream_message message;
+  supine_error error;
+  if (supine_stream_message_read(&peer->header, peer->body, s->options->device, &message, &error) !=
+      SUPINE_OK) {
+    ++s->counts.malformed;
+    supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s", error.message);
+    return;
+  }
+  if (message.kind == SUPINE_STREAM_WISH) {
+    hear_wish(s, peer, message.text);
+    return;
+  }
+  /* Where poll() had nothing to wait for, the message may have lain there since the socket was last
+   * empty. */
+  const bool waited = s->woke - s->waited > 50e-6;
+  supine_stream_patient_hear(&s->patient, &message, waited ? s->woke : peer->heard,
+                             peer->header.stamp);
+}
+
+static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
+  supine_error error = {.status = SUPINE_OK};
+  if (supine_stream_peer_read(peer, s->woke, hear, s, &s->counts.skipped, &error) ==
+      SUPINE_STREAM_LOST) {
+    if (error.status != SUPINE_OK) {
+      ++s->counts.lost;
+      supine_stream_patient_warn(&s->patient, s->woke, "a peer is lost: %s", error.message);
+    }
+    end_peer(s, peer);
+  }
+}
+
+static void replay_poses(supine_stream_server *s) {
+  const supine_stream_poses *poses = s->options->replay;
+  const bool watched = s->counts.peers > 0 ||
+                       (s->options->web != NULL && supine_stream_web_viewers(s->options->web) > 0);
+  if (poses == NULL || (s->replay_begun < 0.0 && !watched)) {
+    return;
+  }
+  s->replay_begun = s->replay_begun < 0.0 ? s->woke : s->replay_begun;
+  for (; s->replayed < poses->count; ++s->replayed) {
+    const supine_stream_pose *pose = &poses->pose[s->replayed];
+    const double due = s->replay_begun + pose->seconds;
+    if (due > s->woke) {
+      return;
+    }
+    supine_stream_patient_pose(&s->patient, pose->gravity, due);
+  }
+}
+
+/* When the next frame is due: INFINITY where nothing moves. */
+static double frame_due(const supine_stream_server *s) {
+  const double soonest = s->latest == NULL ? 0.0 : s->framed + 1.0 / s->options->rate;
+  if (s->patient.fresh || s->latest == NULL) {
+    return soonest;
+  }
+  if (!supine_stream_patient_moves(&s->patient)) {
+    return (double)INFINITY;
+  }
+  /* Poses that come at that pace make the frames themselves. */
+  const bool posed = s->woke - s->patient.received < 2.0 * frame_time;
+  return fmax(soonest, s->framed + (posed ? 2.0 : 1.0) * frame_time);
+}
+
+static bool make_frame(supine_stream_server *s) {
+  supine_stream_moment moment;
+  supine_stream_patient_moment(&s->patient, s->woke, &moment);
+  supine_stream_frame *frame = supine_stream_frame_take(s->frames, &moment);
+  if (frame == NULL) {
+    return false;
+  }
+  supine_stream_frame_leave(s->frames, s->latest);
+  s->latest = frame;
+  s->framed = s->woke;
+  ++s->counts.frames;
+  if (s->options->web != NULL) {
+    supine_stream_web_tell(s->options->web, &moment);
+  }
+  return true;
+}
+
+/* The newest frame to a peer that is ready, and what is left of an older one. */
+static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
+  if (lagging(s, peer) && supine_stream_peer_ready(peer) &&
+      !supine_stream_peer_give(peer, s->frames, s->latest, s->woke)) {
+    return false;
+  }
+  if (peer->frame == NULL) {
+    return true;
+  }
+  const supine_stream_outcome outcome = supine_stream_peer_send(peer, s->woke);
+  if (outcome == SUPINE_STREAM_LOST) {
+    end_peer(s, peer);
+  } else if (outcome == SUPINE_STREAM_DONE) {
+    const double received = peer->frame->moment.received;
+    if (received >= 0.0) {
+      supine_stream_latency_add(&s->latency[peer->what != SUPINE_STREAM_WEIGHTS],
+                                supine_clock_seconds() - received);
+    }
+    ++s->counts.sent;
+    supine_stream_frame_leave(s->frames, peer->frame);
+    peer->frame = NULL;
+  }
+  return true;
+}
+
+static bool send_peers(supine_stream_server *s) {
+  for (int surfaces = 0; surfaces < 2; ++surfaces) {
+    for (size_t i = 0; i < s->options->peers; ++i) {
+      supine_stream_peer *peer = &s->peer[i];
+      const bool surface =
+          peer->what == SUPINE_STREAM_SURFACE || peer->what == SUPINE_STREAM_POINTS;
+      if (peer->socket >= 0 && surface == (surfaces == 1) && !send_peer(s, peer)) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+/* Peers that have left something unfinished for too long. */
+static void lose_stuck(supine_stream_server *s) {
+  const double patience = s->options->patience > 0.0 ? s->options->patience : 20.0;
+  for (size_t i = 0; i < s->options->peers; ++i) {
+    supine_stream_peer *peer = &s->peer[i];
+    if (peer->socket < 0) {
+      continue;
+    }
+    const bool takes = peer->frame != NULL || (lagging(s, peer) && !supine_stream_peer_ready(peer));
+    const bool says = peer->connecting || peer->got > 0 || peer->in_body || peer->skip > 0;
+    if ((takes && s->woke - peer->took > patience) || (says && s->woke - peer->said > patience)) {
+      if (!peer->connecting) {
+        ++s->counts.lost;
+        supine_stream_patient_warn(&s->patient, s->woke,
+                                   "a peer is lost: it has finished nothing for %.3g s", patience);
+      }
+      end_peer(s, peer);
+    }
+  }
+}
+
+/* How long poll may wait. */
+static struct timespec patience_of(const supine_stream_server *s, double end) {
+  const supine_stream_poses *poses = s->options->replay;
+  double next = fmin(fmin(s->woke + asked_time, end), fmin(s->connect_at, frame_due(s)));
+  if (poses != NULL && s->replay_begun >= 0.0 && s->replayed < poses->count) {
+    next = fmin(next, s->replay_begun + poses->pose[s->replayed].seconds);
+  }
+  for (size_t i = 0; i < s->options->peers; ++i) {
+    if (lagging(s, &s->peer[i])) {
+      next = fmin(next, s->woke + retry_time);
+    }
+  }
+  const double left = fmax(0.0, next - supine_clock_seconds()); /* below asked_time */
+  return (struct timespec){0, (long)(1e9 * left)};
+}
+
+/* Everything that poll() is to look at; returns how many. */
+static nfds_t gather(supine_stream_server *s) {
+  nfds_t count = 0;
+  for (size_t i = 0; i < s->options->peers; ++i) {
+    supine_stream_peer *peer = &s->peer[i];
+    if (peer->socket >= 0) {
+      const bool writes = peer->connecting || peer->frame != NULL;
+      s->owner[count] = peer;
+      s->polled[count++] =
+          (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
+    }
+  }
+  const bool accepts = s->listener >= 0 && s->woke >= s->accept_at;
+  s->owner[count] = NULL;
+  s->polled[count++] = (struct pollfd){accepts ? s->listener : -1, POLLIN, 0};
+  const int web = s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1;
+  s->owner[count] = NULL;
+  s->polled[count++] = (struct pollfd){web, POLLIN, 0};
+  return count;
+}
+
+/* Reads everything that has come. */
+static void listen_round(supine_stream_server *s, nfds_t count) {
+  for (nfds_t i = 0; i + 2 < count; ++i) {
+    if (s->polled[i].revents != 0) {
+      if (s->owner[i]->connecting) {
+        connection_made(s, s->owner[i]);
+      } else if ((s->polled[i].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+        read_peer(s, s->owner[i]);
+      }
+    }
+  }
+  if (s->polled[count - 2].revents != 0) {
+    accept_peers(s);
+  }
+  if (s->polled[count - 1].revents != 0) {
+    double gravity[3];
+    double received = 0.0;
+    if (supine_stream_web_take(s->options->web, gravity, &received)) {
+      supine_stream_patient_pose(&s->patient, gravity, received);
+    }
+  }
+  replay_poses(s);
+}
+
+/* When a replay has been seen. */
+static bool replay_over(const supine_stream_server *s) {
+  const supine_stream_poses *poses = s->options->replay;
+  return poses != NULL && s->replayed == poses->count &&
+         s->woke > s->replay_begun + poses->pose[poses->count - 1].seconds + 2.0 * asked_time;
+}
+
+supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error) {
+  supine_stream_server *s = server;
+  const supine_stream_options *options = s->options;
+  s->woke = supine_clock_seconds();
+  const double end = options->seconds > 0.0 ? s->woke + options->seconds : (double)INFINITY;
+  double asked = s->woke;
+  while (s->woke < end && !replay_over(s)) {
+    const nfds_t count = gather(s);
+    const struct timespec patience = patience_of(s, end);
+    s->waited = supine_clock_seconds();
+    if (ppoll(s->polled, count, &patience, NULL) < 0 && errno != EINTR) {
+      return supine_error_set(error, SUPINE_ERROR_WRITE, "poll: %s",
+                              strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    }
+    s->woke = supine_clock_seconds();
+    if (s->woke - asked >= asked_time) {
+      asked = s->woke;
+      lose_stuck(s);
+      if (options->stop(options->context)) {
+        break;
+      }
+    }
+    if (s->woke - s->shown >= 1.0 && options->shown != NULL) {
+      s->shown = s->woke;
+      options->shown(options->context, s);
+    }
+    if (s->woke >= s->connect_at) {
+      connect_peer(s);
+    }
+    listen_round(s, count);
+    if ((s->woke >= frame_due(s) && !make_frame(s)) || !send_peers(s)) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_stream_server_create(const supine_basis *basis,
+                                          const supine_stream_options *options,
+                                          supine_stream_server **server, supine_error *error) {
+  const double now = supine_clock_seconds();
+  supine_stream_server *s = calloc(1, sizeof *s);
+  if (s != NULL) {
+    *s = (supine_stream_server){.options = options, .listener = -1, .replay_begun = -1.0};
+    s->peer = calloc(options->peers, sizeof *s->peer);
+    s->polled = calloc(options->peers + 2, sizeof *s->polled);
+    s->owner = calloc(options->peers + 2, sizeof(supine_stream_peer *));
+    s->latency = calloc(2, sizeof *s->latency);
+  }
+  if (s == NULL || s->peer == NULL || s->polled == NULL || s->owner == NULL || s->latency == NULL) {
+    supine_stream_server_destroy(s);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  for (size_t i = 0; i < options->peers; ++i) {
+    s->peer[i].socket = -1;
+  }
+  s->patient = supine_stream_patient_begin(basis, options, &s->counts, now);
+  s->connect_at = options->connect != NULL ? now : (double)INFINITY;
+  s->shown = s->woke = now;
+  supine_stream_address here;
+  supine_status status =
+      supine_stream_frames_create(basis, options->name, options->ras, &s->frames, error);
+  if (status == SUPINE_OK && options->listen != NULL) {
+    status = supine_stream_address_read(options->listen, true, &here, error);
+    if (status == SUPINE_OK) {
+      s->listener = supine_stream_address_listen(&here, &s->port, error);
+      status = s->listener < 0 ? SUPINE_ERROR_WRITE : SUPINE_OK;
+    }
+  }
+  if (status == SUPINE_OK && options->connect != NULL) {
+    status = supine_stream_address_read(options->connect, false, &s->target, error);
+  }
+  if (status != SUPINE_OK) {
+    supine_stream_server_destroy(s);
+    return status;
+  }
+  *server = s;
+  return SUPINE_OK;
+}
+
+void supine_stream_server_destroy(supine_stream_server *server) {
+  if (server == NULL) {
+    return;
+  }
+  for (size_t i = 0; server->peer != NULL && server->frames != NULL && i < server->options->peers;
+       ++i) {
+    if (server->peer[i].socket >= 0) {
+      supine_stream_peer_end(&server->peer[i], server->frames);
+    }
+  }
+  if (server->listener >= 0) {
+    (void)close(server->listener);
+  }
+  if (server->frames != NULL) {
+    supine_stream_frame_leave(server->frames, server->latest);
+  }
+  supine_stream_frames_destroy(server->frames);
+  free(server->latency);
+  free(server->owner);
+  free(server->polled);
+  free(server->peer);
+  free(server);
+}
+
+int supine_stream_server_port(const supine_stream_server *server) {
+  return server->port;
+}
+
+const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server) {
+  return &server->counts;
+}
+
+const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
+                                                          supine_stream_what what) {
+  return &server->latency[what != SUPINE_STREAM_WEIGHTS];
+}

@@ -1,0 +1,291 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The page and its WebSocket, by libwebsockets, in a thread of its own. */
+#include <jansson.h>
+#include <libwebsockets.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "program/stream/web.h"
+#include "sh/base/clock.h"
+
+enum { TEXT = 256, HEARD = 512, CHUNK = 65536 };
+
+struct supine_stream_web {
+  supine_stream_site site;
+  struct lws_context *context;
+  int port;
+  int event; /* readable when a pose has come */
+  pthread_t thread;
+  bool running;
+  atomic_bool ending;
+  atomic_size_t viewers;
+  pthread_mutex_t lock; /* of what follows */
+  uint64_t told;        /* number of the moment in `text` */
+  char text[TEXT];
+  bool posed;
+  double gravity[3], received;
+};
+
+/* One connection: the page on its way to a browser, or a viewer. */
+typedef struct session {
+  size_t sent;
+  uint64_t told;
+  bool counted;
+} session;
+
+static supine_stream_web *web_of(struct lws *wsi) {
+  return lws_context_user(lws_get_context(wsi));
+}
+
+/* A browser says whose page opened the socket: only ours may. Programs that are no browsers do not
+ * say. */
+static bool is_ours(struct lws *wsi) {
+  char origin[256] = "";
+  char host[256] = "";
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0) {
+    return true;
+  }
+  if (lws_hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) < 0 ||
+      lws_hdr_copy(wsi, host, sizeof host, WSI_TOKEN_HOST) < 0) {
+    return false;
+  }
+  const char *from = strstr(origin, "://");
+  return from != NULL && strcmp(from + 3, host) == 0;
+}
+
+/* {"gravity":[x,y,z]} */
+static void hear(supine_stream_web *web, const char *bytes, size_t size) {
+  json_t *pose = json_loadb(bytes, size, 0, NULL);
+  const json_t *gravity = json_object_get(pose, "gravity");
+  double number[3];
+  bool good = json_array_size(gravity) == 3;
+  for (size_t i = 0; i < 3 && good; ++i) {
+    const json_t *value = json_array_get(gravity, i);
+    number[i] = json_number_value(value);
+    good = json_is_number(value) && isfinite(number[i]);
+  }
+  json_decref(pose);
+  if (good) {
+    const uint64_t one = 1;
+    (void)pthread_mutex_lock(&web->lock);
+    memcpy(web->gravity, number, sizeof number);
+    web->received = supine_clock_seconds();
+    web->posed = true;
+    (void)pthread_mutex_unlock(&web->lock);
+    (void)!write(web->event, &one, sizeof one);
+  }
+}
+
+/* The newest moment, where the viewer has not seen it; 0, or -1 to end. */
+static int tell(supine_stream_web *web, struct lws *wsi, session *s) {
+  unsigned char bytes[LWS_PRE + TEXT];
+  (void)pthread_mutex_lock(&web->lock);
+  const uint64_t told = web->told;
+  const size_t size = strlen(web->text);
+  memcpy(bytes + LWS_PRE, web->text, size);
+  (void)pthread_mutex_unlock(&web->lock);
+  if (told == s->told) {
+    return 0;
+  }
+  s->told = told;
+  return lws_write(wsi, bytes + LWS_PRE, size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
+}
+
+static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
+                size_t size) {
+  supine_stream_web *web = web_of(wsi);
+  session *s = user;
+  switch (reason) {
+  case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+    return is_ours(wsi) ? 0 : -1;
+  case LWS_CALLBACK_ESTABLISHED:
+    if (atomic_load(&web->viewers) >= web->site.viewers) {
+      return -1;
+    }
+    s->counted = true;
+    (void)atomic_fetch_add(&web->viewers, 1);
+    (void)lws_callback_on_writable(wsi);
+    return 0;
+  case LWS_CALLBACK_CLOSED:
+    if (s->counted) {
+      (void)atomic_fetch_sub(&web->viewers, 1);
+    }
+    return 0;
+  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* by supine_stream_web_tell */
+    (void)lws_callback_on_writable_all_protocol(web->context, lws_get_protocol(wsi));
+    return 0;
+  case LWS_CALLBACK_SERVER_WRITEABLE:
+    return tell(web, wsi, s);
+  case LWS_CALLBACK_RECEIVE: /* longer ones come in pieces, and are none of ours */
+    if (lws_is_first_fragment(wsi) != 0 && lws_is_final_fragment(wsi) != 0) {
+      hear(web, in, size);
+    }
+    return 0;
+  default:
+    return 0;
+  }
+}
+
+static int begin_page(supine_stream_web *web, struct lws *wsi, const char *path, session *s) {
+  unsigned char bytes[LWS_PRE + 1024];
+  unsigned char *at = bytes + LWS_PRE;
+  unsigned char *end = bytes + sizeof bytes - 1;
+  if (strcmp(path, "/") != 0) {
+    return lws_return_http_status(wsi, HTTP_STATUS_NOT_FOUND, NULL) != 0 ||
+                   lws_http_transaction_completed(wsi) != 0
+               ? -1
+               : 0;
+  }
+  s->sent = 0;
+  if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8",
+                                  web->site.page_size, &at, end) != 0 ||
+      lws_finalize_write_http_header(wsi, bytes + LWS_PRE, &at, end) != 0) {
+    return -1;
+  }
+  (void)lws_callback_on_writable(wsi);
+  return 0;
+}
+
+static int continue_page(supine_stream_web *web, struct lws *wsi, session *s) {
+  unsigned char bytes[LWS_PRE + CHUNK];
+  const size_t left = web->site.page_size - s->sent;
+  const size_t size = left < CHUNK ? left : CHUNK;
+  memcpy(bytes + LWS_PRE, (const unsigned char *)web->site.page + s->sent, size);
+  s->sent += size;
+  const bool last = size == left;
+  if (lws_write(wsi, bytes + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) {
+    return -1;
+  }
+  if (last) {
+    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+  }
+  (void)lws_callback_on_writable(wsi);
+  return 0;
+}
+
+static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
+                 size_t size) {
+  switch (reason) {
+  case LWS_CALLBACK_HTTP:
+    return begin_page(web_of(wsi), wsi, in, user);
+  case LWS_CALLBACK_HTTP_WRITEABLE:
+    return continue_page(web_of(wsi), wsi, user);
+  default:
+    return lws_callback_http_dummy(wsi, reason, user, in, size);
+  }
+}
+
+static const struct lws_protocols protocols[] = {
+    {"http", serve, sizeof(session), 0, 0, NULL, 0},
+    {"supine", view, sizeof(session), HEARD, 0, NULL, 0},
+    {NULL, NULL, 0, 0, 0, NULL, 0}};
+
+static void *run(void *context) {
+  supine_stream_web *web = context;
+  while (!atomic_load(&web->ending) && lws_service(web->context, 0) >= 0) {
+  }
+  return NULL;
+}
+
+supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
+                                       supine_error *error) {
+  supine_stream_web *w = calloc(1, sizeof *w);
+  if (w == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  w->site = *site;
+  (void)pthread_mutex_init(&w->lock, NULL);
+  w->event = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  lws_set_log_level(0, NULL);
+  struct lws_context_creation_info info = {0};
+  info.port = site->port;
+  info.iface = site->address != NULL ? site->address : "127.0.0.1";
+  info.protocols = protocols;
+  info.user = w;
+  info.gid = -1;
+  info.uid = -1;
+  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+  if (strchr(info.iface, ':') == NULL) { /* it would listen on every address, of either kind */
+    info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
+  }
+  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* pages on their way, too */
+  if (site->certificate != NULL) {
+    info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+    info.ssl_cert_filepath = site->certificate;
+    info.ssl_private_key_filepath = site->key;
+    info.alpn = "http/1.1";
+  }
+  w->context = w->event < 0 ? NULL : lws_create_context(&info);
+  struct lws_vhost *host = w->context == NULL ? NULL : lws_get_vhost_by_name(w->context, "default");
+  w->port = host == NULL ? 0 : lws_get_vhost_listen_port(host);
+  w->running = w->port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
+  if (!w->running) {
+    supine_stream_web_destroy(w);
+    return supine_error_set(error, SUPINE_ERROR_WRITE,
+                            "no page can be served at %s, port %d: is the port taken, or the "
+                            "certificate no good?",
+                            info.iface, site->port);
+  }
+  *web = w;
+  return SUPINE_OK;
+}
+
+void supine_stream_web_destroy(supine_stream_web *web) {
+  if (web == NULL) {
+    return;
+  }
+  atomic_store(&web->ending, true);
+  if (web->running) {
+    lws_cancel_service(web->context);
+    (void)pthread_join(web->thread, NULL);
+  }
+  if (web->context != NULL) {
+    lws_context_destroy(web->context);
+  }
+  if (web->event >= 0) {
+    (void)close(web->event);
+  }
+  (void)pthread_mutex_destroy(&web->lock);
+  free(web);
+}
+
+int supine_stream_web_port(const supine_stream_web *web) {
+  return web->port;
+}
+
+int supine_stream_web_descriptor(const supine_stream_web *web) {
+  return web->event;
+}
+
+bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received) {
+  uint64_t count = 0;
+  (void)!read(web->event, &count, sizeof count);
+  (void)pthread_mutex_lock(&web->lock);
+  const bool posed = web->posed;
+  web->posed = false;
+  memcpy(gravity, web->gravity, sizeof web->gravity);
+  *received = web->received;
+  (void)pthread_mutex_unlock(&web->lock);
+  return posed;
+}
+
+void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *moment) {
+  (void)pthread_mutex_lock(&web->lock);
+  (void)snprintf(
+      web->text, sizeof web->text, "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g}",
+      moment->gravity[0], moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
+  ++web->told;
+  (void)pthread_mutex_unlock(&web->lock);
+  if (atomic_load(&web->viewers) > 0) {
+    lws_cancel_service(web->context);
+  }
+}
+
+size_t supine_stream_web_viewers(supine_stream_web *web) {
+  return atomic_load(&web->viewers);
+}

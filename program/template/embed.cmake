@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Files as an array in C: cmake -D OUTPUT=assets.c -D ARRAY=name -D FILES=a;b -D SOURCES=c;d -P embed.cmake
+# Each becomes an entry {name, bytes, size} of ARRAY, in the order given. Every {{name}} in a .html
+# among them must be another of the files, or stand as "name" in one of the sources that fill it.
+set(known "")
+foreach(path IN LISTS FILES)
+  get_filename_component(name "${path}" NAME)
+  string(APPEND known "\"${name}\" ")
+endforeach()
+foreach(path IN LISTS SOURCES)
+  file(READ "${path}" text)
+  string(APPEND known "${text}")
+endforeach()
+set(arrays "")
+set(table "")
+set(number 0)
+foreach(path IN LISTS FILES)
+  get_filename_component(name "${path}" NAME)
+  if(name MATCHES "\\.html$")
+    file(READ "${path}" text)
+    string(REGEX MATCHALL "{{[^}]*}}" tags "${text}")
+    foreach(tag IN LISTS tags)
+      string(REGEX REPLACE "^{{[#/^]?(.*)}}$" "\\1" tag "${tag}")
+      string(FIND "${known}" "\"${tag}\"" found)
+      if(found EQUAL -1 AND NOT tag STREQUAL ".")
+        message(FATAL_ERROR "${path}: nothing fills {{${tag}}}")
+      endif()
+    endforeach()
+  endif()
+  file(READ "${path}" hex HEX)
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
+  string(REGEX REPLACE "(0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,)"
+    "\\1\n" bytes "${bytes}")
+  string(APPEND arrays "static const unsigned char asset_${number}[] = {\n${bytes}0};\n")
+  string(APPEND table
+    "    {\"${name}\", (const char *)asset_${number}, sizeof asset_${number} - 1},\n")
+  math(EXPR number "${number} + 1")
+endforeach()
+file(WRITE "${OUTPUT}" "/* Made by embed.cmake. */
+#include \"program/template/assets.h\"
+
+${arrays}
+extern const supine_asset ${ARRAY}[];
+const supine_asset ${ARRAY}[] = {
+${table}    {0}};
+")

@@ -1,0 +1,350 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* supine validate: a basis, or a patient's law, against other states of the same person. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include "sh/base/text.h"
+
+#include "program/validation.h"
+
+static const char name[] = "validate";
+
+typedef struct request {
+  const char *landmarks, *path;
+  supine_command_state from, state[SUPINE_COMMAND_STATES_MAX];
+  size_t count;
+  supine_orientation orientation;
+  supine_mesh_load_options load;
+  supine_volume volume;
+  double scale;
+  bool has_volume, has_scale, reverse, json;
+} request;
+
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+/* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
+static int read_posture(const char *command, const char *text, supine_command_state *state) {
+  size_t colons = 0;
+  for (const char *at = text; (at = strchr(at, ':')) != NULL; ++at) {
+    ++colons;
+  }
+  const char *last = colons == 1 || colons == 3 ? strrchr(text, ':') : NULL;
+  const size_t length = last != NULL ? (size_t)(last - text) : strlen(text);
+  if (length == 0 || length >= sizeof state->posture ||
+      (last != NULL && !supine_options_volume_parse(last + 1, &state->volume))) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  state->has_volume = last != NULL;
+  (void)snprintf(state->posture, sizeof state->posture, "%.*s", (int)length, text);
+  return supine_options_posture(command, state->posture, state->gravity);
+}
+
+static int read_from(const char *command, const char *text, void *field) {
+  return read_posture(command, text, field);
+}
+
+/* "prone.ply", "prone:prone.ply", "prone:rest+500:prone.ply", into the whole request. */
+static int read_state(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  supine_command_state *state = &wanted->state[wanted->count];
+  const char *colon = strrchr(text, ':');
+  char posture[SUPINE_POSTURE_NAME_MAX + 32];
+  if (wanted->count == SUPINE_COMMAND_STATES_MAX) {
+    return SUPINE_OPTION_MISFIT;
+  }
+  ++wanted->count;
+  state->path = colon != NULL ? colon + 1 : text;
+  if (colon == NULL) {
+    return SUPINE_EXIT_OK;
+  }
+  const size_t length = (size_t)(colon - text);
+  if (length >= sizeof posture || colon[1] == '\0') {
+    return SUPINE_OPTION_MISFIT;
+  }
+  (void)snprintf(posture, sizeof posture, "%.*s", (int)length, text);
+  return read_posture(command, posture, state);
+}
+
+static int read_volume(const char *command, const char *text, void *field) {
+  request *wanted = field;
+  (void)command;
+  wanted->has_volume = true;
+  return supine_options_fits(supine_options_volume_parse(text, &wanted->volume));
+}
+
+#define FILLS(member) SUPINE_FILLS(request, member)
+
+static const supine_option table[] = {
+    {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
+     "the same lungs in another state, of any meshing; may be repeated, up to 8, and several then "
+     "tell how linear displacement is with volume. Without a volume: what the surface holds",
+     .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
+    {"landmarks", 0, "FILE",
+     "points that are known in both states, as 'supine fit --landmarks' takes them; with several "
+     "states, in the first",
+     FILLS(landmarks), .file = SUPINE_FILE_IN},
+    {"reverse", 0, NULL, "landmarks start from the other one of the two", FILLS(reverse)},
+    {"from", 0, "POSTURE[:VOLUME]",
+     "the state that motion starts from, as landmarks and the maps beside the prediction have it; "
+     "default: the basis's scan itself",
+     FILLS(from), .read = read_from,
+     .wants = "a posture, and :rest, :full, :rest+ML or :ML after it"},
+    {"volume", 0, "VOLUME",
+     "of states that name none: rest, full, rest+500, or mL relative to the scan. Default: a "
+     "patient's own state as it was fitted, else what the state's surface holds",
+     .read = read_volume, .wants = "rest, full, rest+ML or mL", .rivals = "breath"},
+    {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
+     .wants = "a number", .rivals = "breath"},
+    {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
+     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {"output", 'o', "FILE",
+     "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
+     "the first with the way to the state's surface as its displacement (mm)",
+     FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
+    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
+    {.name = NULL}};
+
+static bool draws(const char *path) {
+  return supine_text_ends_in(path, ".png");
+}
+
+/* --- what is printed ------------------------------------------------------------------------- */
+
+static void print_distances(const char *title, const char *largest,
+                            const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
+  (void)printf("%s, mm:\n  %-12s %7s %7s %7s %10s   explained\n", title, "", "mean", "RMS", "95 %",
+               largest);
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    (void)printf("  %-12s %7.2f %7.2f %7.2f %10.2f   %7.1f %%\n", supine_patient_map_names[k],
+                 of[k].mean, of[k].rms, of[k].p95, of[k].largest, 100.0 * of[k].explained);
+  }
+}
+
+static void print_line(const supine_command_subject *s) {
+  if (s->count < 2) {
+    return;
+  }
+  (void)puts("linearity with volume: the breath scale that comes nearest to each state\n"
+             "          mL    by volume    nearest    leaves, mm RMS");
+  for (size_t i = 0; i < s->count; ++i) {
+    const supine_command_outcome *of = &s->outcome[i];
+    if (of->has_best) {
+      (void)printf("  %10.0f %12.3f %10.3f %12.2f   %s\n", of->millilitres,
+                   of->scale - s->from_scale, of->best_scale - s->from_scale, of->best_rms,
+                   s->state[i].path);
+    }
+  }
+  if (s->line_count > 1) {
+    (void)printf(
+        "a straight line from where motion starts misses those %zu of one posture by up to "
+        "%.1f %% of the largest\n",
+        s->line_count, 100.0 * s->line_off);
+  } else {
+    (void)puts("no two states in one posture: nothing to draw a line through");
+  }
+}
+
+static void print_text(const supine_command_subject *s) {
+  bool points = false;
+  for (size_t i = 0; i < s->count; ++i) {
+    const supine_command_outcome *of = &s->outcome[i];
+    if (s->count > 1) {
+      (void)printf("%s%s%s\n", s->state[i].posture, s->state[i].posture[0] != '\0' ? ": " : "",
+                   s->state[i].path);
+    }
+    if (of->has_surface) {
+      print_distances("distance between the surfaces, both ways", "Hausdorff", of->surface);
+    }
+    if (of->has_points) {
+      print_distances("distance of the landmarks", "largest", of->points);
+      points = true;
+    }
+  }
+  print_line(s);
+  (void)puts("translation, rigid+scale and affine are fitted to the other state itself\n"
+             "for comparison, the paper: surfaces within 2 mm, constants within 1 %");
+  if (!points) {
+    (void)puts("a small distance between surfaces does not prove the motion of what is in them: "
+               "--landmarks");
+  }
+}
+
+static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
+  json_t *all = json_object();
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    (void)json_object_set_new(all, supine_patient_map_names[k],
+                              json_pack("{s:f, s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean,
+                                        "rms_mm", of[k].rms, "p95_mm", of[k].p95, "largest_mm",
+                                        of[k].largest, "explained_percent",
+                                        100.0 * of[k].explained));
+  }
+  return all;
+}
+
+static json_t *encode_state(const supine_command_state *state,
+                            const supine_command_outcome *outcome) {
+  json_t *root = json_pack("{s:[f, f, f], s:f}", "gravity", state->gravity[0], state->gravity[1],
+                           state->gravity[2], "scale", outcome->scale);
+  if (state->path != NULL) {
+    (void)json_object_set_new(root, "file", json_string(state->path));
+  }
+  if (outcome->has_millilitres) {
+    (void)json_object_set_new(root, "volume_ml", json_real(outcome->millilitres));
+  }
+  if (outcome->has_surface) {
+    (void)json_object_set_new(root, "surface", encode(outcome->surface));
+  }
+  if (outcome->has_points) {
+    (void)json_object_set_new(root, "landmarks", encode(outcome->points));
+  }
+  if (outcome->has_best) {
+    (void)json_object_update_new(root, json_pack("{s:f, s:f}", "nearest_scale", outcome->best_scale,
+                                                 "nearest_rms", outcome->best_rms));
+  }
+  return root;
+}
+
+static void print_json(const supine_command_subject *s) {
+  json_t *states = json_array();
+  for (size_t i = 0; i < s->count; ++i) {
+    (void)json_array_append_new(states, encode_state(&s->state[i], &s->outcome[i]));
+  }
+  json_t *root = json_pack("{s:f, s:{s:f, s:f}, s:o}", "from_scale", s->from_scale, "paper",
+                           "surface_mm", 2.0, "constants_percent", 1.0, "states", states);
+  if (s->line_count > 1) {
+    (void)json_object_set_new(root, "linearity",
+                              json_pack("{s:i, s:f, s:f}", "states", (int)s->line_count,
+                                        "scale_per_litre", 1e3 * s->line_slope, "off_percent",
+                                        100.0 * s->line_off));
+  }
+  (void)json_dumpf(root, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
+  (void)putchar('\n');
+  json_decref(root);
+}
+
+/* --- all of it ------------------------------------------------------------------------------- */
+
+/* The states, each with a posture, and a volume or scale where one was given. */
+static int set_states(const request *wanted, supine_command_subject *s) {
+  double gravity[3] = {0.0, 1.0, 0.0};
+  s->from = wanted->from;
+  s->count = wanted->count > 0 ? wanted->count : 1;
+  if (wanted->orientation.given || wanted->orientation.tilt != 0.0) {
+    const int result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+  } else if (s->has_patient) {
+    memcpy(gravity, s->record.state.gravity, sizeof gravity);
+  }
+  for (size_t i = 0; i < s->count; ++i) {
+    supine_command_state *state = &s->state[i];
+    *state = wanted->state[i];
+    if (state->posture[0] == '\0') {
+      memcpy(state->gravity, gravity, sizeof gravity);
+    }
+    if (!state->has_volume) {
+      state->has_volume = wanted->has_volume;
+      state->volume = wanted->volume;
+      state->has_scale = wanted->has_scale;
+      state->scale = wanted->scale;
+    }
+  }
+  return SUPINE_EXIT_OK;
+}
+
+static supine_status write_errors(const request *wanted, const supine_command_subject *s,
+                                  supine_error *error) {
+  if (draws(wanted->path)) {
+    return supine_command_draw_errors(s, wanted->path, error);
+  }
+  const supine_mesh shown = {s->rest.vertex_count, s->outcome[0].predicted, s->rest.triangle_count,
+                             s->rest.triangles};
+  const supine_mesh_save_options save = {.rest = s->outcome[0].nearest};
+  return supine_mesh_save(wanted->path, &shown, &save, error);
+}
+
+static supine_status validate(const request *wanted, supine_command_subject *s,
+                              supine_error *error) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_status status = supine_command_subject_begin(s, error);
+  for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
+    status = supine_command_validate_state(s, i, &wanted->load, i == 0 ? wanted->landmarks : NULL,
+                                           wanted->reverse, error);
+    (void)supine_options_progress_step(&progress, (double)(i + 1) / (double)s->count);
+  }
+  supine_options_progress_end(&progress);
+  supine_command_find_line(s);
+  if (status == SUPINE_OK && wanted->path != NULL) {
+    status = write_errors(wanted, s, error);
+  }
+  return status;
+}
+
+static int run(void *chosen, const supine_arguments *given) {
+  const request *wanted = chosen;
+  const char *path = given->operand[0];
+  supine_command_subject s = {0};
+  supine_error error;
+  int result = SUPINE_EXIT_OK;
+  if (wanted->count == 0 && wanted->landmarks == NULL) {
+    return supine_options_usage(name, "against what? Name --state or --landmarks");
+  }
+  if (wanted->path != NULL && wanted->count == 0) {
+    return supine_options_usage(name, "-o shows the way to a --state: name one");
+  }
+  for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
+    result = supine_options_check_output(name, wanted->path, wanted->state[i].path);
+    if (result != SUPINE_EXIT_OK) {
+      return result;
+    }
+  }
+  if (supine_command_subject_open(path, &s, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else if (s.basis == NULL && wanted->count > 0) {
+    result =
+        supine_options_usage(name, "%s is a law without a surface: make a basis of it first", path);
+  } else {
+    result = set_states(wanted, &s);
+  }
+  if (result == SUPINE_EXIT_OK && s.basis == NULL &&
+      !supine_command_law_says(&s, s.state[0].gravity)) {
+    result =
+        supine_options_usage(name, "%s alone knows its own posture only: make a basis of it", path);
+  }
+  if (result == SUPINE_EXIT_OK) {
+    if (validate(wanted, &s, &error) != SUPINE_OK) {
+      result = supine_options_fail(name, &error);
+    } else {
+      (wanted->json ? print_json : print_text)(&s);
+      result = supine_options_finish(name);
+    }
+  }
+  supine_command_subject_free(&s);
+  return result;
+}
+
+const supine_command supine_command_validate = {
+    name,
+    "how far a prediction is from another scan",
+    .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
+             "BASIS|PATIENT.json --landmarks PAIRS.csv [OPTIONS]",
+    .about = "Compares a basis, or a patient's law, with other states of the same person: "
+             "distances between the surfaces and of landmarks, and how much of the motion is "
+             "explained, beside what no motion, a translation, a similarity and an affine map "
+             "leave; and, of several states, how linear displacement is with volume.",
+    .options = table,
+    .notes = "Examples:\n"
+             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+             "      --state supine:full:full.ply --landmarks pairs.csv\n"
+             "  supine validate patient.json --landmarks pairs.csv",
+    .operands_least = 1,
+    .operands_most = 1,
+    .operands_missing = "name one basis file, or one patient.json",
+    .request_size = sizeof(request),
+    .run = run};

@@ -1,0 +1,430 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Predictions and the states that they are of. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/validation.h"
+
+#include "precompute/inside/biharmonic.h"
+#include "precompute/inside/surface.h"
+#include "program/options/basis_input.h"
+#include "sh/base/parallel.h"
+#include "sh/base/text.h"
+
+enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24, GRAIN = 64 };
+
+static const double search_span = 0.5; /* of a full breath, on either side */
+static const double golden = 0.6180339887498949;
+static const double same_posture = 1e-9;
+
+void supine_command_subject_free(supine_command_subject *subject) {
+  supine_basis_close(subject->basis);
+  supine_mesh_free(&subject->rest);
+  for (size_t i = 0; i < SUPINE_COMMAND_STATES_MAX; ++i) {
+    free(subject->outcome[i].predicted);
+    free(subject->outcome[i].nearest);
+  }
+}
+
+supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
+                                          supine_error *error) {
+  supine_command_subject *s = subject;
+  if (supine_text_ends_in(path, ".json")) {
+    s->has_patient = true;
+    return supine_patient_read(path, &s->record, error);
+  }
+  supine_status status = supine_basis_open(path, &s->basis, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const char *law = supine_basis_metadata(s->basis, "patient_law");
+  if (law != NULL) {
+    s->has_patient = true;
+    status = supine_patient_parse(path, law, &s->record, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_rest_mesh(s->basis, &s->rest);
+    if (status != SUPINE_OK) {
+      (void)supine_error_set(error, status, "%s: no memory for its surface", path);
+    }
+  }
+  return status;
+}
+
+static bool same_direction(const double a[3], const double b[3]) {
+  double off = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    off = fmax(off, fabs(a[k] - b[k]));
+  }
+  return off < same_posture;
+}
+
+bool supine_command_law_says(const supine_command_subject *subject, const double gravity[3]) {
+  return subject->has_patient && same_direction(gravity, subject->record.state.gravity);
+}
+
+/* The surface at weights and one scale for all lungs, [N, 3]. */
+static supine_status deform(const supine_basis *basis, const double *weights, double scale,
+                            double *positions, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double scales[SUPINE_LUNGS_MAX];
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  if (xyz == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                            info->vertex_count);
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    scales[lung] = scale;
+  }
+  supine_deform(basis, weights, scales, xyz);
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+    positions[i] = (double)xyz[i];
+  }
+  free(xyz);
+  return SUPINE_OK;
+}
+
+/* Gravity and volume of the scan itself, where it is not the file's surface. */
+static supine_status take_scan(supine_command_subject *s, supine_error *error) {
+  const double volume = supine_basis_get_info(s->basis)->scan_volume;
+  const char *text = supine_basis_metadata(s->basis, "scan_gravity");
+  double *g = s->from.gravity;
+  if (volume == 0.0) {
+    s->from.has_scale = true; /* 0: the file's surface, in any posture */
+    g[1] = 1.0;
+    return SUPINE_OK;
+  }
+  if (text == NULL || sscanf(text, "%lf,%lf,%lf", &g[0], &g[1], &g[2]) != 3) { /* NOLINT */
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis was scanned %g mL from full inflation, but does not say in "
+                            "which posture: name it, as --from supine:rest",
+                            volume);
+  }
+  s->from.has_volume = true;
+  s->from.volume = (supine_volume){SUPINE_VOLUME_SCAN, 0.0};
+  return SUPINE_OK;
+}
+
+supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error) {
+  supine_command_subject *s = subject;
+  double weights[SUPINE_MODES_MAX];
+  supine_status status = SUPINE_OK;
+  if (s->basis == NULL) {
+    return SUPINE_OK;
+  }
+  if (s->from.posture[0] == '\0') {
+    status = take_scan(s, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_basis_weights(s->basis, s->from.gravity, weights);
+  }
+  /* Where no rest is known, a posture alone is the file's surface in it. */
+  if (status == SUPINE_OK && !s->from.has_scale &&
+      (s->from.has_volume || supine_basis_get_info(s->basis)->resting_volume != NULL)) {
+    const supine_volume volume =
+        s->from.has_volume ? s->from.volume : supine_options_volume_default(s->basis);
+    s->from_millilitres = supine_options_volume_of(s->basis, &volume, s->from.gravity);
+    status = supine_basis_scale(s->basis, weights, s->from_millilitres, &s->from_scale, error);
+  }
+  return status != SUPINE_OK || s->from_scale == 0.0
+             ? status
+             : deform(s->basis, weights, s->from_scale, s->rest.vertices, error);
+}
+
+/* --- a prediction ---------------------------------------------------------------------------- */
+
+/* The breath scale: as asked, as the patient was fitted, or that of the state's volume. */
+static supine_status find_scale(const supine_command_subject *s, const supine_command_state *state,
+                                const supine_mesh *mesh, supine_command_outcome *outcome,
+                                supine_error *error) {
+  double held[SUPINE_LUNGS_MAX];
+  double beyond = 0.0; /* mL beyond the file's surface */
+  const bool measured = mesh->vertex_count > 0 && supine_basis_get_info(s->basis)->has_volume;
+  if (state->has_volume) {
+    beyond = supine_options_volume_of(s->basis, &state->volume, state->gravity);
+  } else if (measured) {
+    supine_options_volume_reference(s->basis, held);
+    beyond = 1e-3 * supine_mesh_volume(mesh);
+    for (size_t lung = 0; lung < supine_basis_get_info(s->basis)->lung_count; ++lung) {
+      beyond -= held[lung];
+    }
+  }
+  outcome->has_millilitres = state->has_volume || measured;
+  outcome->millilitres = beyond - s->from_millilitres;
+  outcome->scale = state->scale;
+  if (state->has_scale) {
+    return SUPINE_OK;
+  }
+  if (!state->has_volume && s->count == 1 && supine_command_law_says(s, state->gravity)) {
+    outcome->scale = s->record.inflation;
+    return SUPINE_OK;
+  }
+  if (!outcome->has_millilitres) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "how full is the other state? Landmarks do not tell: --volume, or "
+                            "--scale");
+  }
+  return supine_basis_scale(s->basis, outcome->weights, beyond, &outcome->scale, error);
+}
+
+static supine_status predict_surface(const supine_command_subject *s,
+                                     const supine_command_state *state, const supine_mesh *mesh,
+                                     supine_command_outcome *outcome, supine_error *error) {
+  const size_t n = s->rest.vertex_count;
+  outcome->predicted = malloc(3 * n * sizeof(double));
+  outcome->nearest = malloc(3 * n * sizeof(double));
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (outcome->predicted == NULL || outcome->nearest == NULL) {
+    return supine_error_set(error, status, "no memory for %zu vertices", n);
+  }
+  status = supine_basis_weights(s->basis, state->gravity, outcome->weights);
+  if (status == SUPINE_OK) {
+    status = find_scale(s, state, mesh, outcome, error);
+  }
+  if (status == SUPINE_OK) {
+    status = deform(s->basis, outcome->weights, outcome->scale, outcome->predicted, error);
+  }
+  for (size_t i = 0; status == SUPINE_OK && i < n; ++i) {
+    double motion[3] = {0.0, 0.0, 0.0};
+    if (supine_command_law_says(s, state->gravity)) { /* between the scans that it was fitted to */
+      supine_patient_motion(&s->record.patient, s->rest.vertices + 3 * i, motion);
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      outcome->predicted[3 * i + k] += motion[k];
+    }
+  }
+  return status;
+}
+
+/* --- the scale that would have been best ------------------------------------------------------ */
+
+typedef struct search {
+  const supine_inside_surface *tree;
+  const double *positions; /* [N, 3] */
+  size_t vertices, count;
+  double *square; /* [count] */
+} search;
+
+static void search_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const search *s = context;
+  supine_inside_place place;
+  for (size_t i = begin; i < end; ++i) {
+    const double *at = s->positions + 3 * (i * s->vertices / s->count);
+    place = supine_inside_surface_find(s->tree, at, i > begin ? &place : NULL);
+    s->square[i] = place.depth * place.depth;
+  }
+}
+
+/* mm RMS from predicted vertices to the surface at a scale. */
+static supine_status distance_at(const supine_command_subject *s,
+                                 const supine_command_outcome *outcome, double scale, search *look,
+                                 double *positions, double *rms, supine_error *error) {
+  const supine_status status = deform(s->basis, outcome->weights, scale, positions, error);
+  *rms = INFINITY;
+  if (status == SUPINE_OK) {
+    double sum = 0.0;
+    supine_parallel_for(look->count, GRAIN, 0, search_range, look);
+    for (size_t i = 0; i < look->count; ++i) {
+      sum += look->square[i] / (double)look->count;
+    }
+    *rms = sqrt(sum);
+  }
+  return status;
+}
+
+/* Golden section about the scale that was predicted. */
+static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
+                               supine_command_outcome *outcome, supine_error *error) {
+  const size_t n = s->rest.vertex_count;
+  double *positions = malloc(3 * n * sizeof *positions);
+  search look = {
+      .positions = positions, .vertices = n, .count = n < SEARCHED_MAX ? n : SEARCHED_MAX};
+  look.square = malloc(look.count * sizeof(double));
+  supine_inside_surface *tree = NULL;
+  supine_status status =
+      positions == NULL || look.square == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
+          : supine_inside_surface_create(mesh->vertices, mesh->triangle_count, mesh->triangles,
+                                         &tree, error);
+  const double span = search_span * fmax(1.0, fabs(outcome->scale));
+  double low = outcome->scale - span;
+  double high = outcome->scale + span;
+  look.tree = tree;
+  for (int i = 0; i < SEARCH_STEPS && status == SUPINE_OK; ++i) {
+    const double a = high - golden * (high - low);
+    const double b = low + golden * (high - low);
+    double left[2] = {0};
+    status = distance_at(s, outcome, a, &look, positions, &left[0], error);
+    if (status == SUPINE_OK) {
+      status = distance_at(s, outcome, b, &look, positions, &left[1], error);
+    }
+    *(left[0] < left[1] ? &high : &low) = left[0] < left[1] ? b : a;
+  }
+  if (status == SUPINE_OK) {
+    outcome->best_scale = 0.5 * (low + high);
+    outcome->has_best = true;
+    status =
+        distance_at(s, outcome, outcome->best_scale, &look, positions, &outcome->best_rms, error);
+  }
+  supine_inside_surface_destroy(tree);
+  free(positions);
+  free(look.square);
+  return status;
+}
+
+void supine_command_find_line(supine_command_subject *subject) {
+  supine_command_subject *s = subject;
+  double vv = 0.0;
+  double vs = 0.0;
+  double most = 0.0;
+  double off = 0.0;
+  s->line_count = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (size_t i = 0; i < s->count; ++i) {
+      const supine_command_outcome *of = &s->outcome[i];
+      if (!of->has_best || !of->has_millilitres ||
+          !same_direction(s->state[i].gravity, s->state[0].gravity)) {
+        continue;
+      }
+      const double scale = of->best_scale - s->from_scale;
+      if (pass == 0) {
+        vv += of->millilitres * of->millilitres;
+        vs += of->millilitres * scale;
+        most = fmax(most, fabs(scale));
+        ++s->line_count;
+      } else {
+        off = fmax(off, fabs(scale - s->line_slope * of->millilitres));
+      }
+    }
+    s->line_slope = vv > 0.0 ? vs / vv : 0.0;
+  }
+  s->line_off = most > 0.0 ? off / most : 0.0;
+}
+
+/* --- points ---------------------------------------------------------------------------------- */
+
+/* Where points inside go: by the patient's law itself, with the motion between the scans that was
+ * found with it, else by the biharmonic interpolation of the surface's displacement. */
+static supine_status predict_points(const supine_command_subject *s, size_t which,
+                                    const supine_patient_pairs *pairs, double *predicted,
+                                    supine_error *error) {
+  enum { CENTRES = 1500 };
+  const supine_command_outcome *outcome = &s->outcome[which];
+  const size_t n = s->rest.vertex_count;
+  supine_inside_biharmonic fit = {0};
+  if (supine_command_law_says(s, s->state[which].gravity) &&
+      !supine_patient_is_uneven(&s->record)) {
+    const double times = s->basis == NULL ? 1.0 : outcome->scale * s->record.inflation;
+    for (size_t i = 0; i < pairs->count; ++i) {
+      double u[3];
+      double motion[3];
+      supine_patient_displacement(&s->record.patient, pairs->from + 3 * i, u);
+      supine_patient_motion(&s->record.patient, pairs->from + 3 * i, motion);
+      for (size_t k = 0; k < 3; ++k) {
+        predicted[3 * i + k] = pairs->from[3 * i + k] + times * u[k] + motion[k];
+      }
+    }
+    return SUPINE_OK;
+  }
+  double *displacement = malloc(3 * n * sizeof *displacement);
+  supine_status status = displacement == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                                                 "no memory for %zu vertices", n)
+                                              : SUPINE_OK;
+  for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
+    displacement[i] = outcome->predicted[i] - s->rest.vertices[i];
+  }
+  if (status == SUPINE_OK) {
+    status =
+        supine_inside_biharmonic_fit(n, s->rest.vertices, 3, displacement, CENTRES, &fit, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted, error);
+  }
+  for (size_t i = 0; i < 3 * pairs->count && status == SUPINE_OK; ++i) {
+    predicted[i] += pairs->from[i];
+  }
+  supine_inside_biharmonic_free(&fit);
+  free(displacement);
+  return status;
+}
+
+static supine_status check_points(const supine_command_subject *s,
+                                  const supine_patient_pairs *pairs, supine_error *error) {
+  double low[3];
+  double high[3];
+  size_t outside = 0;
+  if (s->basis == NULL) {
+    return SUPINE_OK;
+  }
+  supine_mesh_box(&s->rest, low, high);
+  for (size_t i = 0; i < pairs->count; ++i) {
+    const double *p = pairs->from + 3 * i;
+    outside += p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] ||
+               p[2] < low[2] || p[2] > high[2];
+  }
+  return 2 * outside <= pairs->count
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%zu of %zu landmarks lie outside of the basis's box: another "
+                                "frame, unit or person; or --reverse",
+                                outside, pairs->count);
+}
+
+static supine_status validate_points(supine_command_subject *s, size_t which, const char *path,
+                                     bool reverse, supine_error *error) {
+  supine_patient_pairs pairs = {0};
+  double *predicted = NULL;
+  supine_status status = supine_patient_pairs_load(path, reverse, &pairs, error);
+  if (status == SUPINE_OK) {
+    status = supine_patient_pairs_check(&pairs, s->has_patient, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_points(s, &pairs, error);
+  }
+  if (status == SUPINE_OK) {
+    predicted = malloc(3 * pairs.count * sizeof *predicted);
+    status = predicted == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                                  "no memory for %zu landmarks", pairs.count)
+                               : predict_points(s, which, &pairs, predicted, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_patient_validate_points(&pairs, predicted, s->outcome[which].points, error);
+    s->outcome[which].has_points = true;
+  }
+  free(predicted);
+  supine_patient_pairs_free(&pairs);
+  return status;
+}
+
+supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
+                                            const supine_mesh_load_options *load,
+                                            const char *landmarks, bool reverse,
+                                            supine_error *error) {
+  supine_command_subject *s = subject;
+  const supine_command_state *state = &s->state[i];
+  supine_command_outcome *outcome = &s->outcome[i];
+  supine_mesh mesh = {0};
+  supine_status status = SUPINE_OK;
+  if (state->path != NULL) {
+    status = supine_mesh_load(state->path, load, &mesh, NULL, error);
+  }
+  if (status == SUPINE_OK && s->basis != NULL) {
+    status = predict_surface(s, state, &mesh, outcome, error);
+  }
+  if (status == SUPINE_OK && state->path != NULL) {
+    status = supine_patient_validate_surface(&s->rest, outcome->predicted, &mesh, outcome->nearest,
+                                             outcome->surface, error);
+    outcome->has_surface = true;
+  }
+  if (status == SUPINE_OK && state->path != NULL && s->count > 1) {
+    status = find_best(s, &mesh, outcome, error);
+  }
+  if (status == SUPINE_OK && landmarks != NULL) {
+    status = validate_points(s, i, landmarks, reverse, error);
+  }
+  supine_mesh_free(&mesh);
+  return status;
+}

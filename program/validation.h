@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What 'supine validate' works on: a basis or a patient's law, the state that motion starts from,
+ * and the states that it is to lead to. */
+#ifndef SUPINE_COMMAND_VALIDATION_H
+#define SUPINE_COMMAND_VALIDATION_H
+
+#include "precompute/patient/patient_file.h"
+#include "precompute/patient/validate.h"
+#include "program/options/orientation.h"
+#include "program/options/volume.h"
+
+enum { SUPINE_COMMAND_STATES_MAX = 8 };
+
+/* A state as the command line names it. */
+typedef struct supine_command_state {
+  const char *path;                      /* its surface; NULL: landmarks alone */
+  char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not said */
+  double gravity[3];
+  bool has_volume, has_scale;
+  supine_volume volume;
+  double scale; /* of the file's surface; negative below full inflation */
+} supine_command_state;
+
+/* What came of one. */
+typedef struct supine_command_outcome {
+  double weights[SUPINE_MODES_MAX];
+  double scale;
+  bool has_millilitres;
+  double millilitres; /* from the state that motion starts from */
+  double *predicted;  /* [N, 3] */
+  double *nearest;    /* [N, 3] of the state's surface */
+  bool has_surface, has_points, has_best;
+  supine_patient_distance surface[SUPINE_PATIENT_MAP_COUNT];
+  supine_patient_distance points[SUPINE_PATIENT_MAP_COUNT];
+  double best_scale; /* that comes nearest to the surface */
+  double best_rms;   /* mm, of vertices to it */
+} supine_command_outcome;
+
+typedef struct supine_command_subject {
+  supine_basis *basis; /* NULL: a patient's law alone */
+  bool has_patient;
+  supine_patient_record record;
+  supine_command_state from;
+  double from_scale, from_millilitres; /* of the file's surface, beyond it */
+  supine_mesh rest;                    /* where motion starts from */
+  size_t count;
+  supine_command_state state[SUPINE_COMMAND_STATES_MAX];
+  supine_command_outcome outcome[SUPINE_COMMAND_STATES_MAX];
+  size_t line_count; /* states in the posture of the first: the line through rest */
+  double line_slope; /* breath scale for a millilitre */
+  double line_off;   /* largest departure, of the largest scale */
+} supine_command_subject;
+
+void supine_command_subject_free(supine_command_subject *subject);
+
+/* Opens a basis, or a patient.json by its ending.
+ * @retval those of the readers */
+supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
+                                          supine_error *error);
+
+/* Sets the surface that motion starts from: the scan's own state where `from` names no posture.
+ * @retval those of the run-time library */
+supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error);
+
+/* Whether the patient's own law says where points inside go: in the state that it was fitted to. */
+bool supine_command_law_says(const supine_command_subject *subject, const double gravity[3]);
+
+/* Predicts state i, and compares it with its surface and with landmarks (NULL: none).
+ * @param reverse  of the landmarks
+ * @retval those of loading and comparing */
+supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
+                                            const supine_mesh_load_options *load,
+                                            const char *landmarks, bool reverse,
+                                            supine_error *error);
+
+/* The line of best scales over volumes. */
+void supine_command_find_line(supine_command_subject *subject);
+
+/* Draws where the errors sit, a panel a state.
+ * @retval SUPINE_ERROR_UNSUPPORTED, SUPINE_ERROR_WRITE, ... of rendering */
+supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
+                                         supine_error *error);
+
+#endif

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A picture of where the error of a prediction sits. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/validation.h"
+
+#include "program/render/render.h"
+#include "sh/base/output.h"
+
+/* mm at the end of the colours: what is less is not worth a colour. */
+static const double end_least = 1.0;
+
+/* How far each vertex is predicted from the state's surface, mm; the largest, and what 95 % of the
+ * vertices do not exceed in most of the states. */
+static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
+                        float *value, double *largest, double *end) {
+  for (size_t i = 0; i < s->rest.vertex_count; ++i) {
+    const double *at = outcome->predicted + 3 * i;
+    const double *to = outcome->nearest + 3 * i;
+    const double off =
+        sqrt(pow(at[0] - to[0], 2.0) + pow(at[1] - to[1], 2.0) + pow(at[2] - to[2], 2.0));
+    value[i] = (float)off;
+    *largest = fmax(*largest, off);
+  }
+  *end = fmax(*end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
+}
+
+static supine_status write_picture(supine_renderer *renderer, const supine_picture *picture,
+                                   const char *path, supine_error *error) {
+  supine_output output = {0};
+  supine_status status = supine_output_open(path, &output, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  status = supine_render_picture_write(renderer, picture, output.file, error);
+  if (status == SUPINE_OK) {
+    return supine_output_commit(&output, error);
+  }
+  if (ferror(output.file) != 0) { /* why a write failed, the output knows */
+    (void)supine_output_commit(&output, error);
+  }
+  supine_output_abandon(&output);
+  return status;
+}
+
+supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
+                                         supine_error *error) {
+  static const supine_view views[2] = {SUPINE_VIEW_ANTERIOR, SUPINE_VIEW_POSTERIOR};
+  const supine_command_subject *s = subject;
+  const size_t n = s->rest.vertex_count;
+  supine_panel panel[SUPINE_COMMAND_STATES_MAX] = {{0}};
+  double scales[SUPINE_COMMAND_STATES_MAX][SUPINE_LUNGS_MAX];
+  char subtitle[SUPINE_COMMAND_STATES_MAX][96];
+  supine_renderer *renderer = NULL;
+  double largest = 0.0;
+  double end = end_least;
+  size_t count = 0;
+  float *values = malloc(SUPINE_COMMAND_STATES_MAX * n * sizeof *values);
+  if (values == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  for (size_t i = 0; i < s->count; ++i) {
+    const supine_command_outcome *outcome = &s->outcome[i];
+    if (!outcome->has_surface) {
+      continue;
+    }
+    find_values(s, outcome, values + count * n, &largest, &end);
+    for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+      scales[count][lung] = outcome->scale;
+    }
+    const supine_patient_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
+    const int used = outcome->has_millilitres ? snprintf(subtitle[count], sizeof subtitle[count],
+                                                         "%+.0f mL, ", outcome->millilitres)
+                                              : 0;
+    (void)snprintf(subtitle[count] + used, sizeof subtitle[count] - (size_t)used,
+                   "RMS %.1f, Hausdorff %.1f mm", off->rms, off->largest);
+    panel[count] = (supine_panel){.title = s->state[i].posture[0] != '\0' ? s->state[i].posture
+                                                                          : s->state[i].path,
+                                  .subtitle = subtitle[count],
+                                  .weights = outcome->weights,
+                                  .scales = scales[count],
+                                  .value = values + count * n};
+    memcpy(panel[count].gravity, s->state[i].gravity, sizeof panel[count].gravity);
+    ++count;
+  }
+  supine_picture picture = {.panel = panel,
+                            .panel_count = count,
+                            .view = views,
+                            .view_count = 2,
+                            .bar_label = "distance of the prediction from the scan, mm",
+                            .colours = SUPINE_COLOURS_DIFFERENCE,
+                            .largest = supine_render_bar_end(end),
+                            .width = 20 + 440 * count,
+                            .height = 120 + 480 * 2};
+  picture.beyond = largest > picture.largest;
+  supine_status status = supine_render_create(s->basis, &renderer, error);
+  if (status == SUPINE_OK) {
+    status = write_picture(renderer, &picture, path, error);
+  }
+  supine_render_destroy(renderer);
+  free(values);
+  return status;
+}

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/* Files and memory of Windows. */
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+
+#include <malloc.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "runtime/safetensors/platform.h"
+
+/* The path in the system's own letters, to be freed; NULL: no UTF-8, or no memory. */
+static wchar_t *widen(const char *path) {
+  const int length = MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, NULL, 0);
+  wchar_t *wide = length > 0 ? malloc((size_t)length * sizeof *wide) : NULL;
+  if (wide != NULL) {
+    (void)MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, wide, length);
+  }
+  return wide;
+}
+
+/* The mapping lives on when its handles are closed. */
+static const void *map_handle(HANDLE handle) {
+  HANDLE mapping = CreateFileMappingW(handle, NULL, PAGE_READONLY, 0, 0, NULL);
+  const void *bytes = mapping != NULL ? MapViewOfFile(mapping, FILE_MAP_READ, 0, 0, 0) : NULL;
+  if (mapping != NULL) {
+    (void)CloseHandle(mapping);
+  }
+  return bytes;
+}
+
+supine_status supine_platform_map(const char *path, supine_platform_file *file,
+                                  supine_error *error) {
+  supine_status status = SUPINE_OK;
+  LARGE_INTEGER size = {.QuadPart = 0};
+  wchar_t *wide = widen(path);
+  *file = (supine_platform_file){NULL, 0};
+  HANDLE handle = wide == NULL ? INVALID_HANDLE_VALUE
+                               : CreateFileW(wide, GENERIC_READ, FILE_SHARE_READ, NULL,
+                                             OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, NULL);
+  free(wide);
+  if (handle == INVALID_HANDLE_VALUE || !GetFileSizeEx(handle, &size) ||
+      GetFileType(handle) != FILE_TYPE_DISK) {
+    status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: Windows error %lu", path,
+                              (unsigned long)GetLastError());
+  } else if (size.QuadPart > 0) { /* else there is nothing to map */
+    file->bytes = (uint64_t)size.QuadPart <= SIZE_MAX ? map_handle(handle) : NULL;
+    file->size = (size_t)size.QuadPart;
+    if (file->bytes == NULL) {
+      file->size = 0;
+      status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map: Windows error %lu", path,
+                                (unsigned long)GetLastError());
+    }
+  }
+  if (handle != INVALID_HANDLE_VALUE) {
+    (void)CloseHandle(handle);
+  }
+  return status;
+}
+
+void supine_platform_unmap(const supine_platform_file *file) {
+  if (file->bytes != NULL) {
+    (void)UnmapViewOfFile(file->bytes);
+  }
+}
+
+void *supine_platform_allocate(size_t bytes) {
+  enum { LINE = 64 };
+  return _aligned_malloc(bytes > 0 ? bytes : 1, LINE);
+}
+
+void supine_platform_free(void *memory) {
+  _aligned_free(memory);
+}

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* Words as users type them. */
+#include <string.h>
+
+#include "runtime/words.h"
+
+int supine_words_lower(char c) {
+  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+}
+
+size_t supine_words_distance(const char *text, const char *word) {
+  const size_t whole = strlen(word);
+  const size_t length = whole < SUPINE_WORD_MAX ? whole : SUPINE_WORD_MAX;
+  size_t row[SUPINE_WORD_MAX + 1];
+  for (size_t j = 0; j <= length; ++j) {
+    row[j] = j;
+  }
+  for (const char *c = text; *c != '\0'; ++c) { /* row by row over the text */
+    size_t diagonal = row[0]++;
+    for (size_t j = 1; j <= length; ++j) {
+      const int differ = supine_words_lower(*c) != supine_words_lower(word[j - 1]);
+      const size_t replaced = diagonal + (differ ? 1 : 0);
+      const size_t shifted = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
+      diagonal = row[j];
+      row[j] = replaced < shifted ? replaced : shifted;
+    }
+  }
+  return row[length];
+}
