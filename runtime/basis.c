@@ -352,7 +352,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;
-  if (choose) { /* the smallest first */
+  if (choose || storage == SUPINE_STORAGE_MIXED) { /* the smallest first */
     const bool thirds = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
     storage = thirds ? SUPINE_STORAGE_MIXED : SUPINE_STORAGE_INT16;
   }

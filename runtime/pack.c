@@ -105,15 +105,14 @@ static double fixed_unit(float top) {
 /* Bits of a coefficient of mode k that shares a word (compact.h); 0 where it shares none. */
 static int word_bits(const supine_tiles *tiles, size_t k) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
-  if (tiles->storage != SUPINE_STORAGE_INT16 && tiles->storage != SUPINE_STORAGE_MIXED) {
+  if (!supine_tiles_compact(tiles->storage)) {
     return 0;
   }
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
 static void choose_units(supine_basis *basis, units *u) {
-  const supine_storage storage = basis->tiles.storage;
-  const bool compact = supine_tiles_compact(storage);
+  const bool compact = supine_tiles_compact(basis->tiles.storage);
   u->rest = compact ? fixed_unit(largest(basis->info.vertices, 3 * basis->info.vertex_count)) : 1;
   u->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1; /* of length 1 */
   basis->tiles.rest_unit = (uint32_t)ilogb(u->rest) << FLOAT_FRACTION_BITS;
@@ -124,8 +123,6 @@ static void choose_units(supine_basis *basis, units *u) {
     u->mode[k] = 1;
     if (flush(top[k]) > 0 && bits > 0) { /* the largest fills the upper bits of a word */
       u->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
-    } else if (flush(top[k]) > 0 && storage == SUPINE_STORAGE_FLOAT16) {
-      u->mode[k] = ldexp(1, ilogbf(top[k]) - 14); /* the largest below 2^15 */
     }
     basis->mode_scale[k] = u->mode[k] * u->direction;
   }
@@ -174,32 +171,13 @@ static void pack_words(const supine_tiles *tiles, const units *u, float *rows, u
   }
 }
 
-static void pack_halves(const supine_tiles *tiles, const units *u, float *rows, unsigned char *at) {
-  for (size_t k = 0; k < tiles->modes; ++k) {
-    float *row = rows + k * TILE;
-    uint16_t half[TILE];
-    for (size_t v = 0; v < TILE; ++v) {
-      half[v] = half_narrow((float)((double)row[v] / u->mode[k]));
-      row[v] = (float)((double)half_widen(half[v]) * u->mode[k]);
-    }
-    memcpy(at + k * sizeof half, half, sizeof half);
-  }
-}
-
 /* Packs rows of 16 coefficients of one axis; leaves in `rows` what they now stand for. */
 static void pack_coefficients(const supine_tiles *tiles, const units *u, float *rows,
                               unsigned char *at) {
-  switch (tiles->storage) {
-  case SUPINE_STORAGE_INT16:
-  case SUPINE_STORAGE_MIXED:
+  if (supine_tiles_compact(tiles->storage)) {
     pack_words(tiles, u, rows, at);
-    break;
-  case SUPINE_STORAGE_FLOAT16:
-    pack_halves(tiles, u, rows, at);
-    break;
-  default:
+  } else {
     memcpy(at, rows, tiles->modes * TILE * sizeof *rows);
-    break;
   }
 }
 

@@ -190,10 +190,9 @@ static void test_deform_real_lung_every_path_within_stated_error(void **state) {
     }
   }
   const supine_basis_info *chosen = supine_basis_get_info(bases[0][0]);
-  print_message("at about 500 mL, mm: exact %.6f float32 %.6f float16 %.6f int16 %.6f; chosen %d, "
-                "stated %.6f\n",
-                worst[1], worst[2], worst[3], worst[4], (int)chosen->storage,
-                chosen->storage_error);
+  print_message("at about 500 mL, mm: exact %.6f int16 %.6f mixed %.6f; chosen %d, stated %.6f\n",
+                worst[SUPINE_STORAGE_EXACT], worst[SUPINE_STORAGE_INT16],
+                worst[SUPINE_STORAGE_MIXED], (int)chosen->storage, chosen->storage_error);
   assert_int_equal(chosen->storage, SUPINE_STORAGE_INT16);
   assert_true(worst[0] <= 0.005);
   assert_true(chosen->storage_error <= 0.005);

@@ -24,8 +24,7 @@ enum {
 };
 
 const char *supine_bench_storage_name(supine_storage storage) {
-  static const char *const names[SUPINE_STORAGE_COUNT] = {"auto",    "exact", "float32",
-                                                          "float16", "int16", "mixed"};
+  static const char *const names[SUPINE_STORAGE_COUNT] = {"auto", "exact", "int16", "mixed"};
   return storage < SUPINE_STORAGE_COUNT ? names[storage] : "";
 }
 

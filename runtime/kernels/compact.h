@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Numbers in fewer bits: halves; two or three numbers in a word of 32 bits; three in two words.
+ * Numbers in fewer bits: two or three numbers in a word of 32 bits; three in two words.
  * Plain C, one at a time.
  *
  * A number that shares a word stands in its upper bits and is read as the whole word, a signed
@@ -24,23 +24,6 @@ static inline float bits_float(uint32_t bits) {
   float value = 0;
   memcpy(&value, &bits, sizeof value);
   return value;
-}
-
-/** A half's value; never infinite or NaN, as none is stored. */
-static inline float half_widen(uint16_t half) {
-  const uint32_t bits = ((uint32_t)(half & 0x8000U) << 16) | ((uint32_t)(half & 0x7FFFU) << 13);
-  return bits_float(bits) * 0x1p112F; /* the exponents' offsets differ by 127 - 15 */
-}
-
-/** The nearest half, ties to even; |value| must be below 65504. */
-static inline uint16_t half_narrow(float value) {
-  const uint32_t sign = (float_bits(value) >> 16) & 0x8000U;
-  const float size = bits_float(float_bits(value) & 0x7FFFFFFFU);
-  if (size < 0x1p-14F) { /* a subnormal half: a multiple of 2^-24; adding rounds it */
-    return (uint16_t)(sign | (float_bits(size + 0.5F) - float_bits(0.5F)));
-  }
-  const uint32_t bits = float_bits(size) - (112U << 23);
-  return (uint16_t)(sign | ((bits + 0xFFFU + ((bits >> 13) & 1U)) >> 13));
 }
 
 /** The integer that `word` stands for. */

@@ -20,12 +20,6 @@ static void deform(const supine_tiles *tiles, const float *weights, size_t first
   case SUPINE_STORAGE_EXACT:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_EXACT);
     break;
-  case SUPINE_STORAGE_FLOAT32:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT32);
-    break;
-  case SUPINE_STORAGE_FLOAT16:
-    deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_FLOAT16);
-    break;
   case SUPINE_STORAGE_MIXED:
     deform_storage(tiles, weights, first, count, target, SUPINE_STORAGE_MIXED);
     break;
@@ -63,11 +57,8 @@ static void widen_axis(const supine_tiles *tiles, const unsigned char *from, flo
   case SUPINE_STORAGE_MIXED:
     widen_coefficients(from, tiles->modes, SUPINE_STORAGE_MIXED, to);
     break;
-  case SUPINE_STORAGE_FLOAT16:
-    widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT16, to);
-    break;
   default:
-    widen_coefficients(from, tiles->modes, SUPINE_STORAGE_FLOAT32, to);
+    widen_coefficients(from, tiles->modes, SUPINE_STORAGE_EXACT, to);
     break;
   }
 }

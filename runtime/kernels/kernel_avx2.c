@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Evaluating tiles with AVX2, FMA and F16C: two registers for the 16 vertices. */
+/* Evaluating tiles with AVX2 and FMA: two registers for the 16 vertices. */
 #include "runtime/kernels/tiles.h"
 
-#if defined(__AVX2__) && defined(__FMA__) && defined(__F16C__)
+#if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
 
 #define INLINE static inline __attribute__((always_inline))
@@ -10,16 +10,12 @@
 /* Coefficient 2 pair, or the one after it, of vertices 8 half to 8 half + 7. */
 INLINE __m256 coefficient(const unsigned char *at, size_t pair, bool second, size_t half,
                           supine_storage storage) {
-  const size_t k = 2 * pair + second;
-  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+  if (supine_tiles_compact(storage)) {
     /* compact.h: pair_first, pair_second */
     const __m256i words = _mm256_load_si256((const __m256i *)(at + 64 * pair + 32 * half));
     return _mm256_cvtepi32_ps(second ? words : _mm256_slli_epi32(words, 16));
   }
-  if (storage == SUPINE_STORAGE_FLOAT16) {
-    return _mm256_cvtph_ps(_mm_load_si128((const __m128i *)(at + 32 * k + 16 * half)));
-  }
-  return _mm256_load_ps((const float *)(const void *)(at + 64 * k + 32 * half));
+  return _mm256_load_ps((const float *)(const void *)(at + 64 * (2 * pair + second) + 32 * half));
 }
 
 /* The coefficient of one of the three last modes whose words are `at` (compact.h). */

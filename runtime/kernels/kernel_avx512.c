@@ -28,16 +28,12 @@ INLINE __m512 weight(const weights16 *w, size_t k, bool common) {
 /* Coefficient 2 pair, or the one after it, of 16 vertices. */
 INLINE __m512 coefficient(const unsigned char *at, size_t pair, bool second,
                           supine_storage storage) {
-  const size_t k = 2 * pair + second;
-  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+  if (supine_tiles_compact(storage)) {
     /* compact.h: pair_first, pair_second */
     const __m512i words = _mm512_load_si512(at + 64 * pair);
     return _mm512_cvtepi32_ps(second ? words : _mm512_slli_epi32(words, 16));
   }
-  if (storage == SUPINE_STORAGE_FLOAT16) {
-    return _mm512_cvtph_ps(_mm256_load_si256((const __m256i *)(at + 32 * k)));
-  }
-  return _mm512_load_ps(at + 64 * k);
+  return _mm512_load_ps(at + 64 * (2 * pair + second));
 }
 
 /* The coefficient of one of the three last modes whose words are `at` (compact.h). */

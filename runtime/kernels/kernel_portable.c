@@ -7,7 +7,7 @@
 static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at, size_t k,
                               float *restrict c) {
   const supine_storage storage = tiles->storage;
-  if (storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_MIXED) {
+  if (supine_tiles_compact(storage)) {
     const size_t paired = supine_tiles_paired(storage, tiles->modes);
     uint32_t words[TILE];
     memcpy(words, at + supine_tiles_words_begin(paired, k), sizeof words);
@@ -19,12 +19,6 @@ static inline void widen_mode(const supine_tiles *tiles, const unsigned char *at
       for (size_t v = 0; v < TILE; ++v) {
         c[v] = k % 2 == 0 ? pair_first(words[v]) : pair_second(words[v]);
       }
-    }
-  } else if (storage == SUPINE_STORAGE_FLOAT16) {
-    uint16_t half[TILE];
-    memcpy(half, at + k * sizeof half, sizeof half);
-    for (size_t v = 0; v < TILE; ++v) {
-      c[v] = half_widen(half[v]);
     }
   } else {
     memcpy(c, at + k * TILE * sizeof *c, TILE * sizeof *c);

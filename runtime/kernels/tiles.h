@@ -3,8 +3,7 @@
  * A basis as the evaluator reads it: tiles of 16 vertices, each one run of whole cache lines.
  *
  *     coefficients   for each axis (1, or 3 where the kind is vector)
- *                      FLOAT32, EXACT   16 floats a mode
- *                      FLOAT16          16 halves a mode
+ *                      EXACT            16 floats a mode
  *                      INT16            16 words of 32 bits for two modes, see compact.h
  *                      MIXED            the same, but 16 words for three of the last modes
  *     direction      48 numbers x y z x y z ...; none where the kind is vector
@@ -38,7 +37,8 @@ typedef struct supine_tiles {
   unsigned char *bytes;
 } supine_tiles;
 
-/** Does the storage keep directions and rest positions compact? */
+/** Does the storage share words: two or three coefficients a word, directions and rest positions
+ * compact? */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
@@ -63,8 +63,6 @@ static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
-  const bool short_words = storage == SUPINE_STORAGE_INT16 || storage == SUPINE_STORAGE_FLOAT16 ||
-                           storage == SUPINE_STORAGE_MIXED;
   const size_t thirds = supine_tiles_thirds(storage, modes);
   const size_t paired = supine_tiles_paired(storage, modes);
   const size_t line = 64;
@@ -72,7 +70,7 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->storage = storage;
   tiles->modes = modes;
   tiles->axes = vector ? 3 : 1;
-  tiles->axis_bytes = line * (short_words ? (paired + 1) / 2 + thirds : modes);
+  tiles->axis_bytes = line * (compact ? (paired + 1) / 2 + thirds : modes);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
   tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
   tiles->stride = tiles->rest_begin + numbers;

@@ -183,7 +183,7 @@ static void print(const peers *p, size_t from) {
   const double sgemv = find(p, from, "sgemv_displace", "", 1);
   const double plain = find(p, from, "plain_loop", "", 1);
   const double native = find(p, from, "plain_native", "", 1);
-  static const char *const storages[] = {"mixed", "int16", "float16", "float32", "exact"};
+  static const char *const storages[] = {"mixed", "int16", "exact"};
   for (size_t i = 0; i < sizeof storages / sizeof *storages; ++i) {
     const double own = find(p, from, "supine", storages[i], 1);
     const double traffic = find(p, from, "traffic", storages[i], 1);

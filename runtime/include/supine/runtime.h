@@ -41,10 +41,10 @@ typedef enum supine_storage {
   SUPINE_STORAGE_AUTO = 0, /**< the smallest of MIXED, INT16 and EXACT that errs by 0.005 mm at most
                                 (see storage_error) */
   SUPINE_STORAGE_EXACT,    /**< everything as in the file */
-  SUPINE_STORAGE_FLOAT32,  /**< float32 coefficients; compact directions and rest positions */
-  SUPINE_STORAGE_FLOAT16,  /**< IEEE half-precision coefficients, scaled; the rest as above */
-  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients, a scale for each mode; the rest as above */
-  SUPINE_STORAGE_MIXED,    /**< INT16, but the last three in eight modes at 10 or 11 bits */
+  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients, a scale for each mode; compact directions and
+                                rest positions */
+  SUPINE_STORAGE_MIXED,    /**< INT16, but the last three in eight modes at 10 or 11 bits; INT16
+                                itself where there are fewer than eight modes */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
@@ -52,7 +52,7 @@ typedef enum supine_storage {
 typedef enum supine_simd {
   SUPINE_SIMD_AUTO = 0, /**< the widest that this processor has */
   SUPINE_SIMD_PORTABLE, /**< C alone */
-  SUPINE_SIMD_AVX2,     /**< AVX2, FMA and F16C */
+  SUPINE_SIMD_AVX2,     /**< AVX2 and FMA */
   SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
   SUPINE_SIMD_COUNT
 } supine_simd;

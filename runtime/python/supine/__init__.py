@@ -35,7 +35,7 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float32)
-STORAGES = ("auto", "exact", "float32", "float16", "int16", "mixed")
+STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512")
 
