@@ -109,9 +109,9 @@ static int teardown(void **state) {
 
 static void test_help_every_command_teaches(void **state) {
   (void)state;
-  static const char *const commands[] = {"phantom", "precompute", "info",    "deform", "compare",
-                                         "render",  "breathe",    "export",  "bench",  "solve",
-                                         "pv",      "fit",        "validate"};
+  static const char *const commands[] = {"phantom", "precompute", "info",    "deform",
+                                         "compare", "render",     "breathe", "export",
+                                         "solve",   "pv",         "fit",     "validate"};
   EXPECT(0, "precompute", "--help");
   EXPECT(0, "supine ", "--version");
   EXPECT(1, "Commands:", "%s", "");
@@ -400,14 +400,6 @@ static void test_solve_unit_force_writes_column(void **state) {
   EXPECT(1, "they count from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
 }
 
-static void test_bench_prints_rows(void **state) {
-  (void)state;
-  EXPECT(0, "plain_loop", "bench lungs.safetensors --vertices 1000 --repeats 1");
-  EXPECT(0, "\"ns_per_vertex\"",
-         "bench lungs.safetensors --vertices 1000 --repeats 1 --threads 1 --json");
-  EXPECT(1, "--vertices takes numbers", "bench lungs.safetensors --vertices 10,,20");
-}
-
 static int sweep_failures;
 static int sweep_files;
 
@@ -460,7 +452,6 @@ int main(void) {
       cmocka_unit_test(test_mesh_inward_lung_turned_round_and_told),
       cmocka_unit_test(test_direction_file_moves_vertices_along_it),
       cmocka_unit_test(test_solve_unit_force_writes_column),
-      cmocka_unit_test(test_bench_prints_rows),
       cmocka_unit_test(test_mesh_hostile_files_never_crash),
   };
   return cmocka_run_group_tests(tests, setup, teardown);

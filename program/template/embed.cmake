@@ -23,7 +23,7 @@ foreach(path IN LISTS FILES)
       string(REGEX REPLACE "^{{[#/^]?(.*)}}$" "\\1" tag "${tag}")
       string(FIND "${known}" "\"${tag}\"" found)
       if(found EQUAL -1 AND NOT tag STREQUAL ".")
-        message(FATAL_ERROR "${path}: nothing fills {{${tag}}}")
+        message(FATAL_ERROR "nothing fills {{${tag}}} in ${path}") # CMake wraps long messages
       endif()
     endforeach()
   endif()

@@ -16,8 +16,8 @@
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
-#include "program/bench/bench.h"
 
+#include "evaluation.h"
 #include "full_solve.h"
 
 enum { MADE_VERTICES = 40000 };

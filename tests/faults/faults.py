@@ -82,7 +82,6 @@ export lungs.safetensors -o out/a.glb --profile 8,clamp-safe --quantise --animat
 pv show patient.pv.csv
 pv fit samples.csv -o out/a.csv
 pv fit samples.csv --json
-bench lungs.safetensors --vertices 1000 --repeats 1
 stream lungs.safetensors --listen 127.0.0.1:0 --seconds 0.05 --volume rest
 """
 

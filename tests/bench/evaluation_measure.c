@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "program/bench/bench.h"
+#include "evaluation.h"
 #include "sh/base/clock.h"
 #include "sh/base/denormals.h"
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
-#include "program/bench/bench.h"
+#include "evaluation.h"
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 

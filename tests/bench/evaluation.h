@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Measuring the evaluator against the memory it reads and a plain loop. Not part of the run-time
+ * Measure the evaluator against the memory it reads and a plain loop. Not part of the run-time
  * library. */
-#ifndef SUPINE_BENCH_H
-#define SUPINE_BENCH_H
+#ifndef SUPINE_TESTS_EVALUATION_H
+#define SUPINE_TESTS_EVALUATION_H
 
 #include <stdbool.h>
 #include <stddef.h>

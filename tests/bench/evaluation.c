@@ -9,7 +9,7 @@
 #include <immintrin.h>
 #endif
 
-#include "program/bench/bench.h"
+#include "evaluation.h"
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 
