@@ -13,10 +13,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** The axes that a file's coordinates are in. */
 typedef enum supine_axes {
   SUPINE_AXES_AUTO = 0, /**< the file's SPACE tag, LPS where it has none */
@@ -195,7 +191,4 @@ void supine_mesh_series_close(supine_mesh_series *series);
 /** True where `path` has an ending that supine_mesh_save writes. */
 bool supine_mesh_save_supports(const char *path);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -4,15 +4,11 @@
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
-#include "precompute/projection/accuracy.h"
 #include "precompute/fields/fields.h"
 #include "precompute/physics/model.h"
-#include "precompute/projection/projection.h"
 #include "precompute/physics/reference.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "precompute/projection/accuracy.h"
+#include "precompute/projection/projection.h"
 
 /** How the field over orientation is found. */
 typedef enum supine_route {
@@ -65,7 +61,4 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
                                        const char *path, supine_fit_report *report,
                                        size_t *mode_count, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

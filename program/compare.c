@@ -68,8 +68,7 @@ static int tell(const supine_comparison *comparison, const request *wanted) {
   if (!wanted->json) {
     supine_report_text(comparison, stdout);
   } else if (!supine_report_json(comparison, stdout)) {
-    supine_options_say(name, "cannot print JSON: %s",
-                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    supine_options_say(name, "cannot print JSON: %s", strerror(errno));
     return SUPINE_EXIT_OUTPUT;
   }
   int result = supine_options_finish(name);

@@ -269,8 +269,7 @@ static int run(void *chosen, const supine_arguments *given) {
     goto cleanup;
   }
   if (wanted->json && !print_json(path, basis, energy)) {
-    supine_options_say(name, "cannot print JSON: %s",
-                       strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    supine_options_say(name, "cannot print JSON: %s", strerror(errno));
     result = SUPINE_EXIT_OUTPUT;
     goto cleanup;
   }

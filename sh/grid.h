@@ -8,10 +8,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** The most latitudes or longitudes of a rule. */
 #define SUPINE_SH_GRID_MAX 16384
 
@@ -65,7 +61,4 @@ void supine_sh_grid_destroy(supine_sh_grid *grid);
 /** Unit direction (j, k). */
 void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

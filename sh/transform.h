@@ -20,10 +20,6 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** A plan for one band and one grid. */
 typedef struct supine_sh_transform supine_sh_transform;
 
@@ -78,7 +74,4 @@ supine_status supine_sh_forward_ring(const supine_sh_transform *plan, const supi
 supine_status supine_sh_inverse(const supine_sh_transform *plan, const supine_sh_batch *batch,
                                 const double *coefficients, double *values, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -381,8 +381,7 @@ static size_t sweep(const char *name) {
     return 0;
   }
   size_t count = 0;
-  for (struct dirent *entry = readdir(stream); entry != NULL; /* NOLINT(concurrency-mt-unsafe) */
-       entry = readdir(stream)) {                             /* NOLINT(concurrency-mt-unsafe) */
+  for (struct dirent *entry = readdir(stream); entry != NULL; entry = readdir(stream)) {
     if (entry->d_name[0] != '.') {
       char path[640];
       (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);

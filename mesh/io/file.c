@@ -15,8 +15,7 @@ enum { HEAD_SIZE = 4096 };
 
 static supine_status cannot_read(const char *path, supine_error *error) {
   const int code = errno == 0 ? EIO : errno;
-  return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                          strerror(code)); /* NOLINT(concurrency-mt-unsafe) */
+  return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
 /* With its dot; "" where the name has none. */

@@ -11,12 +11,8 @@
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
-#include "precompute/projection/accuracy.h"
 #include "precompute/lungs/lungs.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "precompute/projection/accuracy.h"
 
 /** Displacements u of every vertex for M directions. */
 typedef struct supine_fields {
@@ -74,7 +70,4 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
                                 double *directions, supine_compression *compression,
                                 supine_fit_report *report, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -9,10 +9,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** A region of changed stiffness. With r the distance to its centre, E is multiplied by
  *
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
@@ -63,7 +59,4 @@ void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double
 void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
                                    double *directions);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

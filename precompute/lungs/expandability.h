@@ -11,10 +11,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** How expandability goes along an axis. */
 typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_UNIFORM = 0, /**< a = 1 */
@@ -68,7 +64,4 @@ supine_status supine_tissue_expandability_load_ply(const char *path, const char 
 supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,
                                                     double *stiffness, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -6,10 +6,6 @@
 
 #include "mesh/mesh.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** One or two lungs as a single surface whose vertices and triangles are grouped by lung, in the
  * order of the input within each. Where both lungs are there, the left is lung 0. */
 typedef struct supine_lungs {
@@ -53,7 +49,4 @@ const char *supine_lungs_name(const supine_lungs *lungs, size_t lung);
  * the front, Z from the apex to the base. */
 void supine_lungs_box_coordinates(const supine_lungs *lungs, size_t vertex, double box[3]);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

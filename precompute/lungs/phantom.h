@@ -6,10 +6,6 @@
 
 #include "mesh/mesh.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Fewest and most vertices of a phantom. */
 enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 };
 
@@ -19,13 +15,11 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
  * harmonics of band 12, and the pair is scaled about the origin to the volume.
  *
  * @param vertices   wanted in all; the result is the nearest pair of geodesic spheres
- * @param millilitres  volume of both lungs together, > 0; an adult at full inflation holds about 6000
+ * @param millilitres  volume of both lungs together, > 0; an adult at full inflation holds about
+ * 6000
  * @param mesh       zero-initialised; written on success
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -361,8 +361,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
   json_error_t where;
   FILE *file = fopen(path, "rb");
   if (file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
-                            strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
   }
   json_t *root = json_loadf(file, 0, &where);
   (void)fclose(file);

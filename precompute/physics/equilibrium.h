@@ -43,10 +43,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Most right-hand sides of one solve. */
 enum { SUPINE_RHS_MAX = 64 };
 
@@ -145,7 +141,4 @@ supine_status supine_physics_pitcher_catcher(
     const double *force, double tolerance, double *masses, double *springs,
     void (*progress)(void *context, size_t steps, double held), void *context, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

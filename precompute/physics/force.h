@@ -13,10 +13,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Constants of the law. */
 typedef struct supine_force_law {
   double base;
@@ -88,7 +84,4 @@ supine_status supine_physics_directions_load(const char *path, size_t count, dou
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
                                         double *directions, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -15,10 +15,6 @@
 
 #include "precompute/physics/equilibrium.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** The force f [N] under which a catch F [N] is the equilibrium.
  * @param stiffness  [N] E > 0, relative, or NULL: 1 everywhere
  * @param catch_     [N] F
@@ -45,7 +41,4 @@ supine_status supine_physics_inverse_gradient(const supine_network *network,
                                               const double *slope, double tolerance,
                                               double *gradient, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

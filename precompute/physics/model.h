@@ -7,10 +7,6 @@
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/force.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* clang-format off */
 /** Laws by name: a set of constants each.
  *
@@ -71,7 +67,4 @@ const char *supine_physics_law_name(supine_law law);
 supine_status supine_physics_model_network(const supine_lungs *lungs, const supine_model *model,
                                            supine_network **network);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

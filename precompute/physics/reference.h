@@ -18,10 +18,6 @@
 
 #include "precompute/physics/model.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** What a scan shows. */
 typedef enum supine_scan_kind {
   SUPINE_SCAN_NONE = 0, /**< unknown: the scan is the reference of every posture, and no rest is */
@@ -95,7 +91,4 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

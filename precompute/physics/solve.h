@@ -7,10 +7,6 @@
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Full physics for one orientation, no harmonics: u_i = s F_i d_i. */
 typedef struct supine_solution {
   size_t vertex_count;
@@ -36,7 +32,4 @@ double supine_physics_solution_largest(const supine_solution *solution);
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
                                    double scale, double *positions);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

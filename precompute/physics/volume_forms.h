@@ -12,10 +12,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Most functions of orientation that a basis is made with. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
@@ -58,7 +54,4 @@ supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, 
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -8,10 +8,6 @@
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Errors of displacement over all vertices and held-out directions. */
 typedef struct supine_accuracy {
   size_t direction_count;
@@ -73,7 +69,4 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
                                           const supine_volume_forms *forms,
                                           const supine_state *state, double *share);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -12,10 +12,6 @@
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** A projected scalar field. */
 typedef struct supine_projection {
   size_t vertex_count;
@@ -114,7 +110,4 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
 void supine_projection_compression_truncate(supine_compression *compression, size_t rank,
                                             size_t count);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -11,10 +11,6 @@
 
 #include <supine/breath.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** What a fit determines: the control parameters and the volumes at the two ends. */
 enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 
@@ -101,7 +97,4 @@ supine_status supine_breath_save(const char *path, const supine_pv *pv, supine_e
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
 supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

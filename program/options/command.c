@@ -67,8 +67,7 @@ int supine_options_usage(const char *command, const char *format, ...) {
 int supine_options_finish(const char *command) {
   errno = 0;
   if (ferror(stdout) != 0 || fflush(stdout) != 0) {
-    supine_options_say(command, "standard output: %s",
-                       strerror(errno == 0 ? EIO : errno)); /* NOLINT(concurrency-mt-unsafe) */
+    supine_options_say(command, "standard output: %s", strerror(errno == 0 ? EIO : errno));
     return SUPINE_EXIT_OUTPUT;
   }
   return SUPINE_EXIT_OK;

@@ -130,7 +130,7 @@ static json_t *percent(double share) {
 
 /* Today, or what SOURCE_DATE_EPOCH says, so that a report can be made again byte for byte. */
 static json_t *date(void) {
-  const char *epoch = getenv("SOURCE_DATE_EPOCH"); /* NOLINT(concurrency-mt-unsafe) */
+  const char *epoch = getenv("SOURCE_DATE_EPOCH");
   const time_t now = epoch != NULL ? (time_t)strtoll(epoch, NULL, 10) : time(NULL);
   struct tm day;
   char text[16] = "";

@@ -52,7 +52,7 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
       bind(s, (const struct sockaddr *)&address->where, address->size) != 0 || listen(s, 64) != 0 ||
       getsockname(s, (struct sockaddr *)&given, &size) != 0) {
     (void)supine_error_set(error, SUPINE_ERROR_WRITE, "the port cannot be listened on: %s",
-                           strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+                           strerror(errno));
     if (s >= 0) {
       (void)close(s);
     }

@@ -12,10 +12,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Goes on from `crc` (0 at first) over more bytes: by carry-less multiplication where the
  * processor has it, else as supine_stream_crc64_tables. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
@@ -30,7 +26,4 @@ uint64_t supine_stream_crc64_power(size_t size);
  * @param power  supine_stream_crc64_power of the second part's size */
 uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -8,10 +8,6 @@
 #ifndef SUPINE_STREAM_GRAVITY_H
 #define SUPINE_STREAM_GRAVITY_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** How the tracker is set up. */
 typedef struct supine_stream_setup {
   double down[3]; /**< where things fall, in the tracker's world; unit */
@@ -55,7 +51,4 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -7,10 +7,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 enum { SUPINE_STREAM_LATENCY_BINS = 65536 }; /**< of 1 us; later ones count in the last */
 
 typedef struct supine_stream_latency {
@@ -25,7 +21,4 @@ void supine_stream_latency_add(supine_stream_latency *latency, double seconds);
  * bin, the worst. 0 where there are none. */
 double supine_stream_latency_share(const supine_stream_latency *latency, double share);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

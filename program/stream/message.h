@@ -17,10 +17,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 enum {
   SUPINE_STREAM_HEADER = 58,
   SUPINE_STREAM_EXTENSION = 12,
@@ -90,7 +86,4 @@ void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM
 /** Floats in the byte order of the wire, negative where `flip` says so: x and y of LPS as RAS. */
 void supine_stream_put_points(size_t count, const float *xyz, int flip, unsigned char *bytes);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

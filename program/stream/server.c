@@ -345,8 +345,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     const struct timespec patience = patience_of(s, end);
     s->waited = supine_clock_seconds();
     if (ppoll(s->polled, count, &patience, NULL) < 0 && errno != EINTR) {
-      return supine_error_set(error, SUPINE_ERROR_WRITE, "poll: %s",
-                              strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+      return supine_error_set(error, SUPINE_ERROR_WRITE, "poll: %s", strerror(errno));
     }
     s->woke = supine_clock_seconds();
     if (s->woke - asked >= asked_time) {

@@ -17,16 +17,16 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   *file = (supine_platform_file){NULL, 0};
   const int descriptor = open(path, O_RDONLY | O_CLOEXEC);
   if (descriptor < 0 || fstat(descriptor, &about) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                              strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    status =
+        supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
   } else if (!S_ISREG(about.st_mode)) {
     status = supine_error_set(error, SUPINE_ERROR_READ, "%s: not a file: give a basis file's path",
                               path);
   } else if (about.st_size > 0) { /* else there is nothing to map */
     void *bytes = mmap(NULL, (size_t)about.st_size, PROT_READ, MAP_PRIVATE, descriptor, 0);
     if (bytes == MAP_FAILED) {
-      status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map: %s", path,
-                                strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+      status =
+          supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map: %s", path, strerror(errno));
     } else {
       *file = (supine_platform_file){bytes, (size_t)about.st_size};
     }

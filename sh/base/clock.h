@@ -4,14 +4,7 @@
 #ifndef SUPINE_CLOCK_H
 #define SUPINE_CLOCK_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Seconds since some moment in the past; never runs backwards. */
 double supine_clock_seconds(void);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

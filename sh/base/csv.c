@@ -31,7 +31,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
         *status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", csv->path);
       } else if (ferror(csv->file) != 0) {
         *status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", csv->path,
-                                   strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+                                   strerror(errno));
       }
       return NULL;
     }
@@ -102,8 +102,7 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
   *csv = (supine_csv){.path = path};
   csv->file = fopen(path, "rb");
   if (csv->file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
-                            strerror(errno)); /* NOLINT(concurrency-mt-unsafe) */
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
   }
   supine_status status = SUPINE_OK;
   char *text = csv_line(csv, &status, error);

@@ -4,15 +4,8 @@
 #ifndef SUPINE_DENORMALS_H
 #define SUPINE_DENORMALS_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Sets the processor to treat denormal numbers as zero; returns what to restore. */
 unsigned supine_denormals_flush(void);
 void supine_denormals_restore(unsigned saved);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

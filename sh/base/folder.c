@@ -17,8 +17,7 @@
 
 static supine_status fail(const char *path, const char *what, supine_error *error) {
   const int code = errno;
-  return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", path, what,
-                          strerror(code)); /* NOLINT(concurrency-mt-unsafe) */
+  return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", path, what, strerror(code));
 }
 
 /* Removes a folder of files, as far as it can. */
@@ -26,7 +25,7 @@ static void remove_folder(const char *path) {
   DIR *entries = opendir(path);
   if (entries != NULL) {
     const struct dirent *entry;
-    while ((entry = readdir(entries)) != NULL) {        /* NOLINT(concurrency-mt-unsafe) */
+    while ((entry = readdir(entries)) != NULL) {
       (void)unlinkat(dirfd(entries), entry->d_name, 0); /* not "." and "..", which are folders */
     }
     (void)closedir(entries);
@@ -40,7 +39,7 @@ static supine_status is_free(const char *path, supine_error *error) {
     return errno == ENOENT ? SUPINE_OK : fail(path, "cannot use this name for a folder", error);
   }
   size_t count = 0;
-  while (readdir(entries) != NULL) { /* NOLINT(concurrency-mt-unsafe) */
+  while (readdir(entries) != NULL) {
     ++count;
   }
   (void)closedir(entries);

@@ -13,10 +13,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** A folder on its way. Write files into `temporary`. */
 typedef struct supine_folder {
   char *path;      /**< its name when it is complete */
@@ -46,7 +42,4 @@ void supine_folder_keep(supine_folder *folder);
  * zeroed struct. */
 void supine_folder_close(supine_folder *folder);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -67,7 +67,7 @@ static int stream_seek(void *cookie, off64_t *offset, int from) {
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
   const int code = errno;
   (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", output->path, what,
-                         strerror(code)); /* NOLINT(concurrency-mt-unsafe) */
+                         strerror(code));
   supine_output_abandon(output);
   return SUPINE_ERROR_WRITE;
 }

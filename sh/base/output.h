@@ -12,10 +12,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** A file on its way. Write to `file` with stdio, which can seek but in a pipe or device; errors
  * may be left for commit to find. */
 typedef struct supine_output {
@@ -54,7 +50,4 @@ char *supine_path_beside(const char *path, const char *name);
  * about to end it. */
 void supine_output_abandon_all(void);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

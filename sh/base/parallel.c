@@ -22,7 +22,7 @@ static void *piece_run(void *argument) {
 }
 
 size_t supine_thread_count(void) {
-  const char *text = getenv("SUPINE_THREADS"); /* NOLINT(concurrency-mt-unsafe) */
+  const char *text = getenv("SUPINE_THREADS");
   if (text != NULL) {
     char *end = NULL;
     const long value = strtol(text, &end, 10);

@@ -6,10 +6,6 @@
 
 #include <stddef.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Works on items begin <= i < end; `thread` is 0 to threads - 1 and names per-thread space. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
@@ -27,7 +23,4 @@ size_t supine_thread_count(void);
 void supine_parallel_for(size_t count, size_t grain, size_t threads,
                          supine_range_function *function, void *context);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -9,10 +9,6 @@
 
 #include <supine/status.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** Adds to the end of `text`, of `size` bytes with its NUL, by a printf format; what does not fit
  * is left out. */
 SUPINE_PRINTF(3, 4)
@@ -23,7 +19,4 @@ bool supine_text_ends_in(const char *name, const char *ending);
 /** The same, capitals or not. */
 bool supine_text_ends_in_any_case(const char *name, const char *ending);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

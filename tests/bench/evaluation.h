@@ -10,10 +10,6 @@
 
 #include <supine/runtime.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /** One measurement: the fastest of several runs. */
 typedef struct supine_bench_row {
   const char *what;    /**< "supine", "plain_loop", "copy", "triad", ... */
@@ -94,7 +90,4 @@ supine_status supine_bench_run(const supine_bench_options *options, supine_bench
 const char *supine_bench_storage_name(supine_storage storage);
 const char *supine_bench_code_name(supine_simd simd);
 
-#ifdef __cplusplus
-}
-#endif
 #endif
