@@ -8,11 +8,11 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/projection/held_out.h"
+#include "precompute/basis_file.h"
 #include "precompute/physics/solve.h"
 #include "precompute/projection/compression.h"
+#include "precompute/projection/held_out.h"
 #include "precompute/rest.h"
-#include "precompute/basis_file.h"
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
@@ -52,8 +52,8 @@ typedef struct pipeline {
   supine_held_out held_out;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[9];  /* mL from the reference at rest, harmonics; where that is known */
-  supine_state state; /* that errors in mm are stated at */
+  double resting[9];           /* mL from the reference at rest, harmonics; where that is known */
+  supine_accuracy_state state; /* that errors in mm are stated at */
   supine_error_table table;
 } pipeline;
 
@@ -207,7 +207,7 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
 /* Errors are stated at rest where it is known. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
-  p->state = (supine_state){.volume = breath_volume};
+  p->state = (supine_accuracy_state){.volume = breath_volume};
   if (!p->reference.known) {
     return SUPINE_OK;
   }

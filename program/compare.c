@@ -95,8 +95,8 @@ static int compare(const char *path, const supine_basis *basis, const request *w
         name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
         wanted->volume);
   }
-  if (!wanted->by_rms && volume.from == SUPINE_VOLUME_REST) {
-    comparison.inflation = (supine_inflation){SUPINE_INFLATION_REST, volume.offset};
+  if (!wanted->by_rms && volume.kind == SUPINE_VOLUME_REST) {
+    comparison.inflation = (supine_inflation){SUPINE_INFLATION_REST, volume.ml};
   } else if (!wanted->by_rms) {
     static const double anywhere[3] = {0.0, 1.0, 0.0}; /* full and the scan do not turn */
     comparison.inflation = (supine_inflation){SUPINE_INFLATION_VOLUME,

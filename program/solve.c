@@ -134,15 +134,15 @@ static supine_status find_scale(const supine_lungs *lungs, const request *wanted
   if (wanted->volume != NULL) {
     (void)supine_options_volume_parse(wanted->volume, &volume);
   }
-  double state = volume.from == SUPINE_VOLUME_SCAN ? reference->scan_volume : 0.0;
-  if (volume.from == SUPINE_VOLUME_REST && reference->known) {
+  double state = volume.kind == SUPINE_VOLUME_SCAN ? reference->scan_volume : 0.0;
+  if (volume.kind == SUPINE_VOLUME_REST && reference->known) {
     const supine_status status = resting_scale(lungs, wanted, g, scale, error);
     if (status != SUPINE_OK) {
       return status;
     }
     state = supine_volume_at(solution->cubic, *scale);
   }
-  return supine_volume_scale(solution->cubic, state + volume.offset, scale, error);
+  return supine_volume_scale(solution->cubic, state + volume.ml, scale, error);
 }
 
 static supine_status write_solution(const supine_lungs *lungs, const request *wanted,

@@ -579,8 +579,8 @@ static void test_turned_over_looks_at_either_end_of_an_axis(void **state) {
     const double sign = g < 3 ? 1.0 : -1.0;
     double resting[9] = {0.5 * part / 0.28209479177387814};
     resting[term[g % 3]] = sign * 0.5 * part / 0.48860251190291992;
-    const supine_state state_of = {resting, 0.0};
-    const supine_state even = {NULL, 0.5 * part};
+    const supine_accuracy_state state_of = {resting, 0.0};
+    const supine_accuracy_state even = {NULL, 0.5 * part};
     double share = 0.0;
     double least = 0.0;
     assert_int_equal(

@@ -11,8 +11,8 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
-#include "precompute/projection/tally.h"
 #include "precompute/projection/compression.h"
+#include "precompute/projection/tally.h"
 
 /* Sums are of so many parts of the vertices, whatever the number of threads. */
 enum { BLOCK = 512, PARTS = 16, VOLUME_HALVINGS = 10 };
@@ -150,7 +150,7 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
   return true;
 }
 
-double supine_accuracy_state_volume(const supine_state *state, const double *y) {
+double supine_accuracy_state_volume(const supine_accuracy_state *state, const double *y) {
   double volume = state->resting == NULL ? state->volume : 0.0;
   for (size_t t = 0; state->resting != NULL && t < supine_sh_count(2); ++t) {
     volume += state->resting[t] * y[t];
@@ -161,7 +161,8 @@ double supine_accuracy_state_volume(const supine_state *state, const double *y) 
 /* Weights of the modes at every direction, [D, K] = Y [D, P] modes^T, and the state's volumes [D].
  */
 static supine_status find_weights(const supine_truth *truth, const supine_compression *compression,
-                                  const supine_state *state, double *weights, double *volumes) {
+                                  const supine_accuracy_state *state, double *weights,
+                                  double *volumes) {
   const size_t band = compression->band < 2 ? 2 : compression->band;
   double *y = malloc(supine_sh_count(band) * sizeof *y);
   if (y == NULL) {
@@ -183,7 +184,7 @@ static supine_status find_weights(const supine_truth *truth, const supine_compre
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
-                                      const supine_state *state, supine_accuracy *accuracy,
+                                      const supine_accuracy_state *state, supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
   const size_t n = compression->vertex_count;

@@ -31,13 +31,13 @@ typedef struct supine_truth {
 } supine_truth;
 
 /** A volume to compare at, mL from the reference. */
-typedef struct supine_state {
+typedef struct supine_accuracy_state {
   const double *resting; /**< [9] the resting volume (runtime.h): at rest in every direction */
   double volume;         /**< NULL above: the same in every direction */
-} supine_state;
+} supine_accuracy_state;
 
 /** The state's volume at harmonics `y` of bands 0 to 2 at least, mL. */
-double supine_accuracy_state_volume(const supine_state *state, const double *y);
+double supine_accuracy_state_volume(const supine_accuracy_state *state, const double *y);
 
 /** Spreads `count` directions [count, 3] evenly on the sphere along a spiral of golden angles; none
  * is a node of a product grid. */
@@ -53,7 +53,7 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
-                                      const supine_state *state, supine_accuracy *accuracy,
+                                      const supine_accuracy_state *state, supine_accuracy *accuracy,
                                       supine_error *error);
 
 /** Share, 0 to 1, of the triangles whose normal turns by more than a right angle on the way to a
@@ -67,6 +67,6 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms,
-                                          const supine_state *state, double *share);
+                                          const supine_accuracy_state *state, double *share);
 
 #endif

@@ -66,7 +66,8 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
 
 /* Weights for gravity along axis g / 2, forwards or backwards. */
 static supine_status find_posture(search *s, size_t g, const supine_volume_forms *forms,
-                                  const supine_state *state, size_t band, double *harmonics) {
+                                  const supine_accuracy_state *state, size_t band,
+                                  double *harmonics) {
   const supine_compression *field = s->field;
   double gravity[3] = {0.0, 0.0, 0.0};
   gravity[g / 2] = g % 2 == 0 ? 1.0 : -1.0;
@@ -90,7 +91,7 @@ static supine_status find_posture(search *s, size_t g, const supine_volume_forms
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms,
-                                          const supine_state *state, double *share) {
+                                          const supine_accuracy_state *state, double *share) {
   const size_t band = compression->band < 2 ? 2 : compression->band;
   if (compression->mode_count > SUPINE_MODES_MADE_MAX) {
     return SUPINE_ERROR_ARGUMENT;

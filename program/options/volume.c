@@ -28,19 +28,19 @@ const supine_option supine_options_volume[] = {
 bool supine_options_volume_parse(const char *text, supine_volume *volume) {
   static const struct {
     const char *name;
-    supine_volume_from from;
+    supine_volume_kind from;
   } states[] = {{"rest", SUPINE_VOLUME_REST}, {"full", SUPINE_VOLUME_FULL}};
   for (size_t i = 0; i < sizeof states / sizeof *states; ++i) {
     const size_t length = strlen(states[i].name);
     if (strncmp(text, states[i].name, length) == 0) {
       const char *offset = text + length;
-      *volume = (supine_volume){.from = states[i].from};
+      *volume = (supine_volume){.kind = states[i].from};
       return *offset == '\0' || ((*offset == '+' || *offset == '-') &&
-                                 supine_options_parse_number(offset, &volume->offset));
+                                 supine_options_parse_number(offset, &volume->ml));
     }
   }
-  volume->from = SUPINE_VOLUME_SCAN;
-  return supine_options_parse_number(text, &volume->offset);
+  volume->kind = SUPINE_VOLUME_SCAN;
+  return supine_options_parse_number(text, &volume->ml);
 }
 
 supine_volume supine_options_volume_default(const supine_basis *basis) {
@@ -52,12 +52,12 @@ supine_volume supine_options_volume_default(const supine_basis *basis) {
 double supine_options_volume_of(const supine_basis *basis, const supine_volume *volume,
                                 const double gravity[3]) {
   double state = 0.0; /* full, or the surface of a file that knows no rest */
-  if (volume->from == SUPINE_VOLUME_REST) {
+  if (volume->kind == SUPINE_VOLUME_REST) {
     (void)supine_basis_resting_volume(basis, gravity, &state);
-  } else if (volume->from == SUPINE_VOLUME_SCAN) {
+  } else if (volume->kind == SUPINE_VOLUME_SCAN) {
     state = supine_basis_get_info(basis)->scan_volume;
   }
-  return state + volume->offset;
+  return state + volume->ml;
 }
 
 void supine_options_volume_reference(const supine_basis *basis, double *volumes) {
@@ -149,12 +149,12 @@ static supine_status lung_scales(const supine_basis *basis, const supine_volume 
   supine_status status = SUPINE_OK;
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count && status == SUPINE_OK;
        ++lung) {
-    const supine_volume state = {wishes[lung].from, 0.0};
+    const supine_volume state = {wishes[lung].kind, 0.0};
     double together[SUPINE_LUNGS_MAX];
     status = common_scale(basis, &state, gravity, weights, together, error);
     if (status == SUPINE_OK) {
       const double volume =
-          supine_basis_lung_volume(basis, lung, weights, together[lung]) + wishes[lung].offset;
+          supine_basis_lung_volume(basis, lung, weights, together[lung]) + wishes[lung].ml;
       status = supine_basis_lung_scale(basis, lung, weights, volume, &scales[lung], error);
     }
   }

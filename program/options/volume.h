@@ -4,6 +4,7 @@
 #define SUPINE_OPTIONS_VOLUME_H
 
 #include <supine/runtime.h>
+#include <supine/state.h>
 
 #include "program/options/command.h"
 
@@ -22,18 +23,6 @@ typedef struct supine_volume_options {
   "rest (default: the end of a quiet expiration in that posture), full, rest+500, rest-200, or a " \
   "number: mL relative to the scan, all lungs together. Where a basis knows no rest "              \
   "(--scanned none), its surface is the rest, and the default is 500 mL above it"
-
-/* One volume: mL beyond a state. */
-typedef enum supine_volume_from {
-  SUPINE_VOLUME_REST,
-  SUPINE_VOLUME_FULL,
-  SUPINE_VOLUME_SCAN
-} supine_volume_from;
-
-typedef struct supine_volume {
-  supine_volume_from from;
-  double offset; /* mL */
-} supine_volume;
 
 /* Reads "rest", "full", "rest+500", "-300"; false where it is anything else. */
 bool supine_options_volume_parse(const char *text, supine_volume *volume);
