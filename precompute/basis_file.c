@@ -9,9 +9,9 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
-#include "precompute/normals/normals.h"
-#include "precompute/lungs/disease.h"
 #include "precompute/basis_file.h"
+#include "precompute/lungs/disease.h"
+#include "precompute/normals/normals.h"
 #include "runtime/safetensors/safetensors_write.h"
 
 /* Metadata under construction. */
@@ -84,7 +84,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
   const double *c = model->direction.c;
-  add(list, "law", "%s", supine_physics_law_name(model->law));
+  add(list, "law", "%s", supine_physics_law_names[model->law]);
   add(list, "midline_mm", "%.9g", lungs->midline);
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);

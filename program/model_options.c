@@ -8,8 +8,8 @@
 #include "sh/base/parallel.h"
 #include "sh/base/text.h"
 
-#include "program/model_options.h"
 #include "precompute/inside/surface.h"
+#include "program/model_options.h"
 #include "program/options/posture_list.h"
 
 void supine_command_model_options_begin(supine_model_options *options) {
@@ -20,18 +20,20 @@ void supine_command_model_options_begin(supine_model_options *options) {
   options->model.force.box[0] = options->model.direction.c[0] = NAN;
 }
 
-/* The law, under the options of one's own. Full inflation is deep below rest's lungs, a scan at
- * rest breathes quietly, and a scan that is nothing in particular is the paper's. */
-static void choose_law(supine_model_options *options) {
-  static const supine_law by_scan[] = {[SUPINE_SCAN_NONE] = SUPINE_LAW_PAPER,
-                                       [SUPINE_SCAN_FULL] = SUPINE_LAW_DEEP,
-                                       [SUPINE_SCAN_REST] = SUPINE_LAW_TIDAL,
-                                       [SUPINE_SCAN_VOLUME] = SUPINE_LAW_DEEP};
+/* Select the law; explicit options override its constants. Breaths of `paper` are added to the scan
+ * as it is, which has no other state then. */
+static int choose_law(supine_model_options *options, const char *command) {
+  if (options->law_choice == SUPINE_LAW_COUNT) {
+    options->law_choice = options->has_scan && options->scan.kind == SUPINE_SCAN_NONE
+                              ? SUPINE_LAW_PAPER
+                              : SUPINE_LAW_DEEP;
+  }
   if (!options->has_scan && options->law_choice != SUPINE_LAW_PAPER) {
     options->scan.kind = SUPINE_SCAN_FULL;
   }
-  if (options->law_choice == SUPINE_LAW_COUNT) {
-    options->law_choice = (int)by_scan[options->scan.kind];
+  if (options->law_choice == SUPINE_LAW_PAPER && options->scan.kind != SUPINE_SCAN_NONE) {
+    return supine_options_usage(command, "--law paper adds breaths to the scan as it is: leave "
+                                         "--scanned out, or take --law deep");
   }
   const supine_model law = supine_physics_model((supine_law)options->law_choice);
   supine_model *model = &options->model;
@@ -46,6 +48,26 @@ static void choose_law(supine_model_options *options) {
   if (isnan(model->direction.c[0])) {
     memcpy(model->direction.c, law.direction.c, sizeof law.direction.c);
   }
+  return SUPINE_EXIT_OK;
+}
+
+/* A law's name; those of former versions answer with what took their place. */
+static int read_law(const char *command, const char *text, void *field) {
+  int *choice = field;
+  for (int law = 0; law < SUPINE_LAW_COUNT; ++law) {
+    if (strcasecmp(text, supine_physics_law_names[law]) == 0) {
+      *choice = law;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  if (strcasecmp(text, "tidal") == 0 || strcasecmp(text, "cohort") == 0) {
+    return supine_options_usage(command,
+                                "--law %s is no more: 'deep', the default, takes its place, for "
+                                "scans at rest too. Leave --law out and say what the scan shows, "
+                                "as --scanned supine:rest",
+                                text);
+  }
+  return SUPINE_OPTION_MISFIT;
 }
 
 /* "supine:rest", "prone:-3000", "full", "none" */
@@ -197,8 +219,14 @@ static int read_lung(const char *command, const char *text, void *field) {
   return SUPINE_EXIT_OK;
 }
 
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL};               /* as supine_axes */
-static const char *const laws[] = {"deep", "tidal", "cohort", "paper", NULL}; /* as supine_law */
+static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
+
+/* The laws' help, and the constants of each for the options that change one. */
+#define LAW_HELP(id, name, base, gain, box, constants, reach, pair, what) name ": " what "\n"
+#define LAW_BASE(id, name, base, ...) " " name " " #base
+#define LAW_GAIN(id, name, base, gain, ...) " " name " " #gain
+#define LAW_BOX(id, name, base, gain, box, ...) " " name " " #box
+#define LAW_CONSTANTS(id, name, base, gain, box, constants, ...) " " name " " #constants
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -224,15 +252,8 @@ const supine_option supine_command_model_options[] = {
      "gravity does is below it; from a scan in another state that shape is found first",
      .read = read_scan,
      .wants = "full, none, POSTURE:rest or POSTURE:ML with ML at most 0, as supine:-3000"},
-    {"law", 0, "LAW",
-     "deep: how lungs go from full inflation to rest and back (default where the scan is full or "
-     "some mL below); tidal: quiet breaths, mostly the diaphragm's (default for a scan at rest); "
-     "cohort: breaths of one posture, as deep but more by the diaphragm, from full breaths of five "
-     "people (of one left out 4 % less is left than by deep; at rest it leaves lungs flatter); "
-     "paper: Santhanam 2008 as published, breaths from "
-     "the scan's own state (implies --scanned "
-     "none). The options below change single constants of it",
-     FILLS(law_choice), .choices = laws},
+    {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of it",
+     FILLS(law_choice), .read = read_law, .choices = supine_physics_law_names},
     {"resting", 0, "LIST|FILE",
      "volume at rest as a share of the full one, by posture; default "
      "left, right and prone 0.47, supine and inverted 0.43, upright 0.53. Name those that "
@@ -242,12 +263,9 @@ const supine_option supine_command_model_options[] = {
     {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along "
              "gravity (0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the "
              "midline outwards, from the back, from the apex; 0 to 1):"},
-    {"base", 0, "B", "default by the law: deep 0.9, tidal 1.1, cohort 0.775, paper 0",
-     FILLS(model.force.base)},
-    {"gain", 0, "G", "default: paper 1, the others 0.4", FILLS(model.force.gain)},
-    {"box-force", 0, "X,Y,Z",
-     "cx, cy, cz: fixed to the body; default: deep 0,-0.2,0, tidal 0,-0.6,0, cohort "
-     "0.1,-0.05,0, paper 0,0,0",
+    {"base", 0, "B", "default by the law:" SUPINE_LAWS(LAW_BASE), FILLS(model.force.base)},
+    {"gain", 0, "G", "default:" SUPINE_LAWS(LAW_GAIN), FILLS(model.force.gain)},
+    {"box-force", 0, "X,Y,Z", "cx, cy, cz: fixed to the body; default:" SUPINE_LAWS(LAW_BOX),
      FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ"},
     {"soften", 0, "S",
      "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. It hardly tells prone from "
@@ -261,13 +279,9 @@ const supine_option supine_command_model_options[] = {
      .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
      .file = SUPINE_FILE_IN},
     {"constants", 0, "C1,...,C6",
-     "of the box model; default: deep 6,2.6,15,1,16,1.3, tidal 3,2.5,2.5,2,16,1.2, cohort "
-     "2.3,3,8.6,0.8,16,1.15, paper "
-     "2,1.5,1.5,1,16,1.4. Fits to landmarks of ten 4-D CTs (DIR-Lab; of the squared displacement "
-     "of "
-     "a quiet breath tidal explains 62 to 88 %) and of ten full breaths (DIR-Lab COPDgene; deep "
-     "-35 "
-     "to 58 %, median 39); cohort's of five more (Lung250M-4B). The paper's own are lost",
+     "of the box model; default:" SUPINE_LAWS(
+         LAW_CONSTANTS) ". Fits to landmarks: paper's of ten 4-D CTs (DIR-Lab), deep's of ten full "
+                        "breaths (DIR-Lab COPDgene). The paper's own are lost",
      FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6"},
     {.help = "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only "
              "ratios count: a = 2 beside a = 1 is twice as expandable, doubling all of them "
@@ -520,7 +534,7 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
     }
     supine_text_add(text, size, " mm");
   }
-  supine_text_add(text, size, "; %s law; scan ", supine_physics_law_name(options->model.law));
+  supine_text_add(text, size, "; %s law; scan ", supine_physics_law_names[options->model.law]);
   if (!reference->known) {
     supine_text_add(text, size, "taken as the reference of every posture");
     return;
@@ -616,7 +630,10 @@ int supine_command_model_load(supine_model_options *options, const char *command
     options->scan.kind = SUPINE_SCAN_NONE;
     options->has_scan = true;
   }
-  choose_law(options);
+  result = choose_law(options, command);
+  if (result != SUPINE_EXIT_OK) {
+    goto cleanup;
+  }
   if (set_expandability(options, &work, count, lungs, &error) != SUPINE_OK ||
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||

@@ -2,8 +2,6 @@
 supine_test(patient supine_patient supine_base supine_gsl)
 supine_test(patient_surface supine_patient supine_lungs supine_mesh_io supine_base supine_gsl)
 supine_test(patient_expand supine_patient supine_lungs supine_mesh_io supine_base supine_gsl)
-supine_test(cohort_law supine_patient supine_base supine_gsl)
-target_sources(test_cohort_law PRIVATE cohort.c)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_command.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(patient_command PROPERTIES TIMEOUT 900)

@@ -18,12 +18,12 @@
 
 enum { SUPINE, PRONE, LEFT, RIGHT, UPRIGHT };
 
-static void check_pair(const char *left, const char *right, supine_axes axes, supine_law law) {
+static void check_pair(const char *left, const char *right, supine_axes axes) {
   const char *const names[] = {left, right};
   const supine_scan full = {.kind = SUPINE_SCAN_FULL};
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
-      .model = supine_physics_model(law), .band = 23, .modes = 16, .held_out = 20};
+      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 23, .modes = 16, .held_out = 20};
   supine_lungs lungs = {0};
   supine_reference reference;
   supine_precompute_report report;
@@ -68,45 +68,28 @@ static void check_pair(const char *left, const char *right, supine_axes axes, su
 
 static void test_adult_turns_as_published(void **state) {
   (void)state;
-  check_pair("lungs/chaste_left.ply", "lungs/chaste_right.ply", SUPINE_AXES_AUTO, SUPINE_LAW_DEEP);
+  check_pair("lungs/chaste_left.ply", "lungs/chaste_right.ply", SUPINE_AXES_AUTO);
 }
 
 static void test_001_turns_as_published(void **state) {
   (void)state;
-  check_pair("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS,
-             SUPINE_LAW_DEEP);
+  check_pair("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS);
 }
 
 static void test_002_turns_as_published(void **state) {
   (void)state;
-  check_pair("covid/covid002_left.ply", "covid/covid002_right.ply", SUPINE_AXES_RAS,
-             SUPINE_LAW_DEEP);
+  check_pair("covid/covid002_left.ply", "covid/covid002_right.ply", SUPINE_AXES_RAS);
 }
 
 static void test_005_turns_as_published(void **state) {
   (void)state;
-  check_pair("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS,
-             SUPINE_LAW_DEEP);
-}
-
-static void test_adult_turns_so_by_the_law_of_a_cohort(void **state) {
-  (void)state;
-  check_pair("lungs/chaste_left.ply", "lungs/chaste_right.ply", SUPINE_AXES_AUTO,
-             SUPINE_LAW_COHORT);
-}
-
-static void test_005_turns_so_by_the_law_of_a_cohort(void **state) {
-  (void)state;
-  check_pair("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS,
-             SUPINE_LAW_COHORT);
+  check_pair("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_adult_turns_as_published),
                                      cmocka_unit_test(test_001_turns_as_published),
                                      cmocka_unit_test(test_002_turns_as_published),
-                                     cmocka_unit_test(test_005_turns_as_published),
-                                     cmocka_unit_test(test_adult_turns_so_by_the_law_of_a_cohort),
-                                     cmocka_unit_test(test_005_turns_so_by_the_law_of_a_cohort)};
+                                     cmocka_unit_test(test_005_turns_as_published)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

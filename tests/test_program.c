@@ -267,8 +267,13 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   EXPECT(1, "did you mean", "precompute low.ply --scanned sopine:rest -o b.safetensors");
   EXPECT(1, "share of the full volume", "precompute low.ply --resting prone=1.2 -o b.safetensors");
   EXPECT(1, "cannot be", "precompute low.ply --scanned supine:-90000 -o b.safetensors");
-  EXPECT(0, "tidal law; scan at rest",
+  EXPECT(0, "deep law; scan at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
+  EXPECT(1, "'deep', the default", "precompute low.ply --law tidal -o b.safetensors");
+  EXPECT(1, "'deep', the default", "precompute low.ply --law cohort -o b.safetensors");
+  EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
+  EXPECT(1, "leave --scanned out",
+         "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
   EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply"); /* rest, as scanned */
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
   EXPECT(0, "paper law; scan taken as the reference",

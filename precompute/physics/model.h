@@ -8,37 +8,31 @@
 #include "precompute/physics/force.h"
 
 /* clang-format off */
-/** Laws by name: a set of constants each.
+/** The laws, a row each: identifier, name, base, gain, (cx, cy, cz), (c1, ..., c6), reach in mm (0:
+ * over links, as the paper), whether a lung alone has its pair's heights, and what it is.
  *
- *     law    base  gain  cx, cy, cz   c1 ... c6                   reach  moves
- *     deep   0.9   0.4   0, -0.2, 0   6, 2.6, 15, 1, 16, 1.3      10 mm  all three ways, as from rest
- *                                                                        to full inflation
- *     tidal  1.1   0.4   0, -0.6, 0   3, 2.5, 2.5, 2, 16, 1.2     10 mm  with the diaphragm, as a
- *                                                                        quiet breath
- *     cohort 0.775 0.4   .1, -.05, 0  2.3, 3, 8.6, 0.8, 16, 1.15  10 mm  as deep, more by the
- *                                                                        diaphragm
- *     paper  0     1     0,  0,   0   2, 1.5, 1.5, 1, 16, 1.4     links  [Santhanam2008]: (18) alone,
- *                                                                        its c8 turning with gravity
- *
- * The paper's own constants (Table I) are lost: c1..c6 of `paper` and `tidal` are fits to the 4-D
- * CT landmarks of ten patients (DIR-Lab), those of `deep` to full breaths of ten more (DIR-Lab
- * COPDgene), and all of `cohort` to the full breaths of five people (Lung250M-4B), within the ranges
- * of c2 to c9 in which lungs at rest stay whole and fill evenly: each of the five left out, it leaves
- * 4 % less of that one's motion than `deep` does (tests/bench/bench_cohort). In the posture of those scans, supine, h = 1 - Y: base, cy and gain cannot be told
- * apart there. What of the gradient turns with gravity is taken as 0.4 of a mean of 1: at rest the
- * lowest lung lies 1.5 times as far below its full size as the uppermost. That lower regions are
- * the emptier ones is Milic-Emili's (J Appl Physiol 1966); the figure itself is an assumption.
+ * The paper's own constants (Table I) are lost: c1..c6 of `paper` are fits to the 4-D CT landmarks
+ * of ten patients (DIR-Lab), those of `deep` to the full breaths of ten more (DIR-Lab COPDgene). In
+ * the posture of those scans, supine, h = 1 - Y: base, cy and gain cannot be told apart there. The
+ * part of the gradient that turns with gravity is taken as 0.4 of a mean of 1: at rest the lowest
+ * lung lies 1.5 times as far below its full size as the uppermost. That lower regions are the
+ * emptier ones is Milic-Emili's (J Appl Physiol 1966); the figure itself is an assumption.
  *
  * A heart that presses on the lung below it was tried and left out: strong enough to raise the left
  * lung's part of a breath on the left from 48 to 49.5 % (58 published), it takes ventilation prone,
  * lowest over uppermost quarter, from 1.4 to 1.6, farther from even. */
+#define SUPINE_LAWS(LAW)                                                                           \
+  LAW(DEEP, "deep", 0.9, 0.4, (0, -0.2, 0), (6, 2.6, 15, 1, 16, 1.3), 10, true,                    \
+      "postures and breaths between full inflation, rest and beyond (default)")                    \
+  LAW(PAPER, "paper", 0, 1, (0, 0, 0), (2, 1.5, 1.5, 1, 16, 1.4), 0, false,                        \
+      "Santhanam 2008 as published: breaths are added to the scan as it is (implies --scanned "    \
+      "none)")
 /* clang-format on */
 typedef enum supine_law {
-  SUPINE_LAW_DEEP,
-  SUPINE_LAW_TIDAL,
-  SUPINE_LAW_COHORT,
-  SUPINE_LAW_PAPER,
-  SUPINE_LAW_COUNT
+#define SUPINE_LAW_ENUM(id, ...) SUPINE_LAW_##id,
+  SUPINE_LAWS(SUPINE_LAW_ENUM)
+#undef SUPINE_LAW_ENUM
+      SUPINE_LAW_COUNT
 } supine_law;
 
 /** The physical model of one basis or one solve: all that is not geometry. Arrays are the caller's.
@@ -59,8 +53,8 @@ typedef struct supine_model {
 /** The model of healthy lungs of even stiffness under a law. */
 supine_model supine_physics_model(supine_law law);
 
-/** "deep", "tidal", "cohort", "paper". */
-const char *supine_physics_law_name(supine_law law);
+/** The names of the laws; NULL ends them. */
+extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 
 /** The network of lungs with the model's lesions and reach: what solves are set up with.
  * @retval SUPINE_ERROR_MEMORY */
