@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # On a bare Debian 12, as root: install what is needed, build, then
 #   sh cmake/debian.sh demo    make a pair of lungs, precompute and deform them
-#   sh cmake/debian.sh test    build and pass the tests
+#   sh cmake/debian.sh build   build with the tests
+#   sh cmake/debian.sh test    the same, and pass them
 #   sh cmake/debian.sh count   print which lines the quick tests reach
 set -eu
 cd "$(dirname "$0")/.."
@@ -10,7 +11,8 @@ cd "$(dirname "$0")/.."
 # The one list of packages: what building needs, and what the tests need on top.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libxxhash-dev libegl-dev libgles-dev libcairo2-dev libwebp-dev
-  libgl1-mesa-dri libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev"
+  libgl1-mesa-dri libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev
+  help2man"
 tests="g++ poppler-utils libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
   python3-vtk9 python3-dev python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
   plastimatch elastix"
@@ -41,7 +43,7 @@ demo)
   cmake --build --preset release
   exec sh cmake/demo.sh build/release/supine demo
   ;;
-test)
+build | test)
   # What exported files are opened with: another node or browser that is there serves as well.
   command -v npm >/dev/null || tests="$tests nodejs npm"
   command -v chromium >/dev/null || tests="$tests chromium"
@@ -52,10 +54,10 @@ test)
     echo "npm's packages are missing: the tests of exported files that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
-  exec ctest --preset release
+  [ "$1" = build ] || exec ctest --preset release
   ;;
 *)
-  echo "usage: sh cmake/debian.sh demo|test|count" >&2
+  echo "usage: sh cmake/debian.sh demo|build|test|count" >&2
   exit 1
   ;;
 esac

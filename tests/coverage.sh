@@ -20,5 +20,5 @@ left_out=none
 [ "${1-}" = quick ] && left_out=$slow
 ctest --preset coverage -j "$(nproc)" -E "^($left_out)\$" >build/coverage.ctest.log ||
   echo "some tests failed: build/coverage.ctest.log"
-exec gcovr --root . build/coverage --filter '(sh|mesh|precompute|runtime)/' --gcov-ignore-parse-errors \
+exec gcovr --root . build/coverage --filter '(sh|mesh|precompute|runtime|program)/' --gcov-ignore-parse-errors \
   --exclude-unreachable-branches --fail-under-line 90 --print-summary 2>build/coverage.gcovr.log

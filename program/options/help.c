@@ -44,7 +44,7 @@ static void print_text(const char *text, size_t column, size_t left, FILE *file)
   }
 }
 
-void supine_options_help_text(const supine_option *option, char *text, size_t size) {
+static void help_text(const supine_option *option, char *text, size_t size) {
   (void)snprintf(text, size, "%s%s%s", option->help, option->standard != NULL ? "; default " : "",
                  option->standard != NULL ? option->standard : "");
 }
@@ -64,7 +64,7 @@ static void print_row(void *context, const supine_option *option, size_t base) {
                            option->argument != NULL ? option->argument : "");
   const bool beside = used + 2 <= TEXT_COLUMN;
   (void)fprintf(file, "%s%*s", beside ? "" : "\n", beside ? TEXT_COLUMN - used : TEXT_COLUMN, "");
-  supine_options_help_text(option, text, sizeof text);
+  help_text(option, text, sizeof text);
   print_text(text, TEXT_COLUMN, TEXT_COLUMN, file);
 }
 

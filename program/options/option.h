@@ -137,9 +137,6 @@ typedef void supine_option_visit(void *context, const supine_option *option, siz
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-/* An option's help with its default. */
-void supine_options_help_text(const supine_option *option, char *text, size_t size);
-
 void supine_options_print_help(const supine_command *command, FILE *file);
 
 #endif

@@ -1,0 +1,22 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Make a manual page of every command from its --help: manual.sh PROGRAM FOLDER VERSION. Wants help2man.
+set -eu
+mkdir -p "$2"
+out=$(cd "$2" && pwd)
+cd "$(dirname "$1")"
+program=./$(basename "$1")
+
+# page COMMAND SUMMARY: the page of a command, or of the program where COMMAND is empty.
+page() {
+  name=supine${1:+-$1}
+  help2man --no-info --name="$2" --version-string="$3" --no-discard-stderr --help-option="${1:+$1 }--help" \
+    --section=1 --manual='User Commands' --source="supine $3" "$program" |
+    sed "s/^\.TH SUPINE /.TH $(echo "$name" | tr '[:lower:]' '[:upper:]') /
+      /^\.SH NAME/{n;s/^supine /$name /;}" >"$out/$name.1"
+  gzip -9nkf "$out/$name.1"
+}
+page "" "lungs that deform with gravity, in real time" "$3"
+"$program" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) */\1 /p' | while read -r command summary; do
+  page "$command" "$summary" "$3"
+done
