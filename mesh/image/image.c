@@ -8,6 +8,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include "sh/base/clones.h"
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
@@ -102,61 +103,75 @@ size_t supine_image_voxel_size(supine_image_voxel voxel) {
 }
 
 double supine_image_get(const supine_image *image, size_t index) {
-  const void *v = image->values;
-  switch (image->voxel) {
-  case SUPINE_VOXEL_I8:
-    return ((const int8_t *)v)[index];
-  case SUPINE_VOXEL_U8:
-    return ((const uint8_t *)v)[index];
-  case SUPINE_VOXEL_I16:
-    return ((const int16_t *)v)[index];
-  case SUPINE_VOXEL_U16:
-    return ((const uint16_t *)v)[index];
-  case SUPINE_VOXEL_I32:
-    return ((const int32_t *)v)[index];
-  case SUPINE_VOXEL_U32:
-    return ((const uint32_t *)v)[index];
-  case SUPINE_VOXEL_F32:
-    return (double)((const float *)v)[index];
-  case SUPINE_VOXEL_F64:
-  case SUPINE_VOXEL_COUNT:
-    break;
-  }
-  return ((const double *)v)[index];
-}
-
-static double clip(double value, double low, double high) {
-  return fmin(fmax(rint(value), low), high);
+  double value = 0.0;
+  supine_image_gather(image, index, &(size_t){0}, 1, &value);
+  return value;
 }
 
 void supine_image_set(supine_image *image, size_t index, double value) {
-  void *v = image->values;
+  supine_image_put(image, index, 1, &value);
+}
+
+#define GATHER(type)                                                                               \
+  for (size_t i = 0; i < count; ++i) {                                                             \
+    values[i] = (double)((const type *)image->values)[from + index[i]];                            \
+  }                                                                                                \
+  break
+
+SUPINE_CLONES void supine_image_gather(const supine_image *image, size_t from, const size_t *index,
+                                       size_t count, double *restrict values) {
   switch (image->voxel) {
   case SUPINE_VOXEL_I8:
-    ((int8_t *)v)[index] = (int8_t)clip(value, INT8_MIN, INT8_MAX);
-    break;
+    GATHER(int8_t);
   case SUPINE_VOXEL_U8:
-    ((uint8_t *)v)[index] = (uint8_t)clip(value, 0, UINT8_MAX);
-    break;
+    GATHER(uint8_t);
   case SUPINE_VOXEL_I16:
-    ((int16_t *)v)[index] = (int16_t)clip(value, INT16_MIN, INT16_MAX);
-    break;
+    GATHER(int16_t);
   case SUPINE_VOXEL_U16:
-    ((uint16_t *)v)[index] = (uint16_t)clip(value, 0, UINT16_MAX);
-    break;
+    GATHER(uint16_t);
   case SUPINE_VOXEL_I32:
-    ((int32_t *)v)[index] = (int32_t)clip(value, INT32_MIN, INT32_MAX);
-    break;
+    GATHER(int32_t);
   case SUPINE_VOXEL_U32:
-    ((uint32_t *)v)[index] = (uint32_t)clip(value, 0, UINT32_MAX);
-    break;
+    GATHER(uint32_t);
   case SUPINE_VOXEL_F32:
-    ((float *)v)[index] = (float)value;
-    break;
+    GATHER(float);
   case SUPINE_VOXEL_F64:
   case SUPINE_VOXEL_COUNT:
-    ((double *)v)[index] = value;
-    break;
+    GATHER(double);
+  }
+}
+
+static double clip(double value, double low, double high) {
+  const double whole = rint(value);
+  return whole > low ? (whole < high ? whole : high) : low; /* low where it is not a number */
+}
+
+#define PUT(type, number)                                                                          \
+  for (size_t i = 0; i < count; ++i) {                                                             \
+    ((type *)image->values)[begin + i] = (type)(number);                                           \
+  }                                                                                                \
+  break
+
+SUPINE_CLONES void supine_image_put(supine_image *image, size_t begin, size_t count,
+                                    const double *restrict values) {
+  switch (image->voxel) {
+  case SUPINE_VOXEL_I8:
+    PUT(int8_t, clip(values[i], INT8_MIN, INT8_MAX));
+  case SUPINE_VOXEL_U8:
+    PUT(uint8_t, clip(values[i], 0, UINT8_MAX));
+  case SUPINE_VOXEL_I16:
+    PUT(int16_t, clip(values[i], INT16_MIN, INT16_MAX));
+  case SUPINE_VOXEL_U16:
+    PUT(uint16_t, clip(values[i], 0, UINT16_MAX));
+  case SUPINE_VOXEL_I32:
+    PUT(int32_t, clip(values[i], INT32_MIN, INT32_MAX));
+  case SUPINE_VOXEL_U32:
+    PUT(uint32_t, clip(values[i], 0, UINT32_MAX));
+  case SUPINE_VOXEL_F32:
+    PUT(float, values[i]);
+  case SUPINE_VOXEL_F64:
+  case SUPINE_VOXEL_COUNT:
+    PUT(double, values[i]);
   }
 }
 

@@ -72,6 +72,10 @@ size_t supine_image_voxel_size(supine_image_voxel voxel);
 /** A number as a double, and back: rounded and clipped to the type. */
 double supine_image_get(const supine_image *image, size_t index);
 void supine_image_set(supine_image *image, size_t index, double value);
+/** The same for the numbers from + index[0 .. count - 1], or for `count` of them from `begin`. */
+void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
+                         double *values);
+void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
 /** Coordinates of a point in voxels: (0, 0, 0) is the first voxel's centre. */
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]);

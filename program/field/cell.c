@@ -19,6 +19,7 @@ void supine_field_find_cell(const supine_image *image, const double point[3],
 
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]) {
+  const float *numbers = image->values;
   for (size_t c = 0; c < image->channels; ++c) {
     values[c] = 0.0;
     for (size_t k = 0; k < 3 && slope != NULL; ++k) {
@@ -36,7 +37,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
     for (size_t c = 0; c < image->channels; ++c) {
-      const double value = supine_image_get(image, image->channels * voxel + c);
+      const double value = (double)numbers[image->channels * voxel + c];
       values[c] += weight[0] * weight[1] * weight[2] * value;
       for (size_t k = 0; k < 3 && slope != NULL; ++k) {
         const double sign = corner >> k & 1U ? 1.0 : -1.0;

@@ -15,7 +15,8 @@ typedef struct supine_field_cell {
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* All channels there, and optionally their derivative [channels, 3] by the shares. */
+/* All channels there of an F32 image, and optionally their derivative [channels, 3] by the shares.
+ */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 
