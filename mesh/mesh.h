@@ -49,13 +49,13 @@ typedef struct supine_mesh_report {
                                 of the one assumed would make it lungs; else NULL */
 } supine_mesh_report;
 
-/** Reads one surface: PLY, STL and OFF directly, all else that assimp reads through it. Polygons
+/** Reads one surface: PLY and STL directly, all else that assimp reads through it. Polygons
  * are cut into triangles, all nodes of a scene are joined, vertices at the same position are welded
  * in order of first appearance.
  *
  * Files are held to their own counts, so that a truncated or hostile one is refused. assimp runs in
  * a process of its own, so that a file on which an importer crashes or runs wild is refused too.
- * Positions are rounded to float32. A name without a known ending is read as PLY, STL or OFF where
+ * Positions are rounded to float32. A name without a known ending is read as PLY or STL where
  * it begins with that word.
  *
  * @param path     file

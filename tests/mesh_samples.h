@@ -49,6 +49,12 @@ static inline supine_mesh sample_box(void) {
   return sample_make(8, vertices, 12, triangles);
 }
 
+/* Head of a PLY file in ASCII: vertices' rows "x y z" and faces' rows "3 a b c" follow. */
+#define SAMPLE_PLY(vertices, faces)                                                                \
+  "ply\nformat ascii 1.0\nelement vertex " #vertices                                               \
+  "\nproperty float x\nproperty float y\nproperty float z\nelement face " #faces                   \
+  "\nproperty list uint int vertex_indices\nend_header\n"
+
 /* `path` = folder/name. */
 static inline const char *sample_path(void **state, const char *name, char path[256]) {
   (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);

@@ -85,13 +85,13 @@ static void test_load_stl_soup_equals_indexed(void **state) {
 /* No coordinate is -0, whichever way it came, so that positions are the same where their bits are.
  */
 static void test_load_negative_zero_becomes_zero(void **state) {
-  static const char text[] = "OFF\n5 2 0\n-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
-                             "3 0 2 1\n3 3 1 4\n";
+  static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
+                                              "3 0 2 1\n3 3 1 4\n";
   for (int ras = 0; ras < 2; ++ras) {
     char path[256];
     const supine_mesh_load_options options = {.axes = ras ? SUPINE_AXES_RAS : SUPINE_AXES_LPS};
     supine_mesh_report report = {0};
-    supine_mesh mesh = load(sample_text(state, "a.off", text, path), &options, &report);
+    supine_mesh mesh = load(sample_text(state, "a.ply", text, path), &options, &report);
     assert_int_equal(mesh.vertex_count, 4);
     assert_int_equal(report.welded_vertices, 1);
     for (size_t i = 0; i < 12; ++i) {
@@ -183,7 +183,7 @@ static void test_load_concave_face_cut_inside(void **state) {
                                        {60, 60, 0}, {60, 30, 0}, {30, 30, 0},
                                        {30, 60, 0}, {0, 60, 0},  {0, 0, 50}};
   for (double size = 1.0; size > 1.0e-4; size /= 100.0) {
-    char text[1024] = "OFF\n9 2 0\n";
+    char text[1024] = SAMPLE_PLY(9, 2);
     char path[256];
     for (size_t i = 0; i < 9; ++i) {
       const size_t length = strlen(text);
@@ -191,7 +191,7 @@ static void test_load_concave_face_cut_inside(void **state) {
                      size * corners[i][1], size * corners[i][2]);
     }
     (void)strcat(text, "8 0 1 2 3 4 5 6 7\n4 8 7 5 0\n");
-    supine_mesh mesh = load(sample_text(state, "u.off", text, path), NULL, NULL);
+    supine_mesh mesh = load(sample_text(state, "u.ply", text, path), NULL, NULL);
     assert_int_equal(mesh.vertex_count, 9);
     assert_int_equal(mesh.triangle_count, 8);
     double area = 0.0;
@@ -210,35 +210,22 @@ static void test_load_concave_face_cut_inside(void **state) {
 
 /* Corners on one line, and a face that crosses itself, still give every triangle. */
 static void test_load_degenerate_faces_cut_into_all_triangles(void **state) {
-  static const char text[] = "OFF\n6 3 0\n0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
-                             "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
+  static const char text[] = SAMPLE_PLY(6, 3) "0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
+                                              "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
   char path[256];
-  supine_mesh mesh = load(sample_text(state, "flat.off", text, path), NULL, NULL);
+  supine_mesh mesh = load(sample_text(state, "flat.ply", text, path), NULL, NULL);
   assert_int_equal(mesh.triangle_count, 2 + 3 + 2);
   supine_mesh_free(&mesh);
 }
 
 static void test_load_face_of_too_many_corners_refused(void **state) {
   enum { CORNERS = 1025 };
-  char text[32 + 8 * CORNERS];
-  int length = snprintf(text, sizeof text, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n%d", CORNERS);
+  char text[256 + 8 * CORNERS];
+  int length = snprintf(text, sizeof text, SAMPLE_PLY(3, 1) "0 0 0\n1 0 0\n0 1 0\n%d", CORNERS);
   for (int i = 0; i < CORNERS; ++i) {
     length += snprintf(text + length, sizeof text - (size_t)length, " %d", i % 3);
   }
-  refuse_text(state, "a.off", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
-}
-
-static void test_load_off_comments_and_colours(void **state) {
-  static const char text[] = "COFF # a tetrahedron\n4 4 6\n\n0 0 0 255 0 0\n120 0 0 255 0 0\n"
-                             "0 120 0 255 0 0 # y\n\n# z\n0 0 120 255 0 0\n3 0 2 1\n# between\n"
-                             "3 0 1 3 9 9 9\n\n3 0 3 2\n3 1 2 3";
-  char path[256];
-  supine_mesh mesh = load(sample_text(state, "a.off", text, path), NULL, NULL);
-  expect_tetrahedron(&mesh);
-  supine_mesh_free(&mesh);
-  mesh = load(sample_text(state, "without_ending", text + 1, path), NULL, NULL);
-  expect_tetrahedron(&mesh);
-  supine_mesh_free(&mesh);
+  refuse_text(state, "a.ply", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
 }
 
 /* Two nodes hold the tetrahedron: one moved, one mirrored and moved; both face outwards. */
@@ -385,13 +372,14 @@ static void test_load_units_scaled_and_guessed(void **state) {
     char text[256];
     char path[256];
     const double size = cases[i].size;
-    (void)snprintf(text, sizeof text,
-                   "OFF\n4 4 0\n0 0 0\n%.9g 0 0\n0 %.9g 0\n0 0 %.9g\n3 0 2 1\n3 0 1 3\n3 0 3 2\n"
-                   "3 1 2 3\n",
-                   size, size, size);
+    (void)snprintf(
+        text, sizeof text,
+        SAMPLE_PLY(4, 4) "0 0 0\n%.9g 0 0\n0 %.9g 0\n0 0 %.9g\n3 0 2 1\n3 0 1 3\n3 0 3 2\n"
+                         "3 1 2 3\n",
+        size, size, size);
     supine_mesh_report report = {0};
     const supine_mesh_load_options options = {.millimetres_per_unit = cases[i].scale};
-    supine_mesh mesh = load(sample_text(state, "a.off", text, path), &options, &report);
+    supine_mesh mesh = load(sample_text(state, "a.ply", text, path), &options, &report);
     double minimum[3];
     double maximum[3];
     supine_mesh_box(&mesh, minimum, maximum);
@@ -576,7 +564,6 @@ int main(void) {
       cmocka_unit_test(test_load_concave_face_cut_inside),
       cmocka_unit_test(test_load_degenerate_faces_cut_into_all_triangles),
       cmocka_unit_test(test_load_face_of_too_many_corners_refused),
-      cmocka_unit_test(test_load_off_comments_and_colours),
       cmocka_unit_test(test_load_nodes_transformed_mirror_keeps_sense),
       cmocka_unit_test(test_load_axes_tag_option_and_comment),
       cmocka_unit_test(test_load_axes_tag_in_stl_header),

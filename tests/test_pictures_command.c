@@ -38,8 +38,8 @@ static int run_with(const char *environment, const char *format, ...) {
   va_start(list, format);
   (void)vsnprintf(arguments, sizeof arguments, format, list);
   va_end(list);
-  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 %s %s 2>&1", folder, environment,
-                 SUPINE_PROGRAM, arguments);
+  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 \"%s\" %s 2>&1", folder,
+                 environment, SUPINE_PROGRAM, arguments);
   FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
   assert_non_null(pipe);
   printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';

@@ -33,8 +33,8 @@ static int run(const char *format, ...) {
   va_start(list, format);
   (void)vsnprintf(arguments, sizeof arguments, format, list);
   va_end(list);
-  (void)snprintf(command, sizeof command, "cd %s && timeout 60 %s %s 2>&1", folder, SUPINE_PROGRAM,
-                 arguments);
+  (void)snprintf(command, sizeof command, "cd %s && timeout 60 \"%s\" %s 2>&1", folder,
+                 SUPINE_PROGRAM, arguments);
   FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
   assert_non_null(pipe);
   printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
@@ -334,9 +334,9 @@ static void test_mesh_bad_input_named_and_nothing_left(void **state) {
   const size_t size = read_file("lungs.ply", bytes, sizeof bytes);
   write_file("cut.ply", bytes, size / 2);
   EXPECT(2, "cut.ply", "precompute cut.ply -o f.safetensors");
-  write_text("nan.off",
-             "OFF\n4 4 0\n0 0 0\n1 0 0\n0 nan 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n");
-  EXPECT(2, "nan.off", "precompute nan.off -o f.safetensors");
+  write_text("nan.obj",
+             "v 0 0 0\nv 1 0 0\nv 0 nan 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  EXPECT(2, "nan.obj", "precompute nan.obj -o f.safetensors");
   write_text("inf.obj",
              "v 0 0 0\nv 1 0 0\nv 0 inf 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   EXPECT(2, "inf.obj", "precompute inf.obj -o f.safetensors");

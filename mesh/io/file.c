@@ -29,10 +29,7 @@ static bool format_of_ending(const char *ending, mesh_format *format) {
   static const struct {
     const char *ending;
     mesh_format format;
-  } known[] = {{".ply", MESH_FORMAT_PLY},
-               {".stl", MESH_FORMAT_STL},
-               {".obj", MESH_FORMAT_OBJ},
-               {".off", MESH_FORMAT_OFF}};
+  } known[] = {{".ply", MESH_FORMAT_PLY}, {".stl", MESH_FORMAT_STL}, {".obj", MESH_FORMAT_OBJ}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     if (strcasecmp(ending, known[i].ending) == 0) {
       *format = known[i].format;
@@ -52,7 +49,6 @@ static bool format_of_bytes(const unsigned char *bytes, size_t size, mesh_format
   }
   *format = supine_mesh_text_is(word, "ply")     ? MESH_FORMAT_PLY
             : supine_mesh_text_is(word, "solid") ? MESH_FORMAT_STL
-            : supine_mesh_text_is(word, "off")   ? MESH_FORMAT_OFF
                                                  : MESH_FORMAT_OTHER;
   return *format != MESH_FORMAT_OTHER;
 }

@@ -12,8 +12,6 @@ static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dr
     return supine_mesh_read_ply(file, mesh, dropped, error);
   case MESH_FORMAT_STL:
     return supine_mesh_read_stl(file, mesh, error);
-  case MESH_FORMAT_OFF:
-    return supine_mesh_read_off(file, mesh, dropped, error);
   case MESH_FORMAT_OBJ:
     if (supine_mesh_guard_obj(file, error) != SUPINE_OK) {
       return SUPINE_ERROR_FORMAT;

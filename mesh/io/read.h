@@ -37,8 +37,7 @@ typedef enum mesh_format {
   MESH_FORMAT_OTHER = 0, /**< an ending that assimp knows, but no check of ours */
   MESH_FORMAT_PLY,
   MESH_FORMAT_STL,
-  MESH_FORMAT_OBJ,
-  MESH_FORMAT_OFF
+  MESH_FORMAT_OBJ
 } mesh_format;
 
 /** The axes that a SPACE tag names. */
@@ -53,7 +52,7 @@ typedef enum mesh_space {
 typedef struct mesh_file {
   const char *path;
   mesh_format format;
-  unsigned char *bytes; /**< all of PLY, STL, OBJ and OFF, the head of others; then a 0 */
+  unsigned char *bytes; /**< all of PLY, STL and OBJ, the head of others; then a 0 */
   size_t size;
   mesh_space space;
   bool mentions_ras; /**< the word RAS stands in a comment */
@@ -90,7 +89,7 @@ typedef struct mesh_faces {
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 
-/* ---- ply.c, stl.c, off.c, import.c (assimp: all else): a file's surface in its own units and
+/* ---- ply.c, stl.c, import.c (assimp: all else): a file's surface in its own units and
  * axes, not welded, in single precision. What stands in `mesh` after a failure is the caller's to
  * free; `dropped` counts points and lines. The SPACE tag is noted where the head has not shown it
  * yet. ---- */
@@ -98,8 +97,6 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
 supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error);
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error);
-supine_status supine_mesh_read_off(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error);
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error);
 

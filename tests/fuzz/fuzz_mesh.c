@@ -70,10 +70,6 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
                "0 1 0\r\n0 0 1\r\n"},
       {".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e2 0 0\n"
                "vertex 0 -.5 0\nendloop\nendfacet\nendsolid a\n"},
-      {".off",
-       "OFF\n4 4 6\n0 0 0\n120 0 0\n0 120 0\n0 0 120\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"},
-      {".off", "STCNOFF # odd\n5 2 0\n\n0 0 0 1 1 1\n9 0 0\n9 9 0 # c\n0 9 0\n1 1 9\n"
-               "5 0 1 2 4 3 255 0 0\n3 0 1 2\n"},
       {".obj", "# SPACE=LPS\nmtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0.5\nvt 0 0\n"
                "vn 0 0 1\nusemtl a\ns 1\nf 1//1 2/1/1 3\nf -1 -2 -3 -4\nl 1 2\np 3\n"}};
   size_t seen = 0;
