@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: MIT */
+/* Fit the terms and the field to observed residuals. */
+#include <math.h>
+#include <string.h>
+
+#include "runtime/kriging.h"
+
+enum { ONE = 0, VOLUME = 1, PLACE = 4, VALUE = 7, TERMS = SUPINE_KRIGING_TERMS };
+
+const supine_kriging_model supine_kriging_default = {
+    .sill = 6.0, .length = 90.0, .across = 1.0 / 3.0, .least = 2.0};
+
+double supine_kriging_covariance(const supine_kriging_model *model, const supine_kriging_point *a,
+                                 const supine_kriging_point *b) {
+  double square = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double d = a->position[i] - b->position[i];
+    square += d * d;
+  }
+  const double distance = sqrt(3 * square) / model->length;
+  return model->sill / 3 * sqrt(fmax(a->size, model->least) * fmax(b->size, model->least)) *
+         (a->lung == b->lung ? 1.0 : model->across) * (1 + distance) * exp(-distance);
+}
+
+bool supine_kriging_factor(size_t count, double *matrix) {
+  for (size_t i = 0; i < count; ++i) {
+    double *row = matrix + i * count;
+    for (size_t j = 0; j <= i; ++j) {
+      const double *other = matrix + j * count;
+      double sum = row[j];
+      for (size_t k = 0; k < j; ++k) {
+        sum -= row[k] * other[k];
+      }
+      if (i == j && !(sum > 0 && isfinite(sum))) {
+        return false;
+      }
+      row[j] = i == j ? sqrt(sum) : sum / other[j];
+    }
+  }
+  return true;
+}
+
+void supine_kriging_forward(size_t count, const double *factor, double *x) {
+  for (size_t i = 0; i < count; ++i) {
+    double sum = x[i];
+    for (size_t k = 0; k < i; ++k) {
+      sum -= factor[i * count + k] * x[k];
+    }
+    x[i] = sum / factor[i * count + i];
+  }
+}
+
+size_t supine_kriging_space(size_t count) {
+  return count * (count + SUPINE_KRIGING_COLUMNS + 3);
+}
+
+/* Along axis `axis` term `term` is a column, or its negative, or nothing: r x p = (r_y p_z - r_z
+ * p_y, ...). */
+static int column_of(size_t term, size_t axis, double *sign) {
+  *sign = 1;
+  if (term < 3) {
+    *sign = term == axis ? 1 : 0;
+    return ONE;
+  }
+  if (term == 3) {
+    return VOLUME + (int)axis;
+  }
+  const size_t about = term - 4;
+  *sign = axis == (about + 1) % 3 ? -1 : axis == (about + 2) % 3 ? 1 : 0;
+  return PLACE + (int)((6 - about - axis) % 3);
+}
+
+/* The columns and L^-1 of them. */
+static void whiten(supine_kriging *fit) {
+  const size_t n = fit->count;
+  memset(fit->centre, 0, sizeof fit->centre);
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t i = 0; i < 3; ++i) {
+      fit->centre[i] += fit->points[j].position[i] / (double)n;
+    }
+  }
+  for (size_t j = 0; j < n; ++j) {
+    const supine_kriging_point *p = &fit->points[j];
+    fit->white[ONE * n + j] = 1;
+    for (size_t i = 0; i < 3; ++i) {
+      fit->white[(VOLUME + i) * n + j] = p->volume[i];
+      fit->white[(PLACE + i) * n + j] = p->position[i] - fit->centre[i];
+      fit->white[(VALUE + i) * n + j] = p->residual[i];
+    }
+  }
+  for (size_t c = 0; c < SUPINE_KRIGING_COLUMNS; ++c) {
+    supine_kriging_forward(n, fit->factor, fit->white + c * n);
+  }
+}
+
+static double dot(size_t count, const double *a, const double *b) {
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += a[i] * b[i];
+  }
+  return sum;
+}
+
+static bool absent(const supine_kriging_options *options, size_t term) {
+  return term == 3 ? !options->volume : term > 3 && !options->rotation;
+}
+
+/* The terms' normal equations A = X' K^-1 X + P and X' K^-1 y; an absent term has the row of 1. */
+static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
+                             double a[TERMS * TERMS], double right[TERMS]) {
+  const size_t n = fit->count;
+  memset(a, 0, TERMS * TERMS * sizeof *a);
+  for (size_t k = 0; k < TERMS; ++k) {
+    const bool prior = k == 3 && options->volume;
+    right[k] = prior ? options->volume_mean : 0;
+    a[k * TERMS + k] = prior || absent(options, k) ? 1 : 0;
+    for (size_t axis = 0; axis < 3 && !absent(options, k); ++axis) {
+      double sign = 0;
+      const double *x = fit->white + (size_t)column_of(k, axis, &sign) * n;
+      right[k] += sign * dot(n, x, fit->white + (VALUE + axis) * n);
+      for (size_t l = 0; l <= k; ++l) {
+        double other = 0;
+        const double *z = fit->white + (size_t)column_of(l, axis, &other) * n;
+        a[k * TERMS + l] += absent(options, l) ? 0 : sign * other * dot(n, x, z);
+      }
+    }
+  }
+}
+
+/* Is a pivot what rounding leaves of its diagonal? */
+static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
+  for (size_t k = 0; k < TERMS; ++k) {
+    const double pivot = factor[k * TERMS + k];
+    if (!(pivot * pivot > 1e-9 * a[k * TERMS + k])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* The terms, their covariance A^-1 and the same over columns. */
+static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
+                        const double factor[TERMS * TERMS], const double right[TERMS]) {
+  double inverse[TERMS][TERMS]; /* row k: L^-1 e_k */
+  for (size_t k = 0; k < TERMS; ++k) {
+    memset(inverse[k], 0, sizeof inverse[k]);
+    inverse[k][k] = 1;
+    supine_kriging_forward(TERMS, factor, inverse[k]);
+  }
+  memset(fit->terms, 0, sizeof fit->terms);
+  memset(fit->spread, 0, sizeof fit->spread);
+  for (size_t k = 0; k < TERMS; ++k) {
+    for (size_t l = 0; l < TERMS; ++l) {
+      const double c =
+          absent(options, k) || absent(options, l) ? 0 : dot(TERMS, inverse[k], inverse[l]);
+      fit->covariance[k][l] = c;
+      fit->terms[k] += c * right[l];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        double one = 0;
+        double other = 0;
+        const int from = column_of(k, axis, &one);
+        const int to = column_of(l, axis, &other);
+        fit->spread[from][to] += one * other * c;
+      }
+    }
+  }
+}
+
+static void find_weights(supine_kriging *fit) {
+  const size_t n = fit->count;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double *weights = fit->weights + axis * n;
+    memcpy(weights, fit->white + (VALUE + axis) * n, n * sizeof *weights);
+    for (size_t k = 0; k < TERMS; ++k) {
+      double sign = 0;
+      const double *x = fit->white + (size_t)column_of(k, axis, &sign) * n;
+      for (size_t j = 0; j < n; ++j) {
+        weights[j] -= sign * fit->terms[k] * x[j];
+      }
+    }
+  }
+}
+
+supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
+                                 const supine_kriging_point *points, double *space,
+                                 supine_kriging *fit, supine_error *error) {
+  *fit =
+      (supine_kriging){.model = options->model, .points = points, .count = count, .factor = space};
+  fit->white = space + count * count;
+  fit->weights = fit->white + SUPINE_KRIGING_COLUMNS * count;
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = 0; j <= i; ++j) {
+      fit->factor[i * count + j] =
+          supine_kriging_covariance(&options->model, &points[i], &points[j]);
+    }
+    fit->factor[i * count + i] += points[i].noise * points[i].noise;
+  }
+  if (!supine_kriging_factor(count, fit->factor)) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the points' covariance is not positive definite: give each a noise "
+                            "above 0");
+  }
+  whiten(fit);
+  double a[TERMS * TERMS];
+  double factor[TERMS * TERMS];
+  double right[TERMS];
+  normal_equations(fit, options, a, right);
+  memcpy(factor, a, sizeof a);
+  if (!supine_kriging_factor(TERMS, factor) || !determined(a, factor)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a rotation needs three points that are not on one line");
+  }
+  solve_terms(fit, options, factor, right);
+  find_weights(fit);
+  const double mean = options->volume ? options->volume_mean : 0;
+  double sum = mean * mean - dot(TERMS, fit->terms, right);
+  for (size_t i = 0; i < count; ++i) {
+    sum += 6 * log(fit->factor[i * count + i]);
+  }
+  for (size_t k = 0; k < TERMS; ++k) {
+    sum += 2 * log(factor[k * TERMS + k]);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double *y = fit->white + (VALUE + axis) * count;
+    sum += dot(count, y, y);
+  }
+  fit->log_likelihood = -0.5 * sum;
+  return SUPINE_OK;
+}
+
+/* Compute the block of a point in Q = K^-1 - K^-1 X A^-1 X' K^-1: the inverse covariance of its
+ * residual from all others.
+ * @param row  [n] L^-1 e_j */
+static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
+  const size_t n = fit->count;
+  double column[VALUE]; /* row j of K^-1 X, by column */
+  for (size_t c = 0; c < VALUE; ++c) {
+    column[c] = dot(n, row, fit->white + c * n);
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t b = 0; b < 3; ++b) {
+      double sum = a == b ? dot(n, row, row) : 0;
+      for (size_t k = 0; k < TERMS; ++k) {
+        for (size_t l = 0; l < TERMS; ++l) {
+          double one = 0;
+          double other = 0;
+          const double x = column[column_of(k, a, &one)];
+          const double z = column[column_of(l, b, &other)];
+          sum -= one * other * x * z * fit->covariance[k][l];
+        }
+      }
+      block[3 * a + b] = sum;
+    }
+  }
+}
+
+double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
+                                double *scratch) {
+  const size_t n = fit->count;
+  double block[9];
+  memset(scratch, 0, n * sizeof *scratch);
+  scratch[point] = 1;
+  supine_kriging_forward(n, fit->factor, scratch);
+  leave_out_block(fit, scratch, block);
+  const double least = 1e-9 * dot(n, scratch, scratch);
+  bool alone = !supine_kriging_factor(3, block);
+  for (size_t a = 0; a < 3; ++a) {
+    alone = alone || block[4 * a] * block[4 * a] < least;
+    residual[a] = dot(n, scratch, fit->weights + a * n);
+  }
+  if (alone) {
+    memset(residual, 0, 3 * sizeof *residual);
+    return 0;
+  }
+  double trace = 0;
+  double solved[3];
+  supine_kriging_forward(3, block, residual);
+  for (size_t k = 0; k < 3; ++k) { /* column k of L^-1 */
+    double unit[3] = {k == 0, k == 1, k == 2};
+    supine_kriging_forward(3, block, unit);
+    trace += dot(3, unit, unit);
+    solved[k] = dot(3, unit, residual);
+  }
+  memcpy(residual, solved, sizeof solved);
+  return sqrt(trace);
+}

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * Kriging of what a displacement law misses, from observed points.
+ *
+ *     y_j = t + b v_j + r x (p_j - c) + g(p_j) + noise        per point, three axes, mm
+ *     cov g(p_i), g(p_j) = (s / 3) sqrt(|u_i| |u_j|) q (1 + a) exp(-a)      per axis, mm^2
+ *     a = sqrt(3) |p_i - p_j| / length;  q = 1 within a lung, `across` between two
+ *
+ * with y the observed minus the law's position, t a free translation, b of prior N(0, 1) an unknown
+ * volume, r a free small rotation. One n x n matrix serves x, y and z. Nothing allocates; any
+ * number of threads may predict from one fit.
+ *
+ * The covariance is Matern's of order 3/2 [Rasmussen & Williams, Gaussian Processes for Machine
+ * Learning, 2006, (4.17)], the free terms are universal kriging [there, 2.7]. */
+#ifndef SUPINE_KRIGING_H
+#define SUPINE_KRIGING_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <supine/status.h>
+
+enum {
+  SUPINE_KRIGING_POINTS_MAX = 300,
+  SUPINE_KRIGING_TERMS = 7,   /**< translation 0 to 2, volume 3, rotation 4 to 6 */
+  SUPINE_KRIGING_COLUMNS = 10 /**< 1, v (3), p - c (3), y (3) */
+};
+
+typedef struct supine_kriging_model {
+  double sill;   /**< s, mm: 3-D variance of g for each mm of displacement */
+  double length; /**< mm */
+  double across; /**< correlation of two lungs, 0 to 1 */
+  double least;  /**< |u| counts as this much at least, mm */
+} supine_kriging_model;
+
+/** The constants of 15 patients' full breaths: 6 mm, 90 mm, 1/3, 2 mm. */
+extern const supine_kriging_model supine_kriging_default;
+
+typedef struct supine_kriging_point {
+  double position[3]; /**< p, in the scan, mm */
+  double volume[3];   /**< v: what one prior standard deviation of the volume adds, mm */
+  double residual[3]; /**< y, mm: observed less the law's position */
+  double size;        /**< |u|, mm */
+  double noise;       /**< standard deviation per axis, mm, above 0 */
+  size_t lung;
+} supine_kriging_point;
+
+/** The model, and which terms are unknown besides the translation. */
+typedef struct supine_kriging_options {
+  supine_kriging_model model;
+  bool volume, rotation;
+  double volume_mean; /**< prior mean of b */
+} supine_kriging_options;
+
+typedef struct supine_kriging {
+  supine_kriging_model model;
+  const supine_kriging_point *points; /**< the caller's, to be kept */
+  size_t count;
+  double centre[3]; /**< c, the points' mean */
+  double *factor;   /**< [n, n] L, lower; the matrix is L L' */
+  double *white;    /**< [COLUMNS, n] L^-1 of the columns */
+  double *weights;  /**< [3, n] L^-1 of y less the terms */
+  double terms[SUPINE_KRIGING_TERMS];
+  double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS]; /**< of terms; 0 where known */
+  double spread[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];     /**< the same over columns */
+  double log_likelihood; /**< restricted, without what does not depend on the law */
+} supine_kriging;
+
+/** Compute cov g(p_i), g(p_j) of one axis, mm^2, without noise. */
+double supine_kriging_covariance(const supine_kriging_model *model, const supine_kriging_point *a,
+                                 const supine_kriging_point *b);
+
+/** Factor a symmetric positive definite matrix as L L', in place of its lower triangle.
+ * @return false where it is not positive definite */
+bool supine_kriging_factor(size_t count, double *matrix);
+
+/** Solve L x = b in place. */
+void supine_kriging_forward(size_t count, const double *factor, double *x);
+
+/** How many doubles a fit of `count` points needs. */
+size_t supine_kriging_space(size_t count);
+
+/** Fit the terms and g to residuals.
+ * @param count   1 to SUPINE_KRIGING_POINTS_MAX
+ * @param points  [count], kept by the fit
+ * @param space   [supine_kriging_space(count)], kept by the fit
+ * @retval SUPINE_ERROR_ARGUMENT   a rotation is asked for and the points are on one line
+ * @retval SUPINE_ERROR_NUMERICAL  the covariance is not positive definite: numbers not finite, or a
+ *                                 noise of 0 at repeated points */
+supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
+                                 const supine_kriging_point *points, double *space,
+                                 supine_kriging *fit, supine_error *error);
+
+/** Compute the residual of a point from all others' prediction.
+ * @param residual  [3] mm, written
+ * @param scratch   [count]
+ * @return its standard deviation, 3-D, mm; 0 where no other point determines it */
+double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
+                                double *scratch);
+
+/** Where to predict: points of one lung. */
+typedef struct supine_kriging_target {
+  size_t count, lung;
+  const float *position; /**< [count, 3] mm */
+  const float *size;     /**< [count] |u| */
+  const float *volume;   /**< [count, 3] v; NULL where the volume is known */
+} supine_kriging_target;
+
+/** Predict t + b v + r x (p - c) + g and its 3-D variance.
+ * @param shift     [count, 3] mm, written
+ * @param variance  [count] mm^2, written
+ * Cost: n^2 / 2 + 15 n multiplications a point. */
+void supine_kriging_predict(const supine_kriging *fit, const supine_kriging_target *target,
+                            float *shift, float *variance);
+
+#endif
