@@ -11,7 +11,7 @@ find_program(NODE_PROGRAM NAMES node nodejs)
 find_program(CHROMIUM_PROGRAM NAMES chromium chromium-browser google-chrome)
 set(SUPINE_NODE_MODULES ${CMAKE_CURRENT_SOURCE_DIR}/export CACHE PATH
   "Folder whose node_modules the tests of exported files use")
-foreach(what colour glb page page_hands page_inside page_lungs page_views page_sizes accessibility report)
+foreach(what colour glb pages) # pages.mjs: everything that a browser shows, in one process
   if(NODE_PROGRAM)
     add_test(NAME export_${what}_node
       COMMAND ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)

@@ -255,7 +255,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
     for (int l = 0; l < LANDMARKS; ++l) {
       const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
       if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or brightness that says which */
-        supine_image_set(&image, i, voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0);
+        supine_image_put(&image, i, 1, &(double){voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0});
       }
     }
   }

@@ -50,7 +50,7 @@ static supine_image made(supine_image_voxel voxel, uint64_t seed) {
   }
   image.values = calloc(60, supine_image_voxel_size(voxel));
   for (size_t i = 0; i < 60; ++i) {
-    supine_image_set(&image, i, rint(120.0 * random_signed(&seed)));
+    supine_image_put(&image, i, 1, &(double){rint(120.0 * random_signed(&seed))});
   }
   return image;
 }
@@ -277,9 +277,9 @@ static void test_image_names_and_places_refused(void **state) {
 static void test_image_set_rounds_and_clips(void **state) {
   (void)state;
   supine_image image = made(SUPINE_VOXEL_I16, 5);
-  supine_image_set(&image, 3, 7.6);
-  supine_image_set(&image, 4, 4e4);
-  supine_image_set(&image, 5, -4e4);
+  supine_image_put(&image, 3, 1, &(double){7.6});
+  supine_image_put(&image, 4, 1, &(double){4e4});
+  supine_image_put(&image, 5, 1, &(double){-4e4});
   assert_close(supine_image_get(&image, 3), 8.0, 0.0);
   assert_close(supine_image_get(&image, 4), 32767.0, 0.0);
   assert_close(supine_image_get(&image, 5), -32768.0, 0.0);

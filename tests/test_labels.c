@@ -732,14 +732,14 @@ static void test_labels_voxels_that_are_none_refused(void **state) {
     map.voxel = wrong[w].voxel;
     map.values = calloc(voxels(&image), supine_image_voxel_size(map.voxel));
     for (size_t i = 0; i < voxels(&image); ++i) {
-      supine_image_set(&map, i, supine_image_get(&image, i));
+      supine_image_put(&map, i, 1, &(double){supine_image_get(&image, i)});
     }
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     const char *path = in_folder("none.nrrd");
     made out = surfaces_of(&path, 1, &plain); /* whole numbers are labels in any type */
     assert_int_equal(out.report.lung_count, 2);
     release(&out);
-    supine_image_set(&map, voxels(&image) - 1, wrong[w].value);
+    supine_image_put(&map, voxels(&image) - 1, 1, &(double){wrong[w].value});
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     refused("none.nrrd", &plain, SUPINE_ERROR_FORMAT, wrong[w].said);
     supine_image_free(&map);

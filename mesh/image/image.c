@@ -108,10 +108,6 @@ double supine_image_get(const supine_image *image, size_t index) {
   return value;
 }
 
-void supine_image_set(supine_image *image, size_t index, double value) {
-  supine_image_put(image, index, 1, &value);
-}
-
 #define GATHER(type)                                                                               \
   for (size_t i = 0; i < count; ++i) {                                                             \
     values[i] = (double)((const type *)image->values)[from + index[i]];                            \

@@ -69,9 +69,8 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
 
 /** Bytes of one number. */
 size_t supine_image_voxel_size(supine_image_voxel voxel);
-/** A number as a double, and back: rounded and clipped to the type. */
+/** A number as a double. */
 double supine_image_get(const supine_image *image, size_t index);
-void supine_image_set(supine_image *image, size_t index, double value);
 /** The same for the numbers from + index[0 .. count - 1], or for `count` of them from `begin`. */
 void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
                          double *values);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* CRC-64 through tables, 16 bytes a step; by carry-less multiplication, 64 bytes a step. */
+/* CRC-64 by carry-less multiplication, 64 bytes a step, where the processor has it; else by bytes.
+ */
 #include <pthread.h>
-#include <string.h>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -12,9 +12,9 @@
 
 static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* x^64 is understood */
 
-/* What is worked out once: tables [k][b] = b(x) x^(64 + 8 k) mod P, and powers of x for folding. */
+/* What is worked out once: table[b] = b(x) x^64 mod P, and powers of x for folding. */
 static struct {
-  uint64_t table[16][256];
+  uint64_t table[256];
   uint64_t far[2], near[2]; /* x^(512 + 64), x^512; x^(128 + 64), x^128 */
 } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -51,13 +51,7 @@ static void work_out(void) {
     for (int bit = 0; bit < 8; ++bit) {
       value = times_x(value);
     }
-    known.table[0][b] = value;
-  }
-  for (int k = 1; k < 16; ++k) {
-    for (unsigned b = 0; b < 256; ++b) {
-      const uint64_t value = known.table[k - 1][b];
-      known.table[k][b] = (value << 8) ^ known.table[0][value >> 56];
-    }
+    known.table[b] = value;
   }
   known.far[0] = supine_stream_crc64_power(72);
   known.far[1] = supine_stream_crc64_power(64);
@@ -65,32 +59,11 @@ static void work_out(void) {
   known.near[1] = supine_stream_crc64_power(16);
 }
 
-static uint64_t load(const unsigned char *bytes) {
-  uint64_t word = 0;
-  for (int i = 0; i < 8; ++i) {
-    word = word << 8 | bytes[i];
-  }
-  return word;
-}
-
-static uint64_t by_tables(uint64_t crc, const unsigned char *at, size_t size) {
-  for (; size >= 16; at += 16, size -= 16) {
-    const uint64_t word[2] = {load(at) ^ crc, load(at + 8)};
-    crc = 0;
-    for (int j = 0; j < 8; ++j) {
-      crc ^= known.table[15 - j][word[0] >> (56 - 8 * j) & 255] ^
-             known.table[7 - j][word[1] >> (56 - 8 * j) & 255];
-    }
-  }
+static uint64_t by_bytes(uint64_t crc, const unsigned char *at, size_t size) {
   for (; size != 0; ++at, --size) {
-    crc = (crc << 8) ^ known.table[0][(crc >> 56) ^ *at];
+    crc = (crc << 8) ^ known.table[(crc >> 56) ^ *at];
   }
   return crc;
-}
-
-uint64_t supine_stream_crc64_tables(uint64_t crc, const void *bytes, size_t size) {
-  (void)pthread_once(&once, work_out);
-  return by_tables(crc, bytes, size);
 }
 
 #ifdef CRC64_CARRY_LESS
@@ -130,7 +103,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   unsigned char rest[16]; /* worth the same as the whole message */
   const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   _mm_storeu_si128((lane *)(void *)rest, _mm_shuffle_epi8(sum, front));
-  return by_tables(0, rest, sizeof rest);
+  return by_bytes(0, rest, sizeof rest);
 }
 #endif
 
@@ -145,5 +118,5 @@ uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size) {
     size -= most;
   }
 #endif
-  return by_tables(crc, at, size);
+  return by_bytes(crc, at, size);
 }

@@ -12,12 +12,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Goes on from `crc` (0 at first) over more bytes: by carry-less multiplication where the
- * processor has it, else as supine_stream_crc64_tables. Thread-safe. */
+/** Continue from `crc` (0 at first) over more bytes. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
-
-/** The same, 16 bytes a step through 16 tables. */
-uint64_t supine_stream_crc64_tables(uint64_t crc, const void *bytes, size_t size);
 
 /** x^(8 size) mod P: what `size` more bytes multiply a checksum by. */
 uint64_t supine_stream_crc64_power(size_t size);

@@ -4,15 +4,11 @@
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { browser, open, openLungs } from './browser.mjs';
+import { basis, html } from './lungs.mjs';
 import { folder, loadCommon, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
-const mesh = join(folder, 'lungs.ply');
-const basis = join(folder, 'lungs.safetensors');
-const [html, report] = ['lungs.html', 'report.html'].map((name) => join(folder, name));
-supine('phantom', '-o', mesh, '--vertices', '500');
-supine('precompute', mesh, '-o', basis);
-supine('export', basis, '-o', html);
+const report = join(folder, 'report.html');
 supine('compare', basis, '--postures', 'supine,prone,left,supine+15', '-o', report);
 
 async function check(page, what) {
@@ -57,4 +53,3 @@ for (const colorScheme of ['light', 'dark']) {
   assert.deepEqual(second.complaints, []);
   await second.page.close();
 }
-await browser.close();

@@ -35,6 +35,9 @@ export async function openLungs(path, options, hash) {
 
 /** The picture after it has been drawn. */
 export async function picture(page) {
-  await page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+  await settled(page);
   return page.locator('#picture').screenshot();
 }
+
+/** Wait until what was changed is drawn. */
+export const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));

@@ -94,13 +94,13 @@ async function checkPointer(page) {
   assert.fail('no lung was found under the pointer');
 }
 
-const mesh = join(folder, 'lungs.ply');
+const mesh = join(folder, 'page.ply');
 const torn = join(folder, 'torn.obj');
 const bases = ['modes', 'harmonics', 'torn'].map((name) => join(folder, `${name}.safetensors`));
 supine('phantom', '-o', mesh, '--vertices', '2000');
 supine('precompute', mesh, '--law', 'paper', '-o', bases[0]);
 supine('precompute', mesh, '--law', 'paper', '-o', bases[1], '--band', '3', '--modes', 'harmonics');
-const html = join(folder, 'lungs.html');
+const html = join(folder, 'page.html');
 
 supine('export', bases[0], '-o', html, '--title', 'Lungs </title><script>alert("1")</script> & "more"');
 const { page, complaints } = await open(html);
@@ -132,4 +132,3 @@ assert.ok(largestDistance(found, moved.xyz) < TOLERANCE_MM);
 assert.ok(Math.abs(largestDistance(found, rest.xyz) - 8) < TOLERANCE_MM);
 assert.match(await opened.locator('#depth-value').textContent(), /mm/);
 assert.deepEqual(last, []);
-await browser.close();

@@ -5,18 +5,11 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture } from './browser.mjs';
+import { browser, openLungs, picture, settled } from './browser.mjs';
+import { basis, html } from './lungs.mjs';
 import { evaluate, folder, supine } from './support.mjs';
 
 const PROBE_MM = 0.06; // of a distance written with one digit
-const mesh = join(folder, 'lungs.ply');
-const basis = join(folder, 'lungs.safetensors');
-const html = join(folder, 'lungs.html');
-supine('phantom', '-o', mesh, '--vertices', '1500');
-supine('precompute', mesh, '-o', basis);
-supine('export', basis, '-o', html);
-
-const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
 
 /** Keys change what they say, and a second press or its opposite undoes it. */
@@ -380,4 +373,3 @@ assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []
 await page.close();
 await checkTouch();
 await checkMotion();
-await browser.close();

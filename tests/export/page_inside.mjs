@@ -5,7 +5,8 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture } from './browser.mjs';
+import { browser, openLungs, picture, settled } from './browser.mjs';
+import { basis } from './lungs.mjs';
 import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
@@ -13,18 +14,16 @@ const TOLERANCE_MM = 0.005; // of displacements in 16 bits
 const PRINTED_MM = 0.001;   // of a text file's numbers
 const WRITTEN_MM = 0.051;   // of a move as the table has it
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
-const files = Object.fromEntries(['lungs.ply', 'tumour.obj', 'points.csv', 'lungs.safetensors', 'inside.safetensors', 'lungs.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
+const files = Object.fromEntries(['tumour.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
 /** Four named points, and an octahedron that is a mesh. */
-supine('phantom', '-o', files['lungs.ply'], '--vertices', '1500');
-supine('precompute', files['lungs.ply'], '-o', files['lungs.safetensors']);
 const at = [[-80, -120, -90], [60, -150, -110], [70, -160, -60], [-70, -90, -150]];
 writeFileSync(files['points.csv'], `name,x,y,z\n${at.map((p, i) => `${NAMES[i]},${p.join(',')}\n`).join('')}`);
 const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]].map((c) => c.map((x, i) => 14 * x + [80, -110, -130][i]));
 const faces = [[1, 3, 5], [3, 2, 5], [2, 4, 5], [4, 1, 5], [3, 1, 6], [2, 3, 6], [4, 2, 6], [1, 4, 6]];
 writeFileSync(files['tumour.obj'], `${corners.map((c) => `v ${c.join(' ')}\n`).join('')}${faces.map((f) => `f ${f.join(' ')}\n`).join('')}`);
-supine('embed', files['lungs.safetensors'], files['points.csv'], files['tumour.obj'], '-o', files['inside.safetensors']);
-supine('export', files['lungs.safetensors'], '--inside', files['inside.safetensors'], '-o', files['lungs.html']);
+supine('embed', basis, files['points.csv'], files['tumour.obj'], '-o', files['inside.safetensors']);
+supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['inside.html']);
 
 /** What the program makes of it: {name: [places]}. */
 function deformed(posture, volume) {
@@ -36,8 +35,6 @@ function deformed(posture, volume) {
   }
   return places;
 }
-
-const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 
 /** Positions on the graphics card, in postures and at volumes, against the program's. */
 async function checkPositions(page) {
@@ -167,7 +164,7 @@ async function checkControls(page) {
   const pressed = await page.evaluate(() => [...document.querySelectorAll('#inside-rows [aria-pressed=true]')].map((e) => e.textContent));
   assert.ok(pressed.length === 2 && pressed.includes('carina'));
   await page.waitForFunction(() => /names=\d+\.\d+/.test(location.hash));
-  const { page: again } = await openLungs(files['lungs.html'], {}, await page.evaluate(() => `${location.hash}&inside=0`));
+  const { page: again } = await openLungs(files['inside.html'], {}, await page.evaluate(() => `${location.hash}&inside=0`));
   assert.deepEqual(await again.evaluate(() => [window.supine.state.named.length, document.getElementById('inside').checked]), [2, false]);
   await again.close();
 }
@@ -187,7 +184,7 @@ async function checkSizes() {
   mkdirSync('page_inside', { recursive: true });
   for (const [width, height, colorScheme] of [[1400, 900, 'light'], [900, 600, 'dark'], [844, 390, 'light'], [390, 844, 'dark']]) {
     const touch = Math.min(width, height) < 400;
-    const { page, complaints } = await openLungs(files['lungs.html'], { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left&names=0.4');
+    const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left&names=0.4');
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
     if (touch) {
       await page.touchscreen.tap(...await onPage(page, 'carina'));
@@ -208,8 +205,8 @@ async function checkSizes() {
 async function checkMany() {
   const count = 230;
   writeFileSync(files['points.csv'], `name,x,y,z\n${Array.from({ length: count }, (_, i) => `node ${i},${60 + (i % 10)},${-150 + (i % 7)},${-110 + (i % 13)}\n`).join('')}`);
-  supine('embed', files['lungs.safetensors'], files['points.csv'], '-o', files['inside.safetensors']);
-  supine('export', files['lungs.safetensors'], '--inside', files['inside.safetensors'], '-o', files['many.html']);
+  supine('embed', basis, files['points.csv'], '-o', files['inside.safetensors']);
+  supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['many.html']);
   const { page, complaints } = await openLungs(files['many.html'], { viewport: { width: 500, height: 320 } });
   const rows = () => page.evaluate(() => [...document.querySelectorAll('#inside-rows button')].map((e) => e.textContent));
   assert.equal((await rows()).length, 200);
@@ -223,7 +220,7 @@ async function checkMany() {
   await page.close();
 }
 
-const { page, complaints } = await openLungs(files['lungs.html'], { viewport: { width: 760, height: 480 } });
+const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 760, height: 480 } });
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
 await checkControls(page);
@@ -232,4 +229,3 @@ await checkLoss(page);
 await page.close();
 await checkSizes();
 await checkMany();
-await browser.close();

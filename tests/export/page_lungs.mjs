@@ -5,19 +5,13 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture } from './browser.mjs';
+import { browser, openLungs, picture, settled } from './browser.mjs';
+import { basis, html } from './lungs.mjs';
 import { evaluate, folder, largestDistance, randomDirections, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.005; // displacements in 16 bits
 const PRINTED_MM = 0.001; // of a text file's numbers
-const mesh = join(folder, 'lungs.ply');
-const basis = join(folder, 'lungs.safetensors');
-const html = join(folder, 'lungs.html');
-supine('phantom', '-o', mesh, '--vertices', '2000');
-supine('precompute', mesh, '-o', basis);
-supine('export', basis, '-o', html);
 
-const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 const both = (page, gravity, depth) => page.evaluate(([g, mL]) => [Array.from(window.supine.positions(g, mL)), Array.from(window.supine.normals(g, mL))], [gravity, depth]);
 
 /** The resting volume from the file's nine numbers, by their own definition: bands 0 to 2. */
@@ -197,4 +191,3 @@ await checkRight(page);
 assert.deepEqual(complaints, []);
 await page.close();
 await checkHeadset();
-await browser.close();

@@ -4,18 +4,10 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs } from './browser.mjs';
-import { folder, supine } from './support.mjs';
+import { browser, openLungs, settled } from './browser.mjs';
+import { html } from './lungs.mjs';
 
-const mesh = join(folder, 'lungs.ply');
-const basis = join(folder, 'lungs.safetensors');
-const html = join(folder, 'lungs.html');
-supine('phantom', '-o', mesh, '--vertices', '1500');
-supine('precompute', mesh, '-o', basis);
-supine('export', basis, '-o', html);
 mkdirSync('page_sizes', { recursive: true });
-
-const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 
 /** Letters stay off what lies over the picture, gravity's arrow and each other. */
 async function checkLetters(page, what) {
@@ -70,4 +62,3 @@ for (const [width, height] of sizes) {
     await sized.close();
   }
 }
-await browser.close();

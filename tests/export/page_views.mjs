@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What people reach for in the page: views, pan, zoom, postures, probes, cut, links, a lost context.
 import assert from 'node:assert/strict';
-import { join } from 'node:path';
-import { browser, openLungs, picture } from './browser.mjs';
-import { folder, supine } from './support.mjs';
+import { browser, openLungs, picture, settled } from './browser.mjs';
+import { basis, html } from './lungs.mjs';
 
-const mesh = join(folder, 'lungs.ply');
-const basis = join(folder, 'lungs.safetensors');
-const html = join(folder, 'lungs.html');
-supine('phantom', '-o', mesh, '--vertices', '1500');
-supine('precompute', mesh, '-o', basis);
-supine('export', basis, '-o', html);
-
-const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
 /** The letters that are shown, and where. */
 const letters = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => {
   const box = e.getBoundingClientRect();
@@ -188,4 +179,3 @@ assert.equal(goal, 'prone');
 assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
 await page.close();
 
-await browser.close();

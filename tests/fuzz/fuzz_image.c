@@ -76,10 +76,10 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
     const size_t y = i / X % Y;
     const size_t z = i / X / Y;
     const bool inside = y > 0 && y < Y - 1 && z > 0 && z < Z - 1;
-    supine_image_set(&image, i,
-                     inside && x > 0 && x < 7       ? 2.0
-                     : inside && x > 8 && x < X - 1 ? 1.0
-                                                    : 0.0);
+    supine_image_put(&image, i, 1,
+                     &(double){inside && x > 0 && x < 7       ? 2.0
+                               : inside && x > 8 && x < X - 1 ? 1.0
+                                                              : 0.0});
   }
   const char *path = supine_fuzz_file((const uint8_t *)"", 0, FUZZ_ENDING);
   const supine_status status = supine_image_write(path, &image, "a seed", NULL);

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every test of what a browser shows, in one process with one Chromium: node pages.mjs [NAME...]
+import { browser } from './browser.mjs';
+
+const all = ['page', 'page_hands', 'page_inside', 'page_lungs', 'page_views', 'page_sizes', 'accessibility', 'report'];
+for (const name of process.argv.length > 2 ? process.argv.slice(2) : all) {
+  const begin = performance.now();
+  await import(`./${name}.mjs`);
+  for (const context of browser.contexts()) await context.close();
+  console.log(`${name}: passed in ${((performance.now() - begin) / 1000).toFixed(1)} s`);
+}
+await browser.close();
