@@ -146,6 +146,8 @@ typedef struct supine_mesh_save_options {
                             vector and its magnitude as point data */
   const char *comment; /**< optional, one line */
   double millimetres_per_unit; /**< of the file; 0: 1. Displacements are in its units as well */
+  const float *expected_error; /**< optional [vertex_count] mm, whatever the unit: VTP's and PLY's
+                                    "expected_error_mm" */
   /** @{ Of VTP alone, all optional. */
   const float *normals;            /**< [vertex_count, 3]: its "Normals" */
   const unsigned char *lung;       /**< [vertex_count] number of each vertex's lung: its "lung" */

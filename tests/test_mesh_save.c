@@ -142,6 +142,35 @@ static void test_save_ply_displacement_rows(void **state) {
   supine_mesh_free(&mesh);
 }
 
+/* Millimetres also where the file is in centimetres; after the displacement where there is one. */
+static void test_save_expected_error_stays_in_millimetres(void **state) {
+  static const float errors[4] = {1.5F, 2.5F, 3.5F, 4.5F};
+  supine_mesh mesh = sample_tetrahedron();
+  for (int moved = 0; moved < 2; ++moved) {
+    const size_t row = moved ? 32 : 16;
+    const supine_mesh_save_options options = {.rest = moved ? mesh.vertices : NULL,
+                                              .millimetres_per_unit = 10.0,
+                                              .expected_error = errors};
+    char path[256];
+    size_t size = 0;
+    save(sample_path(state, "a.ply", path), &mesh, &options);
+    unsigned char *bytes = sample_read(path, &size);
+    (void)find(bytes, size, "property float expected_error_mm\n");
+    const unsigned char *rows = (const unsigned char *)find(bytes, size, "end_header\n");
+    for (size_t i = 0; i < 4; ++i) {
+      assert_true(float_at(rows + row * (i + 1) - 4) == errors[i]);
+    }
+    free(bytes);
+    assert_int_equal(unlink(path), 0);
+    save(sample_path(state, "a.vtp", path), &mesh, &options);
+    bytes = sample_read(path, &size);
+    (void)find(bytes, size, "Name=\"expected_error_mm\" NumberOfComponents=\"1\"");
+    free(bytes);
+    assert_int_equal(unlink(path), 0);
+  }
+  supine_mesh_free(&mesh);
+}
+
 static void test_save_stl_layout_and_normals(void **state) {
   supine_mesh mesh = sample_tetrahedron();
   const supine_mesh_save_options options = {
@@ -446,6 +475,7 @@ int main(void) {
       cmocka_unit_test(test_save_load_round_trip_each_format_and_axes),
       cmocka_unit_test(test_save_load_indexed_keeps_order),
       cmocka_unit_test(test_save_ply_displacement_rows),
+      cmocka_unit_test(test_save_expected_error_stays_in_millimetres),
       cmocka_unit_test(test_save_stl_layout_and_normals),
       cmocka_unit_test(test_save_vtp_layout),
       cmocka_unit_test(test_save_vtp_opens_in_vtk),

@@ -90,6 +90,7 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
   const double horizontal = (ras ? -1.0 : 1.0) / unit;
   *writer = (mesh_writer){.mesh = mesh,
                           .rest = chosen.rest,
+                          .expected_error = chosen.expected_error,
                           .normals = chosen.normals,
                           .lung = chosen.lung,
                           .fields = chosen.fields,

@@ -11,9 +11,10 @@
 typedef struct mesh_writer {
   FILE *out;
   const supine_mesh *mesh;
-  const double *rest;        /**< NULL: no displacement */
-  const float *normals;      /**< NULL: none */
-  const unsigned char *lung; /**< NULL: none */
+  const double *rest;          /**< NULL: no displacement */
+  const float *expected_error; /**< NULL: none */
+  const float *normals;        /**< NULL: none */
+  const unsigned char *lung;   /**< NULL: none */
   const supine_mesh_field *fields;
   size_t field_count;
   double factor[3];  /**< of x, y, z: the sign of the file's axes over its unit */

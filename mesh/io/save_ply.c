@@ -17,18 +17,26 @@ void supine_mesh_save_ply(const mesh_writer *writer) {
                 "property float displacement_z\nproperty float displacement_magnitude\n",
                 writer->out);
   }
+  if (writer->expected_error != NULL) {
+    (void)fputs("property float expected_error_mm\n", writer->out);
+  }
   (void)fprintf(writer->out,
                 "element face %zu\nproperty list uchar int vertex_indices\nend_header\n",
                 mesh->triangle_count);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    float row[7];
+    float row[8];
+    size_t count = 3;
     supine_mesh_writer_position(writer, i, row);
     if (writer->rest != NULL) {
       supine_mesh_writer_displacement(writer, i, row + 3);
+      count = 7;
+    }
+    if (writer->expected_error != NULL) {
+      row[count++] = writer->expected_error[i];
     }
     unsigned char bytes[sizeof row];
     unsigned char *at = bytes;
-    supine_mesh_put_f32(&at, row, writer->rest != NULL ? 7 : 3);
+    supine_mesh_put_f32(&at, row, count);
     (void)fwrite(bytes, 1, (size_t)(at - bytes), writer->out);
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {

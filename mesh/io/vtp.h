@@ -6,7 +6,7 @@
 
 #include "mesh/io/save.h"
 
-enum { VTP_ARRAYS = 7, VTP_FIRST_OF_POINTS = 3 };
+enum { VTP_ARRAYS = 8, VTP_FIRST_OF_POINTS = 3 };
 
 typedef struct vtp vtp;
 

@@ -46,6 +46,10 @@ static void fill_magnitude(const vtp *file, unsigned char **at) {
   }
 }
 
+static void fill_expected_error(const vtp *file, unsigned char **at) {
+  supine_mesh_put_f32(at, file->writer.expected_error, file->writer.mesh->vertex_count);
+}
+
 static void fill_normals(const vtp *file, unsigned char **at) {
   for (size_t i = 0; i < file->writer.mesh->vertex_count; ++i) {
     float normal[3];
@@ -72,6 +76,9 @@ supine_status supine_mesh_vtp_begin(vtp *file) {
   }
   if (writer->rest != NULL && file->times == NULL) { /* VTK and ParaView find it by themselves */
     *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4 * points, false, fill_magnitude};
+  }
+  if (writer->expected_error != NULL) {
+    *to++ = (vtp_array){"Float32", "expected_error_mm", 1, 4 * points, false, fill_expected_error};
   }
   if (writer->normals != NULL) {
     *to++ = (vtp_array){"Float32", "Normals", 3, 12 * points, false, fill_normals};
