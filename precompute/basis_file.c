@@ -235,7 +235,6 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   add(&list, "band", "%zu", field->band);
   add(&list, "modes", "%s", content->harmonics ? "harmonics" : "best");
   add(&list, "mode_count", "%zu", k);
-  add(&list, "route", "%s", content->route);
   add(&list, "units", "mm");
   add(&list, "axes", "LPS");
   add_lungs(&list, lungs, share);

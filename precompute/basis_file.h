@@ -21,7 +21,6 @@ typedef struct supine_basis_content {
   const double *resting;             /* [9] with it: the resting volume, harmonics, mL */
   const double *turned_over;         /* optional, see supine_accuracy_turned_over */
   const supine_error_table *table;   /* optional */
-  const char *route;                 /* how the field was found */
   bool harmonics;                    /* the modes are the harmonics themselves */
   const char *patient;               /* a person's own law, JSON; optional */
   const char *patient_summary;       /* whose, and how well it held out */

@@ -35,7 +35,6 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
                                           .compression = &field,
                                           .forms = forms.linear != NULL ? &forms : NULL,
                                           .accuracy = &report->accuracy,
-                                          .route = "fields",
                                           .harmonics = options->modes == 0,
                                           .made_by = made_by};
     status = supine_writer_basis_write(path, &content, error);

@@ -16,20 +16,15 @@
 
 /* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
  * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
-enum {
-  HELD_OUT_MIN = 100,
-  HELD_OUT_MAX = 1000,
-  HELD_OUT_SAMPLED_MAX = 300,
-  HELD_OUT_WORK = 20000000
-};
+enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
+
+enum { FEW_COLUMNS = 8 }; /* forms of so many cost less than a pass for each direction */
 
 static const double breath_volume =
     500.0; /* mL, that errors in mm are stated at where rest is unknown */
 
 /* Fewer modes are kept where the error stays within this factor of what the most would have. */
 static const double same_error = 1.01;
-
-static const char *const route_names[] = {"auto", "linear", "sampled", "smooth"}; /* supine_route */
 
 /* Everything between the lungs and the file. */
 typedef struct pipeline {
@@ -38,13 +33,12 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   supine_lungs anchored; /* the lungs with vertices of their own, where a scan is to be met */
   supine_reference reference;
-  supine_route route; /* as taken */
   double *directions; /* [N, 3] */
   double *weight;     /* [N] |d|^2: modes then minimise the error of displacement itself, 0.34 % RMS
                          with 16 where plain or area-weighted ones leave 0.40 and 0.42 % (a left
                          lung, soften 1) */
   supine_projection projection;
-  supine_volume_forms column_forms; /* linear route */
+  supine_volume_forms column_forms; /* where the projection has few columns */
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
   double energy; /* sum of the squares of all singular values */
@@ -106,15 +100,8 @@ static supine_status project(pipeline *p, supine_error *error) {
   if (!stage_progress(&part, 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
-  p->route = options->route != SUPINE_ROUTE_AUTO              ? options->route
-             : model->force.soften == 0.0                     ? SUPINE_ROUTE_LINEAR
-             : supine_projection_smooth_directions(model) > 0 ? SUPINE_ROUTE_SMOOTH
-                                                              : SUPINE_ROUTE_SAMPLED;
-  if (p->route == SUPINE_ROUTE_LINEAR) {
-    return supine_projection_linear(p->lungs, model, options->band, &p->projection, error);
-  }
-  return (p->route == SUPINE_ROUTE_SMOOTH ? supine_projection_smooth : supine_projection_sampled)(
-      p->lungs, model, options->band, stage_progress, &part, &p->projection, error);
+  return supine_projection_create(p->lungs, model, options->band, stage_progress, &part,
+                                  &p->projection, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
@@ -176,14 +163,14 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Volume forms of the coefficients: of the linear route's few columns, carried along; else
- * directly. */
+/* Finds the volume forms of the coefficients: those of the projection's columns carried along where
+ * these are few, else directly. */
 static supine_status find_forms(pipeline *p, supine_error *error) {
   const supine_compression *field = &p->compression;
   if (!p->lungs->topology.closed) {
     return SUPINE_OK;
   }
-  if (p->route == SUPINE_ROUTE_LINEAR) {
+  if (p->projection.rank <= FEW_COLUMNS) {
     supine_status status =
         p->column_forms.linear != NULL
             ? SUPINE_OK
@@ -217,20 +204,15 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
 }
 
 static size_t held_out_default(const pipeline *p) {
-  const size_t most = p->route == SUPINE_ROUTE_LINEAR ? HELD_OUT_MAX : HELD_OUT_SAMPLED_MAX;
   const size_t count = HELD_OUT_WORK / p->lungs->mesh.vertex_count;
-  return count < HELD_OUT_MIN ? HELD_OUT_MIN : count > most ? most : count;
+  return count < HELD_OUT_MIN ? HELD_OUT_MIN : count > HELD_OUT_MAX ? HELD_OUT_MAX : count;
 }
 
 static supine_status hold_out(pipeline *p, supine_error *error) {
   const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
-  if (p->route == SUPINE_ROUTE_LINEAR) {
-    return supine_accuracy_held_out_linear(p->lungs, &p->options->model, &p->projection,
-                                           p->lungs->topology.closed ? &p->column_forms : NULL,
-                                           count, &p->held_out, error);
-  }
-  return supine_accuracy_held_out_sampled(p->lungs, &p->options->model, p->directions,
-                                          &p->compression, count, &p->held_out, error);
+  return supine_accuracy_held_out(p->lungs, &p->options->model, p->directions, &p->projection,
+                                  p->column_forms.linear != NULL ? &p->column_forms : NULL, count,
+                                  &p->held_out, error);
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
@@ -300,7 +282,6 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->state.resting,
-                                        .route = route_names[p->route],
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,
@@ -332,9 +313,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
     status = write_file(&p, path, error);
   }
   if (status == SUPINE_OK && report != NULL) {
-    *report = (supine_precompute_report){.route = p.route,
-                                         .mode_count = p.compression.mode_count,
-                                         .solve_count = p.projection.solve_count,
+    *report = (supine_precompute_report){.mode_count = p.compression.mode_count,
+                                         .solve_count = p.projection.rank,
                                          .iterations = p.projection.iterations,
                                          .residual = p.projection.residual,
                                          .accuracy = p.accuracy,

@@ -10,21 +10,12 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-/** How the field over orientation is found. */
-typedef enum supine_route {
-  SUPINE_ROUTE_AUTO = 0, /**< linear where the law allows it, else smooth, else sampled */
-  SUPINE_ROUTE_LINEAR,   /**< needs soften = 0 */
-  SUPINE_ROUTE_SAMPLED,  /**< for any law */
-  SUPINE_ROUTE_SMOOTH    /**< for soften of some 2.5 at most */
-} supine_route;
-
 /** What a basis is made of. */
 typedef struct supine_precompute_options {
   supine_model model;
   const supine_reference *reference; /**< of the lungs; NULL: volumes count from their surface */
-  supine_route route;
-  size_t band;                 /**< L */
-  size_t modes;                /**< most modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t band;                       /**< L */
+  size_t modes;                      /**< most modes; 0: the (band + 1)^2 harmonics themselves */
   size_t held_out;             /**< directions that the error is measured on; 0: 100 to 1000 */
   const char *made_by;         /**< how it was made, for the file's metadata; optional */
   const char *patient;         /**< a person's own law (JSON), for the same; optional */
@@ -37,9 +28,8 @@ typedef struct supine_precompute_options {
 
 /** What came of it. */
 typedef struct supine_precompute_report {
-  supine_route route;
   size_t mode_count;
-  size_t solve_count; /**< right-hand sides or directions solved for the projection */
+  size_t solve_count; /**< directions solved for */
   size_t iterations;
   double residual;
   supine_accuracy accuracy;

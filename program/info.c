@@ -36,7 +36,7 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
 }
 
 static const char *const shown[] = {"assumed",        "patient",    "scanned",
-                                    "resting_shares", "law",        "route",
+                                    "resting_shares", "law",
                                     "force",          "direction",  "direction_constants",
                                     "stiffness",      "midline_mm", "reference_volume_ml",
                                     "lung_share",     "lesions",    "reach_mm",

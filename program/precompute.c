@@ -8,8 +8,8 @@
 #include "sh/base/output.h"
 #include <supine/sh.h>
 
-#include "program/model_options.h"
 #include "precompute/patient/patient_file.h"
+#include "program/model_options.h"
 
 static const char name[] = "precompute";
 
@@ -34,8 +34,6 @@ static int read_modes(const char *command, const char *text, void *field) {
                              *modes <= SUPINE_MODES_MADE_MAX);
 }
 
-static const char *const routes[] = {"auto", "linear", "sampled", "smooth",
-                                     NULL}; /* as supine_route */
 static const char *const kinds[] = {"vector", "scalar", NULL};
 
 static const supine_option table[] = {
@@ -49,13 +47,6 @@ static const supine_option table[] = {
      "3 --modes harmonics",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'"},
-    {"route", 0, "ROUTE",
-     "linear: a few solves for all directions, exact while --soften is 0 (default there); smooth: "
-     "a "
-     "polynomial through some 100 directions, for --soften up to some 2.5 (default there); "
-     "sampled: "
-     "a solve for each direction of a grid",
-     SUPINE_FILLS(request, basis.route), .choices = routes},
     {"held-out", 0, "N", "directions that the error is measured on; default 100 to 1000",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}},
     {"patient", 0, "FILE",

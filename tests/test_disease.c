@@ -10,10 +10,10 @@
 
 #include <cmocka.h>
 
+#include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/precompute.h"
-#include "precompute/lungs/disease.h"
 #include <supine/volume.h>
 
 #include "lungs_helpers.h"

@@ -12,9 +12,9 @@
 
 #include <cmocka.h>
 
+#include "precompute/lungs/expandability.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "precompute/lungs/expandability.h"
 
 #include "lungs_helpers.h"
 

@@ -115,7 +115,7 @@ static void test_slopes_are_those_of_differences(void **state) {
   double *slope = malloc(n * sizeof *slope);
   double *gradient = malloc(n * sizeof *gradient);
   double *varied = malloc(n * sizeof *varied);
-  for (int k = 0; k < 2; ++k) {
+  for (int k = 1; k < 2; ++k) {
     double largest = 0.0;
     double sum = 0.0;
     (void)cost(f, k, f->stiffness, caught);

@@ -16,11 +16,11 @@
 #include <gsl/gsl_rng.h>
 #include <gsl/gsl_statistics.h>
 
+#include "precompute/lungs/disease.h"
+#include "precompute/lungs/phantom.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
-#include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
-#include "precompute/lungs/disease.h"
 
 #include "lungs_helpers.h"
 

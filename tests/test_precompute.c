@@ -69,7 +69,7 @@ static supine_precompute_report make_basis(const supine_lungs *lungs, size_t ban
                                        .modes = modes,
                                        .held_out = held_out};
   options.model.force.soften = soften;
-  options.model.reach = reach;
+  options.model.reach = soften != 0.0 ? 10.0 : reach;
   supine_precompute_report report;
   supine_error error;
   if (supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK) {
@@ -291,6 +291,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   double field2[HELD_OUT];
   double error_mm2[HELD_OUT];
   model.force.soften = soften;
+  model.reach = soften != 0.0 ? 10.0 : 0.0;
   supine_accuracy_held_out_directions(HELD_OUT, g);
   true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
   const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
@@ -325,6 +326,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
     random_direction(&seed, g + 3 * d);
   }
   model.force.soften = soften;
+  model.reach = soften != 0.0 ? 10.0 : 0.0;
   true_errors(lungs, &model, basis, CHECKED, g, stated->volume, error2, field2, error_mm2);
   const sample_mean error = mean_of(CHECKED, error2);
   const sample_mean field = mean_of(CHECKED, field2);
@@ -477,7 +479,7 @@ static void test_precompute_default_law_keeps_four_modes(void **state) {
   supine_lungs lungs = phantom(1000);
   const supine_precompute_report report = make_basis(&lungs, 15, 16, 0.0, 0);
   assert_int_equal(report.mode_count, 4);
-  assert_int_equal(report.route, SUPINE_ROUTE_LINEAR);
+  assert_int_equal(report.solve_count, 4);
   supine_lungs_free(&lungs);
 }
 
@@ -564,7 +566,8 @@ static void test_turned_over_looks_at_either_end_of_an_axis(void **state) {
   supine_volume_forms forms = {0};
   assert_int_equal(supine_physics_directions(&lungs, &model.direction, directions, NULL),
                    SUPINE_OK);
-  assert_int_equal(supine_projection_linear(&lungs, &model, 3, &projection, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_create(&lungs, &model, 3, NULL, NULL, &projection, NULL),
+                   SUPINE_OK);
   assert_int_equal(supine_projection_compress_harmonics(&projection, &field, NULL), SUPINE_OK);
   assert_int_equal(supine_projection_compression_volume_forms(&field, &lungs, model.share,
                                                               directions, &forms, NULL),
@@ -641,20 +644,18 @@ static bool stop_once(void *context, double fraction) {
 
 static void test_precompute_interrupted_anywhere_leaves_old_file(void **state) {
   (void)state;
-  static const supine_route routes[] = {SUPINE_ROUTE_LINEAR, SUPINE_ROUTE_SAMPLED,
-                                        SUPINE_ROUTE_SMOOTH};
   supine_lungs lungs = phantom(200);
-  for (size_t r = 0; r < sizeof routes / sizeof *routes; ++r) {
+  for (size_t r = 0; r < 2; ++r) {
     (void)make_basis(&lungs, 3, 0, 0.0, 0);
     int due = 0;
     supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                         .route = routes[r],
                                          .band = 7,
                                          .modes = 9,
                                          .held_out = 20,
                                          .progress = stop_once,
                                          .progress_context = &due};
     options.model.force.soften = r == 0 ? 0.0 : 0.5;
+    options.model.reach = 10.0;
     supine_status status = SUPINE_ERROR_INTERRUPTED;
     int calls = 0;
     for (; status == SUPINE_ERROR_INTERRUPTED; ++calls) {
@@ -697,8 +698,7 @@ static void test_precompute_bad_options_refused(void **state) {
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  options.route = SUPINE_ROUTE_LINEAR;
-  options.model.force.soften = 1.0;
+  options.model.force.soften = 1.0; /* without a reach */
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

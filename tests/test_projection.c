@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The two routes of projection against each other, and modes against a plain singular value
- * decomposition. */
+/* The projection against full solves and a plain quadrature, and modes against a plain singular
+ * value decomposition. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,10 +12,10 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include "precompute/projection/tally.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "precompute/projection/tally.h"
 #include "sh/grid.h"
 #include <supine/sh.h>
 
@@ -53,151 +53,142 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* The rule is fine enough for the kinks of the lowest and highest vertex: a rule of many times the
- * directions gives the same functions, but for what is far below any error that a basis states. */
-static void test_linear_rule_is_fine_enough_for_the_kinks(void **state) {
-  enum { FINE = 512 };
+/* Weights of the span at some directions, [count, R]. */
+static double *weights_at(const supine_lungs *lungs, const supine_model *model,
+                          const supine_span *span, size_t count, const double *g) {
+  double *range = malloc(2 * count * sizeof *range);
+  double *weights = malloc(count * span->rank * sizeof *weights);
+  assert_int_equal(
+      supine_physics_height_range(lungs, model->force.pair, count, g, range, range + count),
+      SUPINE_OK);
+  const supine_gravities gravities = {count, g, range, range + count};
+  assert_int_equal(supine_projection_span_weights(lungs, &model->force, span, &gravities, weights),
+                   SUPINE_OK);
+  free(range);
+  return weights;
+}
+
+/* The grid is fine enough for the kinks of the lowest and highest vertex: one of many times the
+ * directions, summed one by one, gives the same functions, but for what is far below any error that
+ * a basis states. */
+static void test_projection_grid_is_fine_enough_for_the_kinks(void **state) {
+  enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
-  static const double most[] = {5e-5, 2e-5}; /* 3.5e-5 and 1e-5 are what they are */
+  static const double most[] = {5e-5, 2e-5};
   for (size_t b = 0; b < 2; ++b) {
     const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
     const size_t terms = supine_sh_count(bands[b]);
     supine_projection made;
-    supine_projection fine;
-    assert_int_equal(supine_projection_linear(*state, &model, bands[b], &made, NULL), SUPINE_OK);
-    assert_int_equal(
-        supine_projection_linear_rule(*state, &model, bands[b], FINE, FINE + 1, &fine, NULL),
-        SUPINE_OK);
+    supine_sh_grid *grid = NULL;
+    assert_int_equal(supine_projection_create(*state, &model, bands[b], NULL, NULL, &made, NULL),
+                     SUPINE_OK);
+    assert_int_equal(supine_sh_grid_create(LATITUDES, LONGITUDES, &grid), SUPINE_OK);
+    double *fine = calloc(made.rank * terms, sizeof *fine);
+    double *g = malloc(3 * LATITUDES * LONGITUDES * sizeof *g);
+    double y[256];
+    for (size_t d = 0; d < LATITUDES * LONGITUDES; ++d) {
+      supine_sh_grid_direction(grid, d / LONGITUDES, d % LONGITUDES, g + 3 * d);
+    }
+    double *weights = weights_at(*state, &model, made.span, LATITUDES * LONGITUDES, g);
+    for (size_t d = 0; d < LATITUDES * LONGITUDES; ++d) {
+      const double share = grid->weight[d / LONGITUDES] * 2.0 * M_PI / LONGITUDES;
+      assert_int_equal(supine_sh_evaluate(bands[b], g + 3 * d, y), SUPINE_OK);
+      for (size_t r = 0; r < made.rank; ++r) {
+        for (size_t t = 0; t < terms; ++t) {
+          fine[r * terms + t] += share * weights[d * made.rank + r] * y[t];
+        }
+      }
+    }
     double missed = 0.0;
     double all = 0.0;
     for (size_t i = 0; i < made.rank * terms; ++i) {
-      missed += pow(made.functions[i] - fine.functions[i], 2.0);
-      all += pow(fine.functions[i], 2.0);
+      missed += pow(made.functions[i] - fine[i], 2.0);
+      all += pow(fine[i], 2.0);
     }
+    printf("band %zu: %.1e of the functions folds back\n", bands[b], sqrt(missed / all));
     assert_true(sqrt(missed / all) < most[b]);
     supine_projection_free(&made);
-    supine_projection_free(&fine);
+    supine_sh_grid_destroy(grid);
+    free(fine);
+    free(g);
+    free(weights);
   }
 }
 
-/* Both routes are sums of the same solves: they agree to rounding where they use the same rule. */
-static void test_routes_agree_where_stiffness_does_not_turn(void **state) {
-  const supine_lungs *lungs = *state;
-  enum { BAND = 5 };
+/* The transfer does not turn: what it makes of a few forces sums to what it makes of any, to
+ * rounding without softening, and to a hundredth of what modes leave with it. */
+static void check_superposition(const supine_lungs *lungs, const supine_model *model,
+                                size_t rank_most, double most) {
+  enum { COUNT = 20 };
   const size_t n = lungs->mesh.vertex_count;
-  const size_t terms = supine_sh_count(BAND);
-  supine_projection linear;
-  supine_projection sampled;
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  model.force = (supine_force_law){.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
+  supine_projection made;
+  double g[3 * COUNT];
+  double missed = 0.0;
+  double all = 0.0;
+  assert_int_equal(supine_projection_create(lungs, model, 3, NULL, NULL, &made, NULL), SUPINE_OK);
+  supine_accuracy_held_out_directions(COUNT, g);
+  double *weights = weights_at(lungs, model, made.span, COUNT, g);
+  for (size_t d = 0; d < COUNT; ++d) {
+    supine_solution solution = {0};
+    assert_int_equal(supine_physics_solve(lungs, model, g + 3 * d, &solution, NULL), SUPINE_OK);
+    for (size_t i = 0; i < n; ++i) {
+      double sum = 0.0;
+      for (size_t r = 0; r < made.rank; ++r) {
+        sum += made.columns[i * made.rank + r] * weights[d * made.rank + r];
+      }
+      missed += pow(sum - solution.catch_[i], 2.0);
+      all += pow(solution.catch_[i], 2.0);
+    }
+    supine_physics_solution_free(&solution);
+  }
+  printf("soften %g, reach %g: %zu solves, %.1e RMS from the full solve\n", model->force.soften,
+         model->reach, made.rank, sqrt(missed / all));
+  assert_true(made.rank <= rank_most);
+  assert_true(sqrt(missed / all) < most);
+  supine_projection_free(&made);
+  free(weights);
+}
+
+static void test_projection_few_solves_sum_to_any_full_solve(void **state) {
+  const supine_lungs *lungs = *state;
+  const size_t n = lungs->mesh.vertex_count;
+  static const double softens[] = {0.0, 0.5, 1.0, 2.0, 5.0};
+  static const size_t ranks[] = {5, 28, 38, 58, 100};
   double *stiffness = malloc(n * sizeof *stiffness);
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   for (size_t i = 0; i < n; ++i) {
     stiffness[i] = exp(0.01 * lungs->mesh.vertices[3 * i + 2]);
   }
   model.stiffness = stiffness;
   model.tolerance = 1e-13;
-  size_t latitudes;
-  size_t longitudes;
-  assert_int_equal(supine_sh_grid_size(BAND, 0.0, &latitudes, &longitudes), SUPINE_OK);
-  assert_int_equal(
-      supine_projection_linear_rule(lungs, &model, BAND, latitudes, longitudes, &linear, NULL),
-      SUPINE_OK);
-  assert_int_equal(supine_projection_sampled(lungs, &model, BAND, NULL, NULL, &sampled, NULL),
-                   SUPINE_OK);
-  assert_int_equal(linear.rank, 5);
-  assert_int_equal(sampled.rank, terms);
-  double *a = coefficients_of(&linear);
-  double *b = coefficients_of(&sampled);
-  const double difference = helper_difference(n * terms, a, b) / helper_largest(n * terms, a);
-  printf("linear and sampled routes: %.1e of the largest coefficient\n", difference);
-  assert_true(difference <= 1e-10);
-  free(a);
-  free(b);
-  free(stiffness);
-  supine_projection_free(&linear);
-  supine_projection_free(&sampled);
-}
-
-/* Where the stiffness does not turn, the field is a polynomial of degree 1 in what the smooth route
- * fits, and its rule is the linear route's. */
-static void test_smooth_route_is_exact_where_stiffness_does_not_turn(void **state) {
-  const supine_lungs *lungs = *state;
-  enum { BAND = 5 };
-  const size_t values = lungs->mesh.vertex_count * supine_sh_count(BAND);
-  supine_projection linear;
-  supine_projection smooth;
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  model.force = (supine_force_law){.base = 0.2, .gain = 1.4, .box = {0.3, -0.1, 0.25}};
-  model.tolerance = 1e-13;
-  assert_int_equal(supine_projection_linear(lungs, &model, BAND, &linear, NULL), SUPINE_OK);
-  assert_int_equal(supine_projection_smooth(lungs, &model, BAND, NULL, NULL, &smooth, NULL),
-                   SUPINE_OK);
-  assert_int_equal(smooth.solve_count, supine_projection_smooth_directions(&model));
-  double *a = coefficients_of(&linear);
-  double *b = coefficients_of(&smooth);
-  assert_true(helper_difference(values, a, b) <= 1e-10 * helper_largest(values, a));
-  free(a);
-  free(b);
-  supine_projection_free(&linear);
-  supine_projection_free(&smooth);
-}
-
-/* Of low even bands next to nothing of the kinks folds back (h(-g) = 1 - h(g)), so that there a
- * grid is as exact as its solves; in all it errs by a third of what lies beyond its band
- * (sh/grid.h). */
-static void test_smooth_route_agrees_with_a_grid(void **state) {
-  const supine_lungs *lungs = *state;
-  enum { BAND = 23, LOW = 4 };
-  static const double softens[] = {1.0, 1.0, 2.0};
-  static const double reaches[] = {0.0, 50.0, 10.0};
-  const size_t n = lungs->mesh.vertex_count;
-  const size_t terms = supine_sh_count(BAND);
-  for (size_t c = 0; c < sizeof softens / sizeof *softens; ++c) {
-    supine_projection smooth;
-    supine_projection grid;
-    supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-    model.force.soften = softens[c];
-    model.reach = reaches[c];
-    assert_int_equal(supine_projection_smooth(lungs, &model, BAND, NULL, NULL, &smooth, NULL),
-                     SUPINE_OK);
-    assert_int_equal(supine_projection_sampled(lungs, &model, BAND, NULL, NULL, &grid, NULL),
-                     SUPINE_OK);
-    double *a = coefficients_of(&smooth);
-    double *b = coefficients_of(&grid);
-    double low = 0.0;
-    double high = 0.0;
-    double all = 0.0;
-    for (size_t i = 0; i < n * terms; ++i) {
-      const double miss = (a[i] - b[i]) * (a[i] - b[i]);
-      const size_t band = (size_t)sqrt((double)(i % terms));
-      low += band <= LOW && band % 2 == 0 ? miss : 0.0;
-      high += miss;
-      all += b[i] * b[i];
-    }
-    printf("soften %g, reach %g: %zu directions in %zu steps against %zu in %zu: low even bands "
-           "%.1e, all %.1e\n",
-           softens[c], reaches[c], smooth.solve_count, smooth.iterations, grid.solve_count,
-           grid.iterations, sqrt(low / all), sqrt(high / all));
-    assert_true(smooth.iterations <= 15 && grid.iterations <= 15);
-    assert_true(sqrt(low / all) <= 2e-4); /* what smooth.c promises */
-    assert_true(sqrt(high / all) <= 2e-3);
-    free(a);
-    free(b);
-    supine_projection_free(&smooth);
-    supine_projection_free(&grid);
+  check_superposition(lungs, &model, 4, 1e-12);
+  model = supine_physics_model(SUPINE_LAW_DEEP);
+  model.force.box[0] = 0.3;
+  model.stiffness = stiffness;
+  for (size_t k = 0; k < sizeof softens / sizeof *softens; ++k) {
+    model.force.soften = softens[k];
+    model.tolerance = softens[k] == 0.0 ? 1e-13 : 0.0;
+    check_superposition(lungs, &model, ranks[k], softens[k] == 0.0 ? 1e-12 : 3e-4);
   }
+  free(stiffness);
 }
 
-static void test_smooth_route_refuses_what_no_polynomial_follows(void **state) {
+static void test_projection_impossible_softening_refused(void **state) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection;
   supine_error error;
-  model.force.soften = 4.0;
-  assert_int_equal(supine_projection_smooth_directions(&model), 0);
-  assert_int_equal(supine_projection_smooth(*state, &model, 5, NULL, NULL, &projection, &error),
+  model.force.soften = 1.0;
+  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_string_equal(error.message,
-                      "soften 4 is too much for a polynomial: take the sampled route");
+  assert_non_null(strstr(error.message, "--soften needs a reach"));
+  model.reach = 10.0;
+  model.force.soften = 40.0;
+  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "at most 5"));
+  model.force = (supine_force_law){0};
+  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
+                   SUPINE_ERROR_NUMERICAL);
 }
 
 /* Singular values and reproduced fields against a dense decomposition of the weighted matrix. */
@@ -268,17 +259,14 @@ static void test_modes_equal_dense_decomposition(void **state) {
   }
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection;
-  assert_int_equal(supine_projection_linear(lungs, &model, 5, &projection, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_create(lungs, &model, 5, NULL, NULL, &projection, NULL),
+                   SUPINE_OK);
   check_modes(&projection, weight, 3);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
   model.force.soften = 1.0;
-  assert_int_equal(supine_projection_sampled(lungs, &model, 5, NULL, NULL, &projection, NULL),
-                   SUPINE_OK);
-  check_modes(&projection, weight, 7);
-  check_modes(&projection, weight, 16);
-  supine_projection_free(&projection);
-  assert_int_equal(supine_projection_smooth(lungs, &model, 5, NULL, NULL, &projection, NULL),
+  model.reach = 10.0;
+  assert_int_equal(supine_projection_create(lungs, &model, 5, NULL, NULL, &projection, NULL),
                    SUPINE_OK);
   check_modes(&projection, weight, 7);
   check_modes(&projection, weight, 16);
@@ -299,6 +287,7 @@ static void test_modes_beat_harmonics_of_the_same_number(void **state) {
                                            .modes = k == 0 ? 0 : 16};
       supine_precompute_report report;
       options.model.force.soften = softens[s];
+      options.model.reach = 10.0;
       assert_int_equal(supine_precompute(lungs, &options, path, &report, NULL), SUPINE_OK);
       error[k] = report.accuracy.relative_rms;
     }
@@ -352,11 +341,9 @@ static void test_tally_percentile_is_the_edge_above(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_routes_agree_where_stiffness_does_not_turn),
-      cmocka_unit_test(test_smooth_route_is_exact_where_stiffness_does_not_turn),
-      cmocka_unit_test(test_smooth_route_agrees_with_a_grid),
-      cmocka_unit_test(test_smooth_route_refuses_what_no_polynomial_follows),
-      cmocka_unit_test(test_linear_rule_is_fine_enough_for_the_kinks),
+      cmocka_unit_test(test_projection_few_solves_sum_to_any_full_solve),
+      cmocka_unit_test(test_projection_impossible_softening_refused),
+      cmocka_unit_test(test_projection_grid_is_fine_enough_for_the_kinks),
       cmocka_unit_test(test_modes_equal_dense_decomposition),
       cmocka_unit_test(test_modes_end_where_rounding_begins),
       cmocka_unit_test(test_tally_percentile_is_the_edge_above),

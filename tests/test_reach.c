@@ -11,9 +11,9 @@
 
 #include <gsl/gsl_linalg.h>
 
+#include "precompute/lungs/disease.h"
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
-#include "precompute/lungs/disease.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -89,8 +89,10 @@ static void test_reach_equals_dense_definition(void **state) {
   }
   gsl_matrix *weight = gsl_matrix_calloc(nodes, nodes); /* 1 / D */
   double *s = calloc(nodes, sizeof *s);
+  double *a = calloc(n, sizeof *a);
   for (size_t i = 0; i < n; ++i) {
-    s[i] = 1.0 / (e[i] / exp(mean_log));
+    a[i] = 1.0 / (e[i] / exp(mean_log)); /* expandability: beside the force */
+    s[i] = 1.0;
     gsl_matrix_set(weight, i, i, area[i] / mean);
   }
   for (size_t k = 0; k < lungs.topology.edge_count; ++k) {
@@ -110,7 +112,7 @@ static void test_reach_equals_dense_definition(void **state) {
           mesh->vertices[3 * (size_t)edge[0] + x] - mesh->vertices[3 * (size_t)edge[1] + x];
       h2 += step * step;
     }
-    s[n + k] = 0.5 * (1.0 / s[edge[0]] + 1.0 / s[edge[1]]);
+    s[n + k] = 1.0;
     for (size_t c = 0; c < 2; ++c) {
       const double w = 4.0 * reach * reach / mean * own / h2;
       gsl_matrix_set(weight, edge[c], n + k, w);
@@ -131,7 +133,7 @@ static void test_reach_equals_dense_definition(void **state) {
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    gsl_vector_set(b, i, area[i] / mean * force[i]);
+    gsl_vector_set(b, i, area[i] / mean * a[i] * force[i]);
   }
   gsl_permutation *p = gsl_permutation_alloc(nodes);
   int sign;
@@ -146,7 +148,7 @@ static void test_reach_equals_dense_definition(void **state) {
     const double caught = s[i] * own / z[i] * gsl_vector_get(x, i); /* Te[i->i] x_i */
     assert_true(fabs(own * found[i] - caught) < 1e-10 * largest);
     balance += own * found[i];
-    given += own * force[i];
+    given += own * a[i] * force[i];
   }
   assert_true(fabs(balance - given) < 1e-10 * given);
   gsl_permutation_free(p);
@@ -158,6 +160,7 @@ static void test_reach_equals_dense_definition(void **state) {
   free(force);
   free(area);
   free(s);
+  free(a);
   free(z);
   free(found);
   supine_lungs_free(&lungs);
@@ -287,12 +290,47 @@ static void test_reach_is_a_length_where_links_are_not(void **state) {
   assert_true(without[2] < 0.6 * without[0]);
 }
 
+/* Twice as expandable tissue moves twice as far, outside the reach of where it ends. */
+static void test_reach_twice_expandable_half_moves_twice_as_far(void **state) {
+  (void)state;
+  const double reach = 10.0;
+  supine_lungs lungs = lungs_of(sphere(24, 0.1), reach);
+  const size_t n = lungs.mesh.vertex_count;
+  double *force = irregular(n, 0.7, 0.0, 1);
+  double *e = irregular(n, 1.0, 0.0, 1);
+  for (size_t i = 0; i < n; ++i) {
+    e[i] = lungs.mesh.vertices[3 * i + 2] > 0.0 ? 0.5 : 1.0;
+  }
+  double *even = solve(&lungs, NULL, force);
+  double *uneven = solve(&lungs, e, force);
+  double largest = 0.0;
+  double ratio[2] = {0.0, 0.0};
+  double count[2] = {0.0, 0.0};
+  for (size_t i = 0; i < n; ++i) {
+    const double z = lungs.mesh.vertices[3 * i + 2];
+    if (fabs(z) > 5.0 * reach) {
+      ratio[z > 0.0] += uneven[i] / even[i];
+      count[z > 0.0] += 1.0;
+      largest = fmax(largest, fabs(uneven[i] / even[i] / (z > 0.0 ? M_SQRT2 : M_SQRT1_2) - 1.0));
+    }
+  }
+  printf("a = 2 beside 1: %.3f to %.3f of even tissue\n", ratio[1] / count[1], ratio[0] / count[0]);
+  assert_true(largest < 0.02);
+  assert_true(fabs(ratio[1] / count[1] / (ratio[0] / count[0]) - 2.0) < 0.02);
+  free(force);
+  free(e);
+  free(even);
+  free(uneven);
+  supine_lungs_free(&lungs);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_reach_equals_dense_definition),
       cmocka_unit_test(test_reach_constant_force_stays_constant),
       cmocka_unit_test(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does),
       cmocka_unit_test(test_reach_is_a_length_where_links_are_not),
+      cmocka_unit_test(test_reach_twice_expandable_half_moves_twice_as_far),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,14 +47,11 @@ static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precomput
   return bytes;
 }
 
-static void check(supine_route route, double soften, double reach) {
+static void check(double soften, double reach) {
   static const char *const threads[] = {"2", "3", "7"};
   supine_lungs lungs = phantom();
-  supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                       .route = route,
-                                       .band = 3,
-                                       .modes = 8,
-                                       .held_out = 20};
+  supine_precompute_options options = {
+      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 3, .modes = 8, .held_out = 20};
   options.model.force.soften = soften;
   options.model.reach = reach;
   size_t size;
@@ -76,27 +73,16 @@ static void check(supine_route route, double soften, double reach) {
   (void)unsetenv("SUPINE_THREADS");
 }
 
-static void test_linear_route_same_bytes(void **state) {
+static void test_basis_any_thread_count_same_bytes(void **state) {
   (void)state;
-  check(SUPINE_ROUTE_LINEAR, 0.0, 0.0);
-  check(SUPINE_ROUTE_LINEAR, 0.0, 10.0);
-}
-
-static void test_sampled_route_same_bytes(void **state) {
-  (void)state;
-  check(SUPINE_ROUTE_SAMPLED, 1.0, 0.0);
-}
-
-static void test_smooth_route_same_bytes(void **state) {
-  (void)state;
-  check(SUPINE_ROUTE_SMOOTH, 1.0, 10.0);
+  check(0.0, 0.0);
+  check(0.0, 10.0);
+  check(1.0, 10.0);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_linear_route_same_bytes),
-      cmocka_unit_test(test_sampled_route_same_bytes),
-      cmocka_unit_test(test_smooth_route_same_bytes),
+      cmocka_unit_test(test_basis_any_thread_count_same_bytes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,8 +12,8 @@
 #include "sh/transform.h"
 #include <supine/sh.h>
 
-#include "precompute/projection/tally.h"
 #include "precompute/projection/compression.h"
+#include "precompute/projection/tally.h"
 
 /* Directions determine a band while the harmonics there are no closer to dependent than this, and
  * no direction is fitted by itself alone. */
@@ -330,8 +330,7 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
   const size_t m = w->fields->direction_count;
   const size_t terms = w->chosen.terms;
   supine_projection *made = &w->projection;
-  *made =
-      (supine_projection){.vertex_count = w->rows, .band = band, .rank = terms, .solve_count = m};
+  *made = (supine_projection){.vertex_count = w->rows, .band = band, .rank = terms};
   made->columns = calloc(w->rows * terms + 1, sizeof *made->columns);
   if (made->columns == NULL) {
     (void)supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu coefficients",

@@ -18,11 +18,10 @@ static void radius_range(void *context, size_t begin, size_t end, size_t thread)
   (void)thread;
   const pass *p = context;
   const supine_stage *stage = &p->system->stage[0];
-  const size_t lanes = p->system->lanes;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     const size_t last = end - block < SUPINE_SUM_ROWS ? end : block + SUPINE_SUM_ROWS;
     float most = 0.0F;
-    for (size_t at = block * lanes; at < last * lanes; ++at) {
+    for (size_t at = block; at < last; ++at) {
       const float share = 1.0F - stage->mass[at] * stage->inverse[at];
       most = share > most ? share : most;
     }
@@ -52,11 +51,11 @@ SUPINE_INLINE void step_rows(size_t lanes, const pass *p, size_t begin, size_t e
     float out[SUPINE_RHS_MAX];
     const float *from = p->from + i * lanes;
     const float *right = stage->right + i * lanes;
-    const float *inverse = stage->inverse + i * lanes;
+    const float inverse = stage->inverse[i];
     float *restrict to = p->to + i * lanes;
     supine_physics_stage_image(lanes, stage, p->from, i, out);
     SUPINE_EACH_LANE(r, lanes) {
-      to[r] += p->omega * (from[r] - to[r] + inverse[r] * (right[r] - out[r]));
+      to[r] += p->omega * (from[r] - to[r] + inverse * (right[r] - out[r]));
     }
   }
 }
@@ -72,9 +71,12 @@ static void begin_range(void *context, size_t begin, size_t end, size_t thread) 
   (void)thread;
   const pass *p = context;
   const supine_stage *stage = &p->system->stage[0];
-  for (size_t at = begin * p->system->lanes; at < end * p->system->lanes; ++at) {
-    stage->solution[at] = stage->inverse[at] * stage->right[at];
-    stage->work[at] = 0.0F;
+  const size_t lanes = p->system->lanes;
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t at = i * lanes; at < (i + 1) * lanes; ++at) {
+      stage->solution[at] = stage->inverse[i] * stage->right[at];
+      stage->work[at] = 0.0F;
+    }
   }
 }
 

@@ -62,18 +62,18 @@ SUPINE_INLINE void update_rows(size_t lanes, const pass *p, size_t begin, size_t
   float *restrict direction = work->direction;
   float *restrict product = work->product;
   double *restrict solution = work->solution;
-  const float *restrict inverse = stage->inverse;
   const float *restrict image = stage->work;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     double rr[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
+      const float inverse = stage->inverse[i];
       SUPINE_EACH_LANE(r, lanes) {
         const size_t at = i * lanes + r;
         direction[at] = z[at] + p->beta[r] * direction[at];
         product[at] = image[at] + p->beta[r] * product[at];
         solution[at] += p->step[r] * (double)direction[at];
         residual[at] -= p->alpha[r] * product[at];
-        const float scaled = inverse[at] * residual[at];
+        const float scaled = inverse * residual[at];
         z[at] = p->first * scaled;
         rr[r] += (double)(scaled * residual[at]);
       }
@@ -94,9 +94,11 @@ static void begin_range(void *context, size_t begin, size_t end, size_t thread) 
   const pass *p = context;
   const size_t lanes = p->work->system->lanes;
   const supine_stage *stage = &p->work->system->stage[0];
-  for (size_t at = begin * lanes; at < end * lanes; ++at) {
-    stage->solution[at] = p->first * stage->inverse[at] * stage->right[at];
-    p->work->direction[at] = p->work->product[at] = 0.0F;
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t at = i * lanes; at < (i + 1) * lanes; ++at) {
+      stage->solution[at] = p->first * stage->inverse[i] * stage->right[at];
+      p->work->direction[at] = p->work->product[at] = 0.0F;
+    }
   }
 }
 

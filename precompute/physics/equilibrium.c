@@ -20,17 +20,14 @@ static const double column_tolerance = 1e-14;
 struct supine_equilibrium {
   const supine_network *network;
   size_t rhs_max;
-  double *stiffness; /* [N] E, geometric mean 1, file's order */
-  double *give;      /* [N] S = 1 / E, internal order */
-  double *lane_give; /* [N, lanes] the same where every lane has its own; NULL until one has */
-  size_t lane_count; /* of lane_give; 0: all lanes share one stiffness */
-  size_t prepared;   /* lanes that the system is set up for; 0: none */
-  size_t count;      /* of the last solve */
-  double *solution;  /* [N, lanes] t */
+  double *give;     /* [N] S of the operator, internal order: 1 / E, with a reach 1 */
+  double *load;     /* [N] what a force of 1 weighs on the right: 1, with a reach area / E */
+  bool prepared;    /* the system is set up for the stiffness */
+  size_t count;     /* right-hand sides of this solve */
+  double *solution; /* [N, count] t */
   supine_system system;
-  double radius;      /* of its eigenvalues over its diagonal about 1 */
-  float *lane_single; /* [N, lanes] S, without a reach, where every lane has its stiffness */
-  supine_rows links;  /* without a reach: the network's, with values of one stiffness */
+  double radius;     /* of its eigenvalues over its diagonal about 1 */
+  supine_rows links; /* without a reach: the network's, with values of the stiffness */
   supine_gradients gradients;
 };
 
@@ -44,11 +41,9 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
       free(stage->right);
       free(stage->work);
     }
-    free(equilibrium->lane_single);
     free(equilibrium->links.value);
-    free(equilibrium->stiffness);
     free(equilibrium->give);
-    free(equilibrium->lane_give);
+    free(equilibrium->load);
     free(equilibrium->solution);
     free(equilibrium->gradients.direction);
     free(equilibrium->gradients.product);
@@ -57,9 +52,10 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
   }
 }
 
-static bool allocate_stage(supine_stage *stage, size_t values) {
-  stage->mass = malloc(values * sizeof(float));
-  stage->inverse = malloc(values * sizeof(float));
+static bool allocate_stage(supine_stage *stage, size_t rows, size_t lanes) {
+  const size_t values = rows * lanes;
+  stage->mass = malloc(rows * sizeof(float));
+  stage->inverse = malloc(rows * sizeof(float));
   stage->solution = malloc(values * sizeof(float));
   stage->right = malloc(values * sizeof(float));
   stage->work = malloc(values * sizeof(float));
@@ -78,7 +74,7 @@ static bool allocate_system(supine_equilibrium *eq) {
     system->stage[0].links = &eq->links;
     system->stage_count = 1;
     return eq->links.value != NULL &&
-           allocate_stage(&system->stage[0], net->vertex_count * eq->rhs_max);
+           allocate_stage(&system->stage[0], net->vertex_count, eq->rhs_max);
   }
   system->stage_count = net->coarse->level_count;
   for (size_t k = 0; k < system->stage_count && whole; ++k) {
@@ -86,7 +82,7 @@ static bool allocate_system(supine_equilibrium *eq) {
     system->stage[k].links = &level->links;
     system->stage[k].part = &level->part;
     system->stage[k].whole = &level->whole;
-    whole = allocate_stage(&system->stage[k], level->links.count * eq->rhs_max);
+    whole = allocate_stage(&system->stage[k], level->links.count, eq->rhs_max);
   }
   return whole;
 }
@@ -107,15 +103,15 @@ supine_status supine_physics_equilibrium_create(const supine_network *network, s
   made->network = network;
   made->rhs_max = rhs_max;
   made->system.threads = threads == 0 ? supine_thread_count() : threads;
-  made->stiffness = malloc(n * sizeof(double));
   made->give = malloc(n * sizeof(double));
+  made->load = malloc(n * sizeof(double));
   made->solution = malloc(n * rhs_max * sizeof(double));
   gradients->system = &made->system;
   gradients->solution = made->solution;
   gradients->direction = malloc(n * rhs_max * sizeof(float));
   gradients->product = malloc(n * rhs_max * sizeof(float));
   gradients->sums = malloc(blocks * 2 * rhs_max * sizeof(double));
-  if (!allocate_system(made) || made->stiffness == NULL || made->give == NULL ||
+  if (!allocate_system(made) || made->give == NULL || made->load == NULL ||
       made->solution == NULL || gradients->direction == NULL || gradients->product == NULL ||
       gradients->sums == NULL) {
     supine_physics_equilibrium_destroy(made);
@@ -129,100 +125,22 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        const double *stiffness,
                                                        supine_error *error) {
   const supine_network *net = equilibrium->network;
-  const supine_status status = supine_physics_stiffness_normalise(net->vertex_count, stiffness,
-                                                                  equilibrium->stiffness, error);
-  if (status != SUPINE_OK) {
-    return status;
+  double *e = equilibrium->solution; /* [N] space, file's order */
+  const supine_status status =
+      supine_physics_stiffness_normalise(net->vertex_count, stiffness, e, error);
+  for (size_t i = 0; status == SUPINE_OK && i < net->vertex_count; ++i) {
+    const uint32_t v = net->order[i];
+    const double a = 1.0 / (e[v] * (net->lesions != NULL ? net->lesions[v] : 1.0));
+    equilibrium->give[i] = net->area != NULL ? 1.0 : a;
+    equilibrium->load[i] = net->area != NULL ? net->area[i] * a : 1.0;
   }
-  for (size_t i = 0; i < net->vertex_count && net->lesions != NULL; ++i) {
-    equilibrium->stiffness[i] *= net->lesions[i];
-  }
-  for (size_t i = 0; i < net->vertex_count; ++i) {
-    equilibrium->give[i] = 1.0 / equilibrium->stiffness[net->order[i]];
-  }
-  equilibrium->lane_count = equilibrium->prepared = 0;
-  return SUPINE_OK;
-}
-
-/* Softness to be given to every lane. */
-typedef struct soften_work {
-  const supine_equilibrium *eq;
-  size_t count;
-  const double *exponents;
-} soften_work;
-
-/* exp to rounding, in vectors, which the library's is not: 2^k times a power series of degree 12 on
- * |x| <= ln 2 / 2. For exponents within 700. */
-SUPINE_INLINE double exponential(double exponent) {
-  const double shift = 0x1.8p52; /* added, it leaves the nearest integer in the lowest bits */
-  const double above = exponent < -700.0 ? -700.0 : exponent;
-  const double limited = above > 700.0 ? 700.0 : above;
-  const double shifted = limited * M_LOG2E + shift;
-  const double k = shifted - shift;
-  const double x = limited - k * 0x1.62e42fefa39efp-1 - k * 0x1.abc9e3b39803fp-56; /* ln 2 */
-  const double high =
-      1.0 / 5040.0 +
-      x * (1.0 / 40320.0 +
-           x * (1.0 / 362880.0 +
-                x * (1.0 / 3628800.0 + x * (1.0 / 39916800.0 + x * (1.0 / 479001600.0)))));
-  const double sum =
-      1.0 +
-      x * (1.0 +
-           x * (0.5 + x * (1.0 / 6.0 +
-                           x * (1.0 / 24.0 + x * (1.0 / 120.0 + x * (1.0 / 720.0 + x * high))))));
-  uint64_t bits;
-  memcpy(&bits, &shifted, sizeof bits);
-  bits = (bits << 52) + ((uint64_t)1023 << 52);
-  double power;
-  memcpy(&power, &bits, sizeof power);
-  return power * sum;
-}
-
-SUPINE_INLINE void soften_rows(size_t lanes, const soften_work *work, size_t begin, size_t end) {
-  const supine_equilibrium *eq = work->eq;
-  for (size_t i = begin; i < end; ++i) {
-    const double *exponent = work->exponents + (size_t)eq->network->order[i] * lanes;
-    const double give = eq->give[i];
-    double *restrict out = eq->lane_give + i * lanes;
-    SUPINE_EACH_LANE(r, lanes) {
-      out[r] = give * exponential(exponent[r]);
-    }
-  }
-}
-
-SUPINE_CLONES static void soften_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const soften_work *work = context;
-  SUPINE_FOR_LANES(work->count, soften_rows, work, begin, end);
-}
-supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium, size_t count,
-                                                const double *exponents) {
-  const supine_network *net = equilibrium->network;
-  const size_t n = net->vertex_count;
-  if (count < 1 || count > equilibrium->rhs_max) {
-    return SUPINE_ERROR_ARGUMENT;
-  }
-  if (equilibrium->lane_give == NULL) {
-    equilibrium->lane_give = malloc(n * equilibrium->rhs_max * sizeof(double));
-  }
-  if (net->coarse == NULL && equilibrium->lane_single == NULL) {
-    equilibrium->lane_single = malloc(n * equilibrium->rhs_max * sizeof(float));
-  }
-  if (equilibrium->lane_give == NULL || (net->coarse == NULL && equilibrium->lane_single == NULL)) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  soften_work work = {equilibrium, count, exponents};
-  supine_physics_system_run(equilibrium->system.threads, n, soften_range, &work);
-  equilibrium->lane_count = count;
-  equilibrium->prepared = 0;
-  return SUPINE_OK;
+  equilibrium->prepared = equilibrium->prepared && net->area != NULL;
+  return status;
 }
 
 /* One solve. */
 typedef struct solve_pass {
   supine_equilibrium *eq;
-  const double *give;            /* [N, lanes], or [N] */
-  size_t give_lanes;             /* of give */
   const double *force;           /* [N, lanes] */
   double *catch_;                /* [N, lanes] */
   bool warm;                     /* catch_ holds a guess */
@@ -253,121 +171,58 @@ SUPINE_INLINE void paper_link(double give, double other, double d, double *c, do
   *mass = d * (give + other) * share;
 }
 
-/* Masses, and without a reach conductances, where all lanes share one stiffness or links do not
- * depend on it. */
+/* Masses, and without a reach conductances. */
 static void prepare_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
   const supine_equilibrium *eq = pass->eq;
   const supine_network *net = eq->network;
-  const size_t stride = pass->give_lanes;
-  float *mass = eq->system.stage[0].mass;
   for (size_t i = begin; i < end; ++i) {
     double more = 0.0;
     for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->area == NULL; ++s) {
       double c;
       double caught;
-      paper_link(pass->give[i], pass->give[net->links.column[s]], net->distance[s], &c, &caught);
+      paper_link(eq->give[i], eq->give[net->links.column[s]], net->distance[s], &c, &caught);
       eq->links.value[s] = (float)c;
       more += caught;
     }
-    for (size_t r = 0; r < eq->count; ++r) {
-      const double give = pass->give[stride == 1 ? i : i * stride + r];
-      mass[i * eq->count + r] =
-          (float)((net->area == NULL ? 1.0 : net->area[i]) * give * give + more);
-    }
+    eq->system.stage[0].mass[i] =
+        (float)((net->area == NULL ? 1.0 : net->area[i]) * eq->give[i] * eq->give[i] + more);
   }
 }
 
-static void copy_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  const supine_equilibrium *eq = pass->eq;
-  for (size_t at = begin * eq->count; at < end * eq->count; ++at) {
-    eq->lane_single[at] = (float)pass->give[at];
-  }
-  for (size_t s = eq->links.begin[begin]; s < eq->links.begin[end]; ++s) {
-    eq->links.value[s] = (float)eq->network->distance[s];
-  }
-}
-
-/* Masses and diagonals without a reach, where every lane has its stiffness. */
-SUPINE_INLINE void lane_masses(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
-  const supine_equilibrium *eq = pass->eq;
-  for (size_t i = begin; i < end; ++i) {
-    float mass[SUPINE_RHS_MAX];
-    float sum[SUPINE_RHS_MAX];
-    const float *inner = eq->lane_single + i * lanes;
-    SUPINE_EACH_LANE(r, lanes) {
-      sum[r] = mass[r] = inner[r] * inner[r];
-    }
-    for (size_t s = eq->links.begin[i]; s < eq->links.begin[i + 1]; ++s) {
-      const float *outer = eq->lane_single + (size_t)eq->links.column[s] * lanes;
-      const float d = eq->links.value[s];
-      SUPINE_EACH_LANE(r, lanes) { /* paper_link */
-        const float product = inner[r] * outer[r];
-        const float more = (inner[r] + outer[r]) / (2.0F * outer[r] * (d + 2.0F * product));
-        mass[r] += more;
-        sum[r] += more + product / (d * (d + 2.0F * product));
-      }
-    }
-    float *restrict to = eq->system.stage[0].mass + i * lanes;
-    float *restrict inverse = eq->system.stage[0].inverse + i * lanes;
-    SUPINE_EACH_LANE(r, lanes) {
-      to[r] = mass[r];
-      inverse[r] = 1.0F / sum[r];
-    }
-  }
-}
-
-SUPINE_CLONES static void lane_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  SUPINE_FOR_LANES(pass->eq->count, lane_masses, pass, begin, end);
-}
-
-/* Sets the system up for the lanes of this solve, where it is not. */
+/* Sets the system up for the stiffness, where it is not. */
 static void prepare(const solve_pass *pass) {
   supine_equilibrium *eq = pass->eq;
   supine_system *system = &eq->system;
-  const bool each = eq->network->coarse == NULL && eq->lane_count > 0;
   system->lanes = eq->count;
-  if (eq->prepared == eq->count) {
-    return;
-  }
-  system->stage[0].give = each ? eq->lane_single : NULL;
-  if (each) {
-    run(pass, copy_range);
-    run(pass, lane_range);
-  } else {
+  if (!eq->prepared) {
     run(pass, prepare_range);
+    supine_physics_system_set_masses(system);
+    eq->radius =
+        system->stage_count > 1 ? 1.0 : supine_physics_chebyshev_radius(system, eq->gradients.sums);
+    eq->prepared = true;
   }
-  supine_physics_system_set_masses(system);
-  eq->radius =
-      system->stage_count > 1 ? 1.0 : supine_physics_chebyshev_radius(system, eq->gradients.sums);
-  eq->prepared = eq->count;
 }
 
-/* The norm of area f, and the t to begin with. */
-SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
-                             size_t end) {
+/* The norm of the right-hand side, and the t to begin with. */
+SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
   const supine_equilibrium *eq = pass->eq;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     double sums[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
       const size_t file = (size_t)eq->network->order[i] * lanes;
-      const double area = eq->network->area == NULL ? 1.0 : eq->network->area[i];
-      const double *give = pass->give + (each ? i * lanes : i);
+      const double load = eq->load[i];
+      const double square = eq->give[i] * eq->give[i];
+      const double inverse = (double)eq->system.stage[0].inverse[i];
       const double *force = pass->force + file;
       const double *guess = pass->catch_ + file;
-      const float *inverse = eq->system.stage[0].inverse + i * lanes;
       double *restrict t = eq->solution + i * lanes;
       SUPINE_EACH_LANE(r, lanes) {
-        sums[r] += area * force[r] * (area * force[r]) * (double)inverse[r];
+        sums[r] += load * force[r] * (load * force[r]) * inverse;
       }
       SUPINE_EACH_LANE(r, lanes) {
-        const double s = give[each ? r : 0];
-        t[r] = pass->warm ? guess[r] / (s * s) : 0.0;
+        t[r] = pass->warm ? guess[r] / square : 0.0;
       }
     }
     memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * lanes, sums, lanes * sizeof *sums);
@@ -377,66 +232,50 @@ SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, bool each, si
 SUPINE_CLONES static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
-  if (pass->give_lanes > 1) {
-    SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, true, begin, end);
-  } else {
-    SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, false, begin, end);
-  }
+  SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, begin, end);
 }
 
-/* The residual of t = 0: area f. */
+/* The residual of t = 0: the right-hand side. */
 static void force_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
   const supine_equilibrium *eq = pass->eq;
   const size_t lanes = eq->count;
   for (size_t i = begin; i < end; ++i) {
-    const double area = eq->network->area == NULL ? 1.0 : eq->network->area[i];
     const double *force = pass->force + (size_t)eq->network->order[i] * lanes;
     for (size_t r = 0; r < lanes; ++r) {
-      eq->system.stage[0].right[i * lanes + r] = (float)(area * force[r] / pass->unit[r]);
+      eq->system.stage[0].right[i * lanes + r] = (float)(eq->load[i] * force[r] / pass->unit[r]);
     }
   }
 }
 
-/* area f - A t in double, for the next round in single precision. */
-SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each, size_t begin,
-                                 size_t end) {
+/* The right-hand side less A t in double, for the next round in single precision. */
+SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
   const supine_equilibrium *eq = pass->eq;
   const supine_network *net = eq->network;
   const supine_stage *stage = &eq->system.stage[0];
-  const double *give = pass->give;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
     double sums[SUPINE_RHS_MAX] = {0.0};
     for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
-      const double area = net->area == NULL ? 1.0 : net->area[i];
+      const double give = eq->give[i];
+      const double load = eq->load[i];
+      const double own = (net->area == NULL ? 1.0 : net->area[i]) * give * give;
       const double *force = pass->force + (size_t)net->order[i] * lanes;
       const double *t = eq->solution + i * lanes;
       if (i + AHEAD < end) { /* in the file's order, which no prefetcher foresees */
         __builtin_prefetch(pass->force + (size_t)net->order[i + AHEAD] * lanes);
       }
-      const double *inner = give + (each ? i * lanes : i);
       double out[SUPINE_RHS_MAX];
       SUPINE_EACH_LANE(r, lanes) {
-        const double s = inner[each ? r : 0];
-        out[r] = area * (force[r] - s * s * t[r]);
+        out[r] = load * force[r] - own * t[r];
       }
       for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
         const size_t j = net->links.column[s];
-        const double *outer = give + (each ? j * lanes : j);
         const double *other = eq->solution + j * lanes;
-        const double d = net->distance[s];
         double c = 0.0;
         double mass = 0.0;
-        if (net->area == NULL && each) {
-          SUPINE_EACH_LANE(r, lanes) {
-            paper_link(inner[r], outer[r], d, &c, &mass);
-            out[r] -= c * (t[r] - other[r]) + mass * t[r];
-          }
-          continue;
-        }
         if (net->area == NULL) {
-          paper_link(*inner, *outer, d, &c, &mass);
+          paper_link(give, eq->give[j], net->distance[s], &c, &mass);
         } else {
           c = net->conductance[s];
         }
@@ -444,10 +283,10 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each
           out[r] -= c * (t[r] - other[r]) + mass * t[r];
         }
       }
-      const float *inverse = stage->inverse + i * lanes;
+      const double inverse = (double)stage->inverse[i];
       float *restrict right = stage->right + i * lanes;
       SUPINE_EACH_LANE(r, lanes) {
-        sums[r] += out[r] * out[r] * (double)inverse[r];
+        sums[r] += out[r] * out[r] * inverse;
         right[r] = (float)(out[r] / pass->unit[r]);
       }
     }
@@ -458,11 +297,7 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, bool each
 SUPINE_CLONES static void residual_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
-  if (pass->give_lanes > 1) {
-    SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, true, begin, end);
-  } else {
-    SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, false, begin, end);
-  }
+  SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, begin, end);
 }
 
 /* F = S^2 t, back in the file's order. */
@@ -474,8 +309,7 @@ static void store_range(void *context, size_t begin, size_t end, size_t thread) 
   for (size_t i = begin; i < end; ++i) {
     double *out = pass->catch_ + (size_t)eq->network->order[i] * count;
     for (size_t r = 0; r < count; ++r) {
-      const double give = pass->give[pass->give_lanes == 1 ? i : i * count + r];
-      out[r] = give * give * eq->solution[i * count + r];
+      out[r] = eq->give[i] * eq->give[i] * eq->solution[i * count + r];
     }
   }
 }
@@ -535,17 +369,11 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                                                supine_error *error) {
   supine_equilibrium *eq = equilibrium;
   const double wanted = tolerance > 0.0 ? tolerance : SUPINE_SOLVE_TOLERANCE;
-  if (count < 1 || count > eq->rhs_max || (eq->lane_count > 0 && count != eq->lane_count)) {
+  if (count < 1 || count > eq->rhs_max) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu right-hand sides in a solver made for %zu", count,
-                            eq->lane_count > 0 ? eq->lane_count : eq->rhs_max);
+                            "%zu right-hand sides in a solver made for %zu", count, eq->rhs_max);
   }
-  solve_pass pass = {.eq = eq,
-                     .give = eq->lane_count > 0 ? eq->lane_give : eq->give,
-                     .give_lanes = eq->lane_count > 0 ? count : 1,
-                     .force = force,
-                     .catch_ = catch_,
-                     .warm = warm};
+  solve_pass pass = {.eq = eq, .force = force, .catch_ = catch_, .warm = warm};
   eq->count = count;
   prepare(&pass);
   run(&pass, load_range);
@@ -566,32 +394,6 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                             made.residual, made.iterations, wanted);
   }
   return SUPINE_OK;
-}
-
-void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
-                                             const supine_topology *topology, double *catch_) {
-  const supine_equilibrium *eq = equilibrium;
-  const supine_network *net = eq->network;
-  const size_t lanes = eq->lane_count > 0 ? eq->count : 1;
-  const double *all = eq->lane_count > 0 ? eq->lane_give : eq->give;
-  for (size_t e = 0; e < topology->edge_count; ++e) {
-    const size_t i = net->rank[topology->edges[2 * e]];
-    const size_t j = net->rank[topology->edges[2 * e + 1]];
-    size_t s = net->links.begin[i];
-    while (net->links.column[s] != j) {
-      ++s;
-    }
-    for (size_t r = 0; r < eq->count; ++r) { /* F_e = S_e x_e / Z_e, x_e = S_e (y_i + y_j) / D */
-      const double give = all[i * lanes + (lanes > 1 ? r : 0)];
-      const double other = all[j * lanes + (lanes > 1 ? r : 0)];
-      const double spring = 0.5 * (1.0 / give + 1.0 / other);
-      const double d = net->distance[s];
-      const double z = spring + (give + other) / d;
-      const double y = give * eq->solution[i * eq->count + r] +
-                       other * eq->solution[j * eq->count + r]; /* y = S t */
-      catch_[e * eq->count + r] = net->area == NULL ? spring / z * spring / d * y : 0.0;
-    }
-  }
 }
 
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,

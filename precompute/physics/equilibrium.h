@@ -26,14 +26,15 @@
  *
  *     w = 4 (R^2 / mean area) a / h^2      a: a third of the link's triangles' area, h its length
  *
- * Columns still sum to 1, and the system is even simpler: the stiffness is in the masses alone,
+ * and the tissue acts on the force instead of in the links, so that the matrix depends on the
+ * geometry alone: twice as expandable tissue, a = 1/E, moves twice as far where it is wider than R.
  *
- *     area_i S_i^2 t_i + sum over edges ij of (w_ij / 2) (t_i - t_j) = area_i f_i
+ *     area_i F_i + sum over edges ij of (w_ij / 2) (F_i - F_j) = area_i a_i f_i
  *
- * which for E = 1 is a discrete (1 - R^2 Laplacian) F = f on the surface, in which a disturbance
+ * which is a discrete (1 - R^2 Laplacian) F = a f on the surface, in which a disturbance
  * decays as exp(-r / R) whatever the mesh. What balances is then area F: sum of area_i F_i = sum of
- * area_i f_i. The finer the mesh, the larger the condition number; a cycle over coarser and coarser
- * graphs keeps the number of steps what it is (coarse.h).
+ * area_i a_i f_i. The finer the mesh, the larger the condition number; a cycle over coarser and
+ * coarser graphs keeps the number of steps what it is (coarse.h).
  *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
  * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf. Technol.
@@ -60,7 +61,6 @@ supine_status supine_physics_network_create(const supine_mesh *mesh,
                                             supine_network **network);
 
 void supine_physics_network_destroy(supine_network *network);
-size_t supine_physics_network_vertex_count(const supine_network *network);
 
 /** One stiffness on a network, with the space to solve for it. For one thread at a time. */
 typedef struct supine_equilibrium supine_equilibrium;
@@ -73,26 +73,18 @@ supine_status supine_physics_equilibrium_create(const supine_network *network, s
                                                 size_t threads, supine_equilibrium **equilibrium);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
-/** Sets the stiffness of all right-hand sides.
+/** Sets the stiffness; without a reach the matrix changes with it.
  * @param stiffness  [N] E > 0, relative: scaled here to geometric mean 1; NULL: 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error);
 
-/** Gives each of `count` right-hand sides a stiffness of its own: E exp(-exponent) of what was set
- * last, whose mean exponent should be 0 (the geometric mean of E stays 1).
- * @param exponents  [N, count]
- * @retval SUPINE_ERROR_ARGUMENT  count out of range
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_equilibrium_soften(supine_equilibrium *equilibrium, size_t count,
-                                                const double *exponents);
-
 /** How a solve went. */
 typedef struct supine_solve_report {
   size_t iterations;
-  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = area f, which were computed
-                      in double, each square divided by A's diagonal */
+  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = area a f, which were
+                      computed in double, each square divided by A's diagonal */
 } supine_solve_report;
 
 /** Relative residual that is asked for by 0. A basis file keeps 6e-8 of a number, and the solve
@@ -106,7 +98,7 @@ typedef struct supine_solve_report {
  * @param warm       start from what is in catch_ instead of zero
  * @param catch_     [N, count] F, written
  * @param report     optional
- * @retval SUPINE_ERROR_ARGUMENT   count out of range, or not that of the stiffnesses
+ * @retval SUPINE_ERROR_ARGUMENT   count out of range
  * @retval SUPINE_ERROR_NUMERICAL  the residual stopped falling above the tolerance, as it does
  * where a force is not finite */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
@@ -114,14 +106,9 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                                                double *catch_, supine_solve_report *report,
                                                supine_error *error);
 
-/** What the spring nodes caught in the last solve, [edge_count, count] in the topology's order:
- * with the masses' catch it sums to the sum of f. 0 with a reach. */
-void supine_physics_equilibrium_spring_catch(const supine_equilibrium *equilibrium,
-                                             const supine_topology *topology, double *catch_);
-
 /** Column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force on that
  * vertex alone.
- * @retval SUPINE_ERROR_ARGUMENT  no such vertex, or every right-hand side has a stiffness */
+ * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error);
 

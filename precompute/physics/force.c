@@ -3,81 +3,54 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
 #include "precompute/physics/force.h"
 
-static bool has_fixed_part(const supine_force_law *law) {
-  return law->box[0] != 0.0 || law->box[1] != 0.0 || law->box[2] != 0.0;
-}
+enum { GRAIN = 64 };
 
-static double fixed_part(const supine_lungs *lungs, const supine_force_law *law, size_t vertex) {
-  double box[3];
-  supine_lungs_box_coordinates(lungs, vertex, box);
-  return supine_dot(law->box, box);
-}
+typedef struct force_work {
+  const supine_lungs *lungs;
+  const supine_force_law *law;
+  const supine_gravities *gravities;
+  const size_t *vertices; /* NULL: all */
+  double middle[3];       /* mean position of all vertices: where h is its mean */
+  double *force;
+} force_work;
 
-void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
-                          double minimum, double maximum, double *force) {
-  const bool fixed = has_fixed_part(law);
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
-    force[i] = law->base + law->gain * h + (fixed ? fixed_part(lungs, law, i) : 0.0); /* (18) */
-  }
-}
-
-void supine_physics_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, const double g[3], double minimum,
-                                    double maximum, double *softened) {
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    const double h = (supine_dot(g, lungs->mesh.vertices + 3 * i) - minimum) / (maximum - minimum);
-    softened[i] = (stiffness == NULL ? 1.0 : stiffness[i]) * exp(-law->soften * (h - 0.5));
-  }
-}
-
-size_t supine_physics_force_column_count(const supine_force_law *law) {
-  return has_fixed_part(law) ? 5 : 4;
-}
-
-/* Centre and half diagonal of the box: positions in these units keep the columns well scaled. */
-static double box_frame(const supine_lungs *lungs, double centre[3]) {
-  double square = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    const double half = 0.5 * (lungs->maximum[k] - lungs->minimum[k]);
-    centre[k] = lungs->minimum[k] + half;
-    square += half * half;
-  }
-  return sqrt(square);
-}
-
-void supine_physics_force_columns(const supine_lungs *lungs, const supine_force_law *law,
-                                  double *columns) {
-  const size_t count = supine_physics_force_column_count(law);
-  double centre[3];
-  const double radius = box_frame(lungs, centre);
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    double *row = columns + i * count;
-    row[0] = 1.0;
-    for (size_t k = 0; k < 3; ++k) {
-      row[1 + k] = (lungs->mesh.vertices[3 * i + k] - centre[k]) / radius;
-    }
-    if (count == 5) {
-      row[4] = fixed_part(lungs, law, i);
+static void force_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const force_work *work = context;
+  const supine_force_law *law = work->law;
+  const supine_gravities *gravities = work->gravities;
+  for (size_t k = begin; k < end; ++k) {
+    const size_t vertex = work->vertices != NULL ? work->vertices[k] : k;
+    const double *p = work->lungs->mesh.vertices + 3 * vertex;
+    const double from_middle[3] = {p[0] - work->middle[0], p[1] - work->middle[1],
+                                   p[2] - work->middle[2]};
+    double *restrict out = work->force + k * gravities->count;
+    double box[3];
+    supine_lungs_box_coordinates(work->lungs, vertex, box);
+    const double still = law->base + supine_dot(law->box, box);
+    for (size_t d = 0; d < gravities->count; ++d) {
+      const double *g = gravities->directions + 3 * d;
+      const double height = gravities->maximum[d] - gravities->minimum[d];
+      out[d] = still + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height; /* (18) */
+      if (law->soften != 0.0) {
+        out[d] *= exp(law->soften * supine_dot(g, from_middle) / height);
+      }
     }
   }
 }
 
-void supine_physics_force_functions(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double g[3], double minimum, double maximum,
-                                    double *functions) {
-  double centre[3];
-  const double radius = box_frame(lungs, centre);
-  const double slope = law->gain / (maximum - minimum);
-  functions[0] = law->base + slope * (supine_dot(g, centre) - minimum);
-  for (size_t k = 0; k < 3; ++k) {
-    functions[1 + k] = slope * radius * g[k];
+void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law,
+                          const supine_gravities *gravities, size_t vertex_count,
+                          const size_t *vertices, double *force) {
+  const size_t n = lungs->mesh.vertex_count;
+  force_work work = {lungs, law, gravities, vertices, {0.0}, force};
+  for (size_t i = 0; i < 3 * n && law->soften != 0.0; ++i) {
+    work.middle[i % 3] += lungs->mesh.vertices[i] / (double)n;
   }
-  if (has_fixed_part(law)) {
-    functions[4] = 1.0;
-  }
+  supine_parallel_for(vertex_count, GRAIN, 0, force_range, &work);
 }

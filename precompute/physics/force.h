@@ -4,10 +4,11 @@
  * direction that they move in, (15)-(17).
  *
  *     h_i(g) = (g.p_i - min_j g.p_j) / (max_j g.p_j - min_j g.p_j)      1 where most dependent
- *     f_i(g) = base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i
- *     E_i(g) = E_i exp(-soften (h_i(g) - 1/2))
+ *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
- * with X, Y, Z the box coordinates of lungs.h, and min and max over all lungs of the model. */
+ * with X, Y, Z the box coordinates of lungs.h, and min and max over all lungs of the model. With
+ * soften, dependent tissue is more expandable: the exponential is a factor on a = 1/E of geometric
+ * mean 1, which stands beside the force in the equilibrium (equilibrium.h). */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
@@ -18,7 +19,7 @@ typedef struct supine_force_law {
   double base;
   double gain;   /**< the part that turns with gravity */
   double box[3]; /**< cx, cy, cz: fixed to the body */
-  double soften; /**< how much softer dependent tissue is; not 0 breaks the linear route */
+  double soften; /**< how much softer dependent tissue is; needs a reach (model.h) */
   bool pair;     /**< a lung alone has the heights of the pair that it and its mirror image in the
                       midline make, so that it moves as beside its fellow; false: its own */
 } supine_force_law;
@@ -31,31 +32,20 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
                                           const double *directions, double *minimum,
                                           double *maximum);
 
-/** f [N] for gravity along the unit vector `g`, given its height range. */
-void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
-                          double minimum, double maximum, double *force);
+/** Directions of gravity and how far the lungs reach along each. The arrays are the caller's. */
+typedef struct supine_gravities {
+  size_t count;
+  const double *directions; /**< [count, 3] unit */
+  const double *minimum;    /**< [count] of g.p over the lungs, mm (supine_physics_height_range) */
+  const double *maximum;    /**< [count] */
+} supine_gravities;
 
-/** E [N] for gravity along `g` from E without gravity (NULL: 1). */
-void supine_physics_force_stiffness(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double *stiffness, const double g[3], double minimum,
-                                    double maximum, double *softened);
-
-/** The law as a sum of a few forces that do not turn, times functions of gravity alone:
- * f_i(g) = sum over r of columns[i, r] functions[r](g). The columns are 1 and the position (about
- * the box's centre, in half diagonals), and the body-fixed part where there is one. */
-enum { SUPINE_FORCE_COLUMNS_MAX = 5 };
-
-/** Number of columns: 4, or 5 with a body-fixed part. */
-size_t supine_physics_force_column_count(const supine_force_law *law);
-
-/** The columns, [N, R]. */
-void supine_physics_force_columns(const supine_lungs *lungs, const supine_force_law *law,
-                                  double *columns);
-
-/** The functions at one direction, [R]. */
-void supine_physics_force_functions(const supine_lungs *lungs, const supine_force_law *law,
-                                    const double g[3], double minimum, double maximum,
-                                    double *functions);
+/** f of some vertices for every direction, into force [vertex_count, gravities->count]. Uses all
+ * cores.
+ * @param vertices  [vertex_count] which; NULL: all of the lungs' */
+void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law,
+                          const supine_gravities *gravities, size_t vertex_count,
+                          const size_t *vertices, double *force);
 
 /** How vertices move. */
 typedef enum supine_direction_model {

@@ -16,6 +16,11 @@
  * cells (Morton 1966). */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
 
+/* Directions of a run, the vertices that may be highest along one of them, and the cosine of the
+ * largest angle from its first. */
+enum { RUN = 8, CANDIDATES = 4096 };
+static const double run_cosine = 0.985;
+
 typedef struct block_box {
   double centre[3];
   double half[3];
@@ -55,34 +60,106 @@ static double bound_of(const block_box *box, const double *g, const double *size
   return supine_dot(g, box->centre) + supine_dot(size, box->half);
 }
 
-/* Raises `best` to what a block holds above it; whether there is such. */
-static bool look_into(const range_work *work, const double *g, size_t block, double *best) {
+/* The highest vertex along a direction so far, and the block that holds it. */
+typedef struct summit {
+  double height;
+  const double *point;
+  size_t block;
+} summit;
+
+static void look_into(const range_work *work, const double *g, size_t block, summit *best) {
   const double *p = work->vertices + 3 * block * BLOCK;
-  const double before = *best;
   for (size_t i = 0; i < block_size(work, block); ++i) {
     const double h = supine_dot(g, p + 3 * i);
-    *best = h > *best ? h : *best;
+    if (h > best->height) {
+      *best = (summit){h, p + 3 * i, block};
+    }
   }
-  return *best > before;
 }
 
-/* Largest g.p, starting from `seed`, a block that held the last direction's: turned to `seed`
- * again. */
-static double highest(const range_work *work, const double *g, size_t *seed) {
+/* Finds the largest g.p, starting from `seed`, a block that held a similar direction's. */
+static summit highest(const range_work *work, const double *g, size_t seed) {
   const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
-  double best = -INFINITY;
-  (void)look_into(work, g, *seed, &best);
+  summit best = {.height = -INFINITY};
+  look_into(work, g, seed, &best);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
-    if (bound_of(&work->groups[first / GROUP], g, size) <= best) {
+    if (bound_of(&work->groups[first / GROUP], g, size) <= best.height) {
       continue;
     }
     for (size_t block = first; block < first + GROUP && block < work->box_count; ++block) {
-      if (bound_of(&work->boxes[block], g, size) > best && look_into(work, g, block, &best)) {
-        *seed = block;
+      if (bound_of(&work->boxes[block], g, size) > best.height) {
+        look_into(work, g, block, &best);
       }
     }
   }
   return best;
+}
+
+/* How far below the summit along a direction a box may reach up within a cone about it that opens
+ * by `slope`: negative where nothing in it can be highest along a direction in the cone. */
+static double margin_of(const block_box *box, const double *g, const double *size,
+                        const summit *top, double slope) {
+  const double far = supine_distance(box->centre, top->point) + supine_length(box->half);
+  return bound_of(box, g, size) - top->height + slope * far;
+}
+
+/* Copies the vertices that may be highest along some direction within an angle of g, whose tangent
+ * is `slope`: with p the highest along g, q rises above it only if g.(p - q) <= slope |p - q|.
+ * Returns their number; CANDIDATES + 1: too many. */
+static size_t find_candidates(const range_work *work, const double *g, double slope,
+                              const summit *top, double *points) {
+  const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
+  size_t count = 0;
+  for (size_t first = 0; first < work->box_count; first += GROUP) {
+    if (margin_of(&work->groups[first / GROUP], g, size, top, slope) < 0.0) {
+      continue;
+    }
+    for (size_t block = first; block < first + GROUP && block < work->box_count; ++block) {
+      if (margin_of(&work->boxes[block], g, size, top, slope) < 0.0) {
+        continue;
+      }
+      for (size_t i = 0; i < block_size(work, block); ++i) {
+        const double *q = work->vertices + 3 * (block * BLOCK + i);
+        if (top->height - supine_dot(g, q) > slope * supine_distance(top->point, q) + 1e-9) {
+          continue;
+        }
+        if (count == CANDIDATES) {
+          return CANDIDATES + 1;
+        }
+        memcpy(points + 3 * count++, q, 3 * sizeof *q);
+      }
+    }
+  }
+  return count;
+}
+
+/* Largest sign g.p for a run of neighbouring directions, which share their few candidates. */
+static void search_run(const range_work *work, size_t begin, size_t end, double sign, size_t *seed,
+                       double *out) {
+  const double *centre = work->directions + 3 * (begin + (end - begin) / 2);
+  const double g[3] = {sign * centre[0], sign * centre[1], sign * centre[2]};
+  const summit top = highest(work, g, *seed);
+  double points[3 * CANDIDATES];
+  double least = 1.0; /* cosine to the centre */
+  *seed = top.block;
+  for (size_t d = begin; d < end; ++d) {
+    least = fmin(least, supine_dot(centre, work->directions + 3 * d));
+  }
+  const double slope = sqrt(fmax(0.0, 1.0 - least * least)) / least + 1e-7; /* for rounding */
+  const size_t count = end - begin == 1 ? 0 : find_candidates(work, g, slope, &top, points);
+  for (size_t d = begin; d < end; ++d) {
+    const double *at = work->directions + 3 * d;
+    const double seen[3] = {sign * at[0], sign * at[1], sign * at[2]};
+    double best = end - begin == 1 ? top.height : -INFINITY;
+    if (count > CANDIDATES) {
+      best = highest(work, seen, *seed).height;
+    }
+    for (size_t i = 0; i < count && count <= CANDIDATES; ++i) {
+      const double h = supine_dot(seen, points + 3 * i);
+      best = h > best ? h : best;
+    }
+    out[d] = sign * best;
+  }
 }
 
 static void height_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -90,11 +167,15 @@ static void height_range(void *context, size_t begin, size_t end, size_t thread)
   const range_work *work = context;
   size_t top = 0;
   size_t bottom = 0;
-  for (size_t d = begin; d < end; ++d) {
-    const double *g = work->directions + 3 * d;
-    const double opposite[3] = {-g[0], -g[1], -g[2]};
-    work->maximum[d] = highest(work, g, &top);
-    work->minimum[d] = -highest(work, opposite, &bottom);
+  for (size_t d = begin; d < end;) {
+    size_t last = d + 1;
+    while (last < end && last < d + RUN &&
+           supine_dot(work->directions + 3 * d, work->directions + 3 * last) > run_cosine) {
+      ++last;
+    }
+    search_run(work, d, last, 1.0, &top, work->maximum);
+    search_run(work, d, last, -1.0, &bottom, work->minimum);
+    d = last;
   }
 }
 

@@ -1,134 +1,92 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From catch to force, and from a function of the catch to its slopes by stiffness. */
+/* From catch to force. */
 #include <stdlib.h>
 
 #include "precompute/physics/inverse.h"
 #include "precompute/physics/network.h"
 
-/* One direction of a link without a reach: what passes for each difference of t, what its spring
- * makes the mass of its first end, and the slopes of both by S of either end. */
-typedef struct paper_link {
-  double c, mass;
-  double c_by_give, c_by_other, mass_by_give, mass_by_other;
-} paper_link;
-
-static paper_link link_of(double give, double other, double d) {
-  const double wide = d + 2.0 * give * other;
-  const double half = (give + other) / (2.0 * other);
-  return (paper_link){.c = give * other / (d * wide),
-                      .mass = half / wide,
-                      .c_by_give = other / (wide * wide),
-                      .c_by_other = give / (wide * wide),
-                      .mass_by_give = 0.5 / (other * wide) - half * 2.0 * other / (wide * wide),
-                      .mass_by_other = 0.5 / (other * wide) - half / (other * wide) -
-                                       half * 2.0 * give / (wide * wide)};
+/* f of vertex i without a reach: its catch, what passes over its links and what their springs
+ * catch. give [N]: S, file's order. */
+static double paper_force(const supine_network *net, const double *give, const double *catch_,
+                          size_t i) {
+  const uint32_t v = net->order[i];
+  const double t = catch_[v] / (give[v] * give[v]);
+  double sum = catch_[v];
+  for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
+    const uint32_t w = net->order[net->links.column[s]];
+    const double d = net->distance[s];
+    const double wide = d + 2.0 * give[v] * give[w];
+    sum += give[v] * give[w] / (d * wide) * (t - catch_[w] / (give[w] * give[w]));
+    sum += (give[v] + give[w]) / (2.0 * give[w] * wide) * t;
+  }
+  return sum;
 }
 
-/* S [N] of the file's vertices. */
-static supine_status find_give(const supine_network *network, const double *stiffness, double *give,
-                               supine_error *error) {
-  const supine_status status =
-      supine_physics_stiffness_normalise(network->vertex_count, stiffness, give, error);
-  for (size_t i = 0; status == SUPINE_OK && i < network->vertex_count; ++i) {
-    give[i] = 1.0 / (give[i] * (network->lesions != NULL ? network->lesions[i] : 1.0));
+/* The same with a reach: (area + L) F / (area a). */
+static double reach_force(const supine_network *net, const double *give, const double *catch_,
+                          size_t i) {
+  const uint32_t v = net->order[i];
+  double sum = net->area[i] * catch_[v];
+  for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
+    sum += net->conductance[s] * (catch_[v] - catch_[net->order[net->links.column[s]]]);
   }
-  return status;
+  return sum / (net->area[i] * give[v]);
 }
 
 supine_status supine_physics_inverse_force(const supine_network *network, const double *stiffness,
                                            const double *catch_, double *force,
                                            supine_error *error) {
-  const supine_network *net = network;
-  double *give = malloc(net->vertex_count * sizeof *give);
+  const size_t n = network->vertex_count;
+  double *give = malloc(n * sizeof *give);
   if (give == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                            net->vertex_count);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  const supine_status status = find_give(net, stiffness, give, error);
-  for (size_t i = 0; status == SUPINE_OK && i < net->vertex_count; ++i) {
-    const uint32_t v = net->order[i];
-    const double t = catch_[v] / (give[v] * give[v]);
-    const double area = net->area == NULL ? 1.0 : net->area[i];
-    double sum = area * catch_[v];
-    for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
-      const uint32_t w = net->order[net->links.column[s]];
-      const double other = catch_[w] / (give[w] * give[w]);
-      if (net->area != NULL) {
-        sum += net->conductance[s] * (t - other);
-      } else {
-        const paper_link link = link_of(give[v], give[w], net->distance[s]);
-        sum += link.c * (t - other) + link.mass * t;
-      }
-    }
-    force[v] = sum / area; /* A t = area f */
+  const supine_status status = supine_physics_stiffness_normalise(n, stiffness, give, error);
+  for (size_t i = 0; status == SUPINE_OK && i < n; ++i) {
+    give[i] = 1.0 / (give[i] * (network->lesions != NULL ? network->lesions[i] : 1.0));
+  }
+  for (size_t i = 0; status == SUPINE_OK && i < n; ++i) {
+    force[network->order[i]] =
+        (network->area == NULL ? paper_force : reach_force)(network, give, catch_, i);
   }
   free(give);
   return status;
 }
 
-/* Takes lambda . (dA/dS) t of vertex i's links off the slopes by log E: dS = -S dtheta. */
-static void add_links(const supine_network *net, size_t i, const double *give, const double *t,
-                      const double *adjoint, double *gradient) {
-  const uint32_t v = net->order[i];
-  for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
-    const uint32_t w = net->order[net->links.column[s]];
-    const paper_link link = link_of(give[v], give[w], net->distance[s]);
-    /* Each link is seen from both ends: half of what passes, all of its first end's mass. */
-    const double passed = 0.5 * (adjoint[v] - adjoint[w]) * (t[v] - t[w]);
-    const double caught = adjoint[v] * t[v];
-    gradient[v] += give[v] * (link.c_by_give * passed + link.mass_by_give * caught);
-    gradient[w] += give[w] * (link.c_by_other * passed + link.mass_by_other * caught);
-  }
-}
-
-/* Eight parameters: the system, the two fields that meet in it, and what comes of them. */
 supine_status supine_physics_inverse_gradient(const supine_network *network,
                                               supine_equilibrium *equilibrium,
                                               const double *stiffness, const double *catch_,
                                               const double *slope, double tolerance,
                                               double *gradient, supine_error *error) {
-  const supine_network *net = network;
-  const size_t n = net->vertex_count;
-  double *give = malloc(n * sizeof *give);
-  double *t = malloc(n * sizeof *t);
-  double *adjoint = malloc(n * sizeof *adjoint);
-  supine_status status =
-      give == NULL || t == NULL || adjoint == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-          : find_give(net, stiffness, give, error);
+  const size_t n = network->vertex_count;
+  double *force = malloc(2 * n * sizeof *force);
+  double *right = force + n;
+  if (force == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  supine_status status = supine_physics_inverse_force(network, NULL, catch_, force, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_equilibrium_set_stiffness(equilibrium, NULL, error);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    right[network->order[i]] = slope[network->order[i]] / network->area[i];
+  }
+  if (status == SUPINE_OK) {
+    status = supine_physics_equilibrium_solve(equilibrium, 1, right, tolerance, false, gradient,
+                                              NULL, error);
+  }
+  double mean = 0.0;
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    const uint32_t v = network->order[i];
+    gradient[v] *= -network->area[i] * force[v];
+    mean += gradient[v] / (double)n;
+  }
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    gradient[i] -= mean;
+  }
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, error);
   }
-  if (status == SUPINE_OK) {
-    for (size_t i = 0; i < n; ++i) {
-      const uint32_t v = net->order[i];
-      const double area = net->area == NULL ? 1.0 : net->area[i];
-      t[v] = give[v] * give[v] * slope[v] / area; /* area f = S^2 dJ/dF */
-    }
-    status =
-        supine_physics_equilibrium_solve(equilibrium, 1, t, tolerance, false, adjoint, NULL, error);
-  }
-  if (status == SUPINE_OK) {
-    double mean = 0.0;
-    for (size_t i = 0; i < n; ++i) {
-      const uint32_t v = net->order[i];
-      const double area = net->area == NULL ? 1.0 : net->area[i];
-      adjoint[v] /= give[v] * give[v]; /* lambda */
-      t[v] = catch_[v] / (give[v] * give[v]);
-      gradient[v] = 2.0 * catch_[v] * (area * adjoint[v] - slope[v]);
-    }
-    for (size_t i = 0; i < n && net->area == NULL; ++i) {
-      add_links(net, i, give, t, adjoint, gradient);
-    }
-    for (size_t i = 0; i < n; ++i) {
-      mean += gradient[i] / (double)n;
-    }
-    for (size_t i = 0; i < n; ++i) {
-      gradient[i] -= mean; /* theta has mean 0 */
-    }
-  }
-  free(give);
-  free(t);
-  free(adjoint);
+  free(force);
   return status;
 }

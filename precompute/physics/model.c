@@ -18,3 +18,12 @@ supine_model supine_physics_model(supine_law law) {
 }
 
 const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1] = {SUPINE_LAWS(NAME) NULL};
+
+supine_status supine_physics_model_check(const supine_model *model, supine_error *error) {
+  return model->force.soften == 0.0 || model->reach > 0.0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "--soften needs a reach: the paper's transfer holds the stiffness, "
+                                "which may not turn with gravity. Give --reach 10, or leave "
+                                "--soften out");
+}

@@ -46,7 +46,7 @@ typedef struct supine_model {
   double reach;            /**< spreading length, mm, at most half the box's diagonal counts; 0: the
                                 paper's, a fixed number of links */
   double tolerance;        /**< relative residual of every solve; 0: SUPINE_SOLVE_TOLERANCE
-                              (equilibrium.h); where directions are sampled 5e-6 */
+                              (equilibrium.h), with softening 5e-6 */
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
 } supine_model;
 
@@ -55,6 +55,11 @@ supine_model supine_physics_model(supine_law law);
 
 /** The names of the laws; NULL ends them. */
 extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
+
+/** Checks that the law is one that can be solved.
+ * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the paper's transfer holds the
+ * stiffness, so that it would turn with gravity */
+supine_status supine_physics_model_check(const supine_model *model, supine_error *error);
 
 /** The network of lungs with the model's lesions and reach: what solves are set up with.
  * @retval SUPINE_ERROR_MEMORY */

@@ -136,7 +136,3 @@ void supine_physics_network_destroy(supine_network *network) {
     free(network);
   }
 }
-
-size_t supine_physics_network_vertex_count(const supine_network *network) {
-  return network->vertex_count;
-}

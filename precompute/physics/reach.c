@@ -41,11 +41,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 0.5 * sqrt(square);
 }
 
-/* With springs that catch nothing the system is (equilibrium.h)
- *
- *     area_i F_i + sum over links of (w / 2) (E_i^2 F_i - E_j^2 F_j) = area_i f_i
- *
- * which for E = 1 is (1 - R^2 Laplacian) F = f, in the weak form on the surface, where area_i is
+/* The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
+ * surface, where area_i is
  * the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that
  * make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third
  * of its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions

@@ -7,9 +7,9 @@
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
+#include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
-#include "precompute/physics/reference.h"
 
 enum { STEPS_MAX = 100 };
 

@@ -5,9 +5,9 @@
 
 #include "sh/base/vec3.h"
 
+#include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
-#include "precompute/lungs/disease.h"
 
 void supine_physics_solution_free(supine_solution *solution) {
   free(solution->catch_);
@@ -23,17 +23,19 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   supine_equilibrium *equilibrium = NULL;
   supine_volume_forms forms = {0};
   supine_solution made = {.vertex_count = n, .has_volume = lungs->topology.closed};
-  double minimum;
-  double maximum;
+  double range[2];
   double *work = malloc(n * sizeof *work);
   made.catch_ = malloc(n * sizeof *made.catch_);
   made.directions = malloc(3 * n * sizeof *made.directions);
-  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_status status = supine_physics_model_check(model, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  status = SUPINE_ERROR_MEMORY;
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
       supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
       supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
-      supine_physics_height_range(lungs, model->force.pair, 1, g, &minimum, &maximum) !=
-          SUPINE_OK) {
+      supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
@@ -41,12 +43,12 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_physics_force_stiffness(lungs, &model->force, model->stiffness, g, minimum, maximum, work);
-  status = supine_physics_equilibrium_set_stiffness(equilibrium, work, error);
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  supine_physics_force(lungs, &model->force, g, minimum, maximum, work);
+  const supine_gravities gravity = {1, g, range, range + 1};
+  supine_physics_force(lungs, &model->force, &gravity, n, NULL, work);
   status = supine_physics_equilibrium_solve(equilibrium, 1, work, model->tolerance, false,
                                             made.catch_, &made.report, error);
   if (status != SUPINE_OK) {

@@ -38,7 +38,7 @@ SUPINE_INLINE void sweep_rows(size_t lanes, const row_pass *pass, size_t begin, 
     float out[SUPINE_RHS_MAX];
     const float *from = pass->from + i * lanes;
     const float *right = pass->right + i * lanes;
-    const float *inverse = stage->inverse + i * lanes;
+    const float inverse = pass->factor * stage->inverse[i];
     float *restrict to = pass->to + i * lanes;
     supine_physics_stage_image(lanes, stage, pass->from, i, out);
     if (pass->factor == 0.0F) {
@@ -47,7 +47,7 @@ SUPINE_INLINE void sweep_rows(size_t lanes, const row_pass *pass, size_t begin, 
       }
     } else {
       SUPINE_EACH_LANE(r, lanes) {
-        to[r] = from[r] + pass->factor * inverse[r] * (right[r] - out[r]);
+        to[r] = from[r] + inverse * (right[r] - out[r]);
       }
     }
   }
@@ -93,9 +93,9 @@ static void sweep(const supine_system *system, const supine_stage *stage, float 
   supine_physics_system_run(system->threads, stage->links->count, sweep_range, &pass);
 }
 
-static void apply(const supine_system *system, const supine_rows *rows, float factor,
+static void apply(const supine_system *system, const supine_rows *rows, size_t lanes, float factor,
                   const float *from, float *to) {
-  row_pass pass = {NULL, rows, system->lanes, factor, NULL, from, to};
+  row_pass pass = {NULL, rows, lanes, factor, NULL, from, to};
   supine_physics_system_run(system->threads, rows->count, apply_range, &pass);
 }
 
@@ -106,25 +106,21 @@ static void invert_range(void *context, size_t begin, size_t end, size_t thread)
   const supine_stage *stage = pass->stage;
   const supine_rows *links = stage->links;
   for (size_t i = begin; i < end; ++i) {
-    for (size_t r = 0; r < pass->lanes; ++r) {
-      double sum = (double)stage->mass[i * pass->lanes + r];
-      for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
-        sum += (double)links->value[s];
-      }
-      stage->inverse[i * pass->lanes + r] = (float)(1.0 / sum);
+    double sum = (double)stage->mass[i];
+    for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
+      sum += (double)links->value[s];
     }
+    stage->inverse[i] = (float)(1.0 / sum);
   }
 }
 
 void supine_physics_system_set_masses(supine_system *system) {
   for (size_t k = 0; k < system->stage_count; ++k) {
     const supine_stage *stage = &system->stage[k];
-    row_pass pass = {stage, NULL, system->lanes, 0.0F, NULL, NULL, NULL};
-    if (stage->give == NULL) {
-      supine_physics_system_run(system->threads, stage->links->count, invert_range, &pass);
-    }
+    row_pass pass = {.stage = stage};
+    supine_physics_system_run(system->threads, stage->links->count, invert_range, &pass);
     if (k + 1 < system->stage_count) { /* shares sum to 1: the mass stays the same in all */
-      apply(system, stage->whole, 0.0F, stage->mass, system->stage[k + 1].mass);
+      apply(system, stage->whole, 1, 0.0F, stage->mass, system->stage[k + 1].mass);
     }
   }
 }
@@ -133,8 +129,11 @@ void supine_physics_system_set_masses(supine_system *system) {
 static void begin_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const row_pass *pass = context;
-  for (size_t at = begin * pass->lanes; at < end * pass->lanes; ++at) {
-    pass->to[at] = pass->factor * pass->stage->inverse[at] * pass->right[at];
+  const size_t lanes = pass->lanes;
+  for (size_t i = begin; i < end; ++i) {
+    for (size_t at = i * lanes; at < (i + 1) * lanes; ++at) {
+      pass->to[at] = pass->factor * pass->stage->inverse[i] * pass->right[at];
+    }
   }
 }
 
@@ -161,12 +160,12 @@ static void improve(supine_system *system, size_t k) {
     if (k + 1 < system->stage_count) {
       supine_stage *next = &system->stage[k + 1];
       sweep(system, stage, 0.0F, stage->right, stage->solution, stage->work);
-      apply(system, stage->whole, 0.0F, stage->work, next->right);
+      apply(system, stage->whole, system->lanes, 0.0F, stage->work, next->right);
       row_pass pass = {next,        NULL,           system->lanes, SUPINE_DAMPING,
                        next->right, next->solution, next->solution};
       supine_physics_system_run(system->threads, next->links->count, begin_range, &pass);
       improve(system, k + 1);
-      apply(system, stage->part, 1.0F, next->solution, stage->solution);
+      apply(system, stage->part, system->lanes, 1.0F, next->solution, stage->solution);
     }
     smooth(system, stage);
   }

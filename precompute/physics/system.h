@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The reduced system of an equilibrium, in single precision on every level, and what one solve of
  * it works with. Rows are in the network's internal order; every vector is [rows, lanes], a lane
- * being one right-hand side, with a stiffness of its own or one for all.
+ * being one right-hand side.
  *
- *     A t = area f,  (A t)_i = mass_i t_i + sum over links of c_ij (t_i - t_j),  F_i = S_i^2 t_i */
+ *     A t = right,  (A t)_i = mass_i t_i + sum over links of c_ij (t_i - t_j),  F_i = S_i^2 t_i */
 #ifndef SUPINE_SYSTEM_H
 #define SUPINE_SYSTEM_H
 
@@ -16,12 +16,11 @@ enum { SUPINE_SUM_ROWS = 2048 };
 
 /* One level of the system. */
 typedef struct supine_stage {
-  const supine_rows *links; /* who is linked, and c where it does not depend on the stiffness */
-  const supine_rows *part;  /* shares of its rows in those of the next stage */
-  const supine_rows *whole; /* the transpose */
-  const float *give;        /* [rows, lanes] S that c is found from, links' values being D; NULL */
-  float *mass;              /* [rows, lanes] */
-  float *inverse;           /* [rows, lanes] of the diagonal */
+  const supine_rows *links;       /* who is linked, and c */
+  const supine_rows *part;        /* shares of its rows in those of the next stage */
+  const supine_rows *whole;       /* the transpose */
+  float *mass;                    /* [rows] */
+  float *inverse;                 /* [rows] of the diagonal */
   float *solution, *right, *work; /* [rows, lanes] */
 } supine_stage;
 
@@ -35,8 +34,7 @@ typedef struct supine_system {
 void supine_physics_system_run(size_t threads, size_t rows, supine_range_function *function,
                                void *context);
 
-/* The coarse masses of the fine ones, and the inverse of every diagonal that is not there already,
- * as it is where c depends on the stiffness. */
+/* Finds the coarse masses of the fine ones, and the inverse of every diagonal. */
 void supine_physics_system_set_masses(supine_system *system);
 
 /* Share of a full step that smoothing takes: stable for diagonals of half the largest eigenvalue or
@@ -63,8 +61,8 @@ void supine_physics_system_cycle(supine_system *system);
     case 5:                                                                                        \
       rows(5, __VA_ARGS__);                                                                        \
       break;                                                                                       \
-    case 8:                                                                                        \
-      rows(8, __VA_ARGS__);                                                                        \
+    case 16:                                                                                       \
+      rows(16, __VA_ARGS__);                                                                       \
       break;                                                                                       \
     default:                                                                                       \
       rows(lanes, __VA_ARGS__);                                                                    \
@@ -87,25 +85,15 @@ SUPINE_INLINE void supine_physics_stage_image(size_t lanes, const supine_stage *
                                               const float *from, size_t i, float *out) {
   const supine_rows *links = stage->links;
   const float *here = from + i * lanes;
-  const float *mass = stage->mass + i * lanes;
+  const float mass = stage->mass[i];
   SUPINE_EACH_LANE(r, lanes) {
-    out[r] = mass[r] * here[r];
+    out[r] = mass * here[r];
   }
   for (size_t s = links->begin[i]; s < links->begin[i + 1]; ++s) {
     const float *other = from + (size_t)links->column[s] * lanes;
-    if (stage->give == NULL) {
-      const float c = links->value[s];
-      SUPINE_EACH_LANE(r, lanes) {
-        out[r] += c * (here[r] - other[r]);
-      }
-    } else {
-      const float *outer = stage->give + (size_t)links->column[s] * lanes;
-      const float *inner = stage->give + i * lanes;
-      SUPINE_EACH_LANE(r, lanes) { /* as paper_link: cheaper than to fetch */
-        const float product = inner[r] * outer[r];
-        out[r] +=
-            product / (links->value[s] * (links->value[s] + 2.0F * product)) * (here[r] - other[r]);
-      }
+    const float c = links->value[s];
+    SUPINE_EACH_LANE(r, lanes) {
+      out[r] += c * (here[r] - other[r]);
     }
   }
 }

@@ -38,7 +38,7 @@ typedef struct accuracy_work {
 typedef struct transposed {
   size_t count;
   double length[BLOCK]; /* |d| */
-  double columns[SUPINE_FORCE_COLUMNS_MAX][BLOCK];
+  double columns[SUPINE_SPAN_MAX][BLOCK];
   float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
 } transposed;
 
@@ -53,7 +53,7 @@ static void transpose(const accuracy_work *work, size_t begin, size_t count, tra
     for (size_t k = 0; k < modes; ++k) {
       block->coefficients[k][i] = c[k];
     }
-    for (size_t r = 0; truth->fields == NULL && r < truth->rank; ++r) {
+    for (size_t r = 0; r < truth->rank; ++r) {
       block->columns[r][i] = truth->columns[(begin + i) * truth->rank + r];
     }
   }
@@ -92,21 +92,15 @@ SUPINE_CLONES static void miss_block(const double *is, const double *should, con
   }
 }
 
-static void compare_block(const accuracy_work *work, tally *sums, size_t begin,
-                          const transposed *block) {
+static void compare_block(const accuracy_work *work, tally *sums, const transposed *block) {
   const supine_truth *truth = work->truth;
   const size_t modes = work->compression->mode_count;
   double is[BLOCK];
-  double should[BLOCK] = {0.0}; /* to its end, though the last block is shorter */
+  double should[BLOCK];
   double miss[BLOCK];
   for (size_t d = 0; d < truth->direction_count; ++d) {
     compressed_block(block, modes, work->weights + d * modes, is);
-    if (truth->fields != NULL) {
-      memcpy(should, truth->fields + d * work->compression->vertex_count + begin,
-             block->count * sizeof *should);
-    } else {
-      true_block(block, truth->rank, truth->functions + d * truth->rank, should);
-    }
+    true_block(block, truth->rank, truth->functions + d * truth->rank, should);
     for (size_t i = 0; i < block->count; ++i) {
       const double field = should[i] * block->length[i];
       sums->field2 += field * field;
@@ -129,7 +123,7 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
     for (size_t b = blocks * part / PARTS; b < blocks * (part + 1) / PARTS; ++b) {
       const size_t left = n - b * BLOCK;
       transpose(work, b * BLOCK, left < BLOCK ? left : BLOCK, block);
-      compare_block(work, &work->tallies[part], b * BLOCK, block);
+      compare_block(work, &work->tallies[part], block);
     }
   }
 }
@@ -196,12 +190,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   transposed *blocks = calloc(threads, sizeof *blocks);
   supine_accuracy made = {.direction_count = count};
   supine_status status = SUPINE_OK;
-  if (compression->mode_count > SUPINE_MODES_MADE_MAX ||
-      (truth->fields == NULL && truth->rank > SUPINE_FORCE_COLUMNS_MAX)) {
+  if (compression->mode_count > SUPINE_MODES_MADE_MAX || truth->rank > SUPINE_SPAN_MAX) {
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "%zu modes against %zu columns: at most %d and %d can be compared",
                               compression->mode_count, truth->rank, SUPINE_MODES_MADE_MAX,
-                              SUPINE_FORCE_COLUMNS_MAX);
+                              SUPINE_SPAN_MAX);
     goto cleanup;
   }
   if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {

@@ -23,9 +23,8 @@ typedef struct supine_accuracy {
 typedef struct supine_truth {
   size_t direction_count;
   const double *directions; /**< [D, 3] */
-  const double *fields;     /**< [D, N] F of the full solve; NULL: columns x functions */
   size_t rank;
-  const double *columns;   /**< [N, rank] */
+  const double *columns;   /**< [N, rank], of which the full solve is a sum */
   const double *functions; /**< [D, rank] */
   const double *cubic;     /**< [D, 3] volume against breath scale, mL; NULL: open surface */
 } supine_truth;
@@ -47,8 +46,7 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
  * @param directions  [N, 3] d
  * @param forms       of the compression's coefficients; NULL: open surface
  * @param state       to compare at; halved until every direction reaches it
- * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX modes or SUPINE_FORCE_COLUMNS_MAX
- * columns
+ * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX modes or SUPINE_SPAN_MAX columns
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (no volume is reached) */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,

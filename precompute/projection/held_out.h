@@ -3,27 +3,23 @@
 #ifndef SUPINE_HELD_OUT_H
 #define SUPINE_HELD_OUT_H
 
-#include "precompute/projection/accuracy.h"
 #include "precompute/physics/model.h"
+#include "precompute/projection/accuracy.h"
 
-/* Owns what a supine_truth points to. */
+/* Owns what a supine_truth points to, but for its columns. */
 typedef struct supine_held_out {
   supine_truth truth;
-  double *directions, *fields, *functions, *cubic;
+  double *directions, *functions, *cubic;
 } supine_held_out;
 
-/* The linear route: by superposition of the solved columns, which is exact. `forms` are those of
- * the projection's columns; NULL: open surface. */
-supine_status supine_accuracy_held_out_linear(const supine_lungs *lungs, const supine_model *model,
-                                              const supine_projection *projection,
-                                              const supine_volume_forms *forms, size_t count,
-                                              supine_held_out *held_out, supine_error *error);
-
-/* Every other route: solved one by one, from what `guess` says, to the tolerance of samples. */
-supine_status supine_accuracy_held_out_sampled(const supine_lungs *lungs, const supine_model *model,
-                                               const double *directions,
-                                               const supine_compression *guess, size_t count,
-                                               supine_held_out *held_out, supine_error *error);
+/* Finds it by superposition of the solved columns, which is as exact as the projection's span.
+ * @param directions  [N, 3] d
+ * @param forms       of the projection's columns; NULL: volumes of each direction's field alone */
+supine_status supine_accuracy_held_out(const supine_lungs *lungs, const supine_model *model,
+                                       const double *directions,
+                                       const supine_projection *projection,
+                                       const supine_volume_forms *forms, size_t count,
+                                       supine_held_out *held_out, supine_error *error);
 
 void supine_accuracy_held_out_free(supine_held_out *held_out);
 

@@ -4,22 +4,24 @@
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
- * kept in factors, C = columns x functions: the linear route needs no more columns than the applied
- * force has, one right-hand side each. */
+ * kept in factors, C = columns x functions. The transfer does not turn with gravity, so that it
+ * commutes with the projection: the force at any direction is a sum of those at a few (span.h), the
+ * transfer is applied to these alone, and what is transformed is how they sum. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
+#include "precompute/projection/span.h"
 
 /** A projected scalar field. */
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
+  supine_span *span; /**< that columns and functions are of; NULL: another simulator's field */
   size_t rank;       /**< R */
   double *columns;   /**< [N, R] */
   double *functions; /**< [R, (band + 1)^2]; NULL where R = (band + 1)^2 and it is the identity */
-  size_t solve_count;
   size_t iterations; /**< of the solve that took most */
   double residual;   /**< the largest */
 } supine_projection;
@@ -29,47 +31,22 @@ void supine_projection_free(supine_projection *projection);
 /** Reports progress from 0 to 1; returns false to stop the work. */
 typedef bool supine_progress_function(void *context, double fraction);
 
-/** The linear route: one solve for all columns of the force, and the quadrature of its functions of
- * gravity. Exact for laws with soften = 0.
- * @retval SUPINE_ERROR_ARGUMENT  soften is not 0, a band above SUPINE_SH_BAND_MAX, bad stiffness
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_projection_linear(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_projection *projection,
-                                       supine_error *error);
+/** Relative residual of solves with softening where the model names none: what is left of its force
+ * is some ten times more. */
+#define SUPINE_SOFTENED_TOLERANCE 5e-6
 
-/** The same with a rule of latitudes x longitudes directions instead of the default, which is eight
- * times finer than the band. */
-supine_status supine_projection_linear_rule(const supine_lungs *lungs, const supine_model *model,
-                                            size_t band, size_t latitudes, size_t longitudes,
-                                            supine_projection *projection, supine_error *error);
-
-/** The sampled route: a full solve for every direction of a Gauss-Legendre x equispaced grid, and
- * the transform of every vertex's field. For any law. The columns that come back are the harmonics'
- * coefficients themselves; memory is one ring of fields and those, and solves side by side within
- * 600 MB, or eight directions where these alone take more.
+/** Projects the field: solves for the span's directions, and transforms the span's functions on a
+ * grid eight times finer than the band, so that their kinks, where another vertex becomes the
+ * lowest or highest, do not fold back into it.
  * @param progress  optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_projection_sampled(const supine_lungs *lungs, const supine_model *model,
-                                        size_t band, supine_progress_function *progress,
-                                        void *context, supine_projection *projection,
-                                        supine_error *error);
-
-/** The smooth route: a full solve for each of some 100 directions, and a polynomial through them in
- * gravity over the lungs' extent along it, in which the field is analytic while over the sphere it
- * has kinks (smooth.c). Columns and functions as from the linear route, without what a grid folds
- * back; memory is the columns, the fields of 32 directions, and solves within the same 600 MB.
- * @param progress  optional
- * @retval SUPINE_ERROR_ARGUMENT  soften is too large for a polynomial (above some 2.5), a bad band
- * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
+ * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach, a band above
+ *                                   SUPINE_SH_BAND_MAX, bad stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_projection_smooth(const supine_lungs *lungs, const supine_model *model,
+supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
                                        size_t band, supine_progress_function *progress,
                                        void *context, supine_projection *projection,
                                        supine_error *error);
-
-/** How many directions that solves for; 0: soften is too large. */
-size_t supine_projection_smooth_directions(const supine_model *model);
 
 /** A field compressed to K functions of orientation:
  * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */

@@ -70,7 +70,8 @@ void full_solve_run(void *context) {
   if (supine_physics_height_range(lungs, false, 1, g, &low, &high) != SUPINE_OK) {
     return;
   }
-  supine_physics_force(lungs, &law, g, low, high, solve->force);
+  const supine_gravities gravity = {1, g, &low, &high};
+  supine_physics_force(lungs, &law, &gravity, lungs->mesh.vertex_count, NULL, solve->force);
   /* to the accuracy that a frame needs, not the default's 1e-14 */
   (void)supine_physics_equilibrium_solve(solve->equilibrium, 1, solve->force, 1e-6, false,
                                          solve->caught, NULL, NULL);

@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The field over orientation: solves for a few directions, and the transform of how they sum. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/projection/projection.h"
+#include "sh/transform.h"
+#include <supine/sh.h>
+
+enum {
+  LATITUDES_PER_BAND = 8, /* of the grid; longitudes are twice as many */
+  LATITUDES_MIN = 32,
+  LANES = 16 /* right-hand sides of one solve: a cache line of single precision */
+};
+
+void supine_projection_free(supine_projection *projection) {
+  free(projection->span);
+  free(projection->columns);
+  free(projection->functions);
+  *projection = (supine_projection){0};
+}
+
+/* --- functions of gravity -------------------------------------------------------------------- */
+
+/* Directions of the grid and the lungs' extent along each, [latitudes * longitudes]. */
+typedef struct grid_heights {
+  double *directions, *minimum, *maximum;
+} grid_heights;
+
+/* Searches half the grid: the other is opposite to it. */
+static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
+                                  grid_heights *made) {
+  const size_t width = grid->longitudes;
+  const size_t count = grid->latitudes * width;
+  for (size_t d = 0; d < count; ++d) {
+    supine_sh_grid_direction(grid, d / width, d % width, made->directions + 3 * d);
+  }
+  const supine_status status = supine_physics_height_range(lungs, pair, count / 2, made->directions,
+                                                           made->minimum, made->maximum);
+  for (size_t d = 0; d < count / 2; ++d) {
+    const size_t opposite =
+        (grid->latitudes - 1 - d / width) * width + (d % width + width / 2) % width;
+    made->minimum[opposite] = -made->maximum[d];
+    made->maximum[opposite] = -made->minimum[d];
+  }
+  return status;
+}
+
+/* functions [R, (band + 1)^2] of the span's weights. */
+static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
+                               const supine_span *span, double *functions, supine_error *error) {
+  const size_t least = LATITUDES_PER_BAND * (band + 1);
+  const size_t latitudes = least < LATITUDES_MIN ? LATITUDES_MIN : least;
+  const size_t count = 2 * latitudes * latitudes;
+  const supine_sh_batch batch = {.fields = span->rank};
+  supine_sh_grid *grid = NULL;
+  supine_sh_transform *plan = NULL;
+  grid_heights heights = {malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
+                          malloc(count * sizeof(double))};
+  double *ring = malloc(2 * latitudes * span->rank * sizeof *ring);
+  supine_status status = supine_sh_grid_create(latitudes, 2 * latitudes, &grid);
+  if (status == SUPINE_OK) {
+    status = supine_sh_transform_create(band, grid, &plan, error);
+  }
+  if (status == SUPINE_OK && (heights.directions == NULL || heights.minimum == NULL ||
+                              heights.maximum == NULL || ring == NULL)) {
+    status = SUPINE_ERROR_MEMORY;
+  }
+  if (status == SUPINE_OK) {
+    status = find_heights(lungs, law->pair, grid, &heights);
+  }
+  memset(functions, 0, span->rank * supine_sh_count(band) * sizeof *functions);
+  for (size_t j = 0; j < latitudes && status == SUPINE_OK; ++j) {
+    const size_t first = j * 2 * latitudes;
+    const supine_gravities gravities = {2 * latitudes, heights.directions + 3 * first,
+                                        heights.minimum + first, heights.maximum + first};
+    status = supine_projection_span_weights(lungs, law, span, &gravities, ring);
+    if (status == SUPINE_OK) {
+      status = supine_sh_forward_ring(plan, &batch, j, ring, functions, error);
+    }
+  }
+  supine_sh_transform_destroy(plan);
+  supine_sh_grid_destroy(grid);
+  free(heights.directions);
+  free(heights.minimum);
+  free(heights.maximum);
+  free(ring);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "projection to band %zu: %s", band,
+                                                supine_status_string(status));
+}
+
+/* --- columns --------------------------------------------------------------------------------- */
+
+/* A stage of the work for the caller to follow. */
+typedef struct follower {
+  supine_progress_function *progress;
+  void *context;
+} follower;
+
+/* Solves for the span's directions, some at a time, into columns [N, R]. */
+static supine_status solve(const supine_lungs *lungs, const supine_model *model,
+                           const follower *caller, supine_projection *made, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t rank = made->rank;
+  const size_t lanes = rank < LANES ? rank : LANES;
+  const double softened = model->force.soften == 0.0 ? 0.0 : SUPINE_SOFTENED_TOLERANCE;
+  const double tolerance = model->tolerance > 0.0 ? model->tolerance : softened;
+  double range[2 * SUPINE_SPAN_MAX];
+  supine_network *network = NULL;
+  supine_equilibrium *equilibrium = NULL;
+  double *force = malloc(n * lanes * sizeof *force);
+  double *caught = malloc(n * lanes * sizeof *caught);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (force == NULL || caught == NULL ||
+      supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
+                                  range + rank) != SUPINE_OK ||
+      supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
+      supine_physics_equilibrium_create(network, lanes, 0, &equilibrium) != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
+    goto cleanup;
+  }
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
+  for (size_t first = 0; first < rank && status == SUPINE_OK; first += lanes) {
+    const size_t count = rank - first < lanes ? rank - first : lanes;
+    const supine_gravities gravities = {count, made->span->directions + 3 * first, range + first,
+                                        range + rank + first};
+    supine_solve_report report;
+    if (caller->progress != NULL &&
+        !caller->progress(caller->context, (double)first / (double)rank)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+      break;
+    }
+    supine_physics_force(lungs, &model->force, &gravities, n, NULL, force);
+    status = supine_physics_equilibrium_solve(equilibrium, count, force, tolerance, false, caught,
+                                              &report, error);
+    for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+      memcpy(made->columns + i * rank + first, caught + i * count, count * sizeof *caught);
+    }
+    made->iterations = report.iterations > made->iterations ? report.iterations : made->iterations;
+    made->residual = report.residual > made->residual ? report.residual : made->residual;
+  }
+cleanup:
+  free(force);
+  free(caught);
+  supine_physics_equilibrium_destroy(equilibrium);
+  supine_physics_network_destroy(network);
+  return status;
+}
+
+supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_progress_function *progress,
+                                       void *context, supine_projection *projection,
+                                       supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  const follower caller = {progress, context};
+  supine_projection made = {.vertex_count = n, .band = band};
+  supine_status status = supine_physics_model_check(model, error);
+  if (status == SUPINE_OK && band > SUPINE_SH_BAND_MAX) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu is above %d", band,
+                              SUPINE_SH_BAND_MAX);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  made.span = malloc(sizeof *made.span);
+  status = made.span == NULL
+               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force")
+               : supine_projection_span_create(lungs, &model->force, made.span, error);
+  if (status == SUPINE_OK) {
+    made.rank = made.span->rank;
+    made.columns = malloc(n * made.rank * sizeof *made.columns);
+    made.functions = malloc(made.rank * supine_sh_count(band) * sizeof *made.functions);
+    status =
+        made.columns == NULL || made.functions == NULL
+            ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n)
+            : transform(lungs, &model->force, band, made.span, made.functions, error);
+  }
+  if (status == SUPINE_OK) {
+    status = solve(lungs, model, &caller, &made, error);
+  }
+  if (status == SUPINE_OK) {
+    *projection = made;
+    made = (supine_projection){0};
+  }
+  supine_projection_free(&made);
+  return status;
+}

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A few directions of gravity whose forces sum to those of all. */
+#include <cblas.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/projection/span.h"
+#include "sh/base/vec3.h"
+
+/* What is chosen from. */
+enum { VERTICES = 1024, DIRECTIONS = 512 };
+
+/* Largest force that may be left of the largest: 6e-5 of the RMS force are, a hundredth of the
+ * error of 16 modes. */
+static const double left_out = 3e-4;
+static const double rounding = 1e-12; /* the same without softening: exact */
+
+/* Vertex and direction of what is left of most, by full pivoting; takes its cross off all others.
+ * force [vertices, DIRECTIONS]. */
+static void take_cross(double *force, size_t vertices, size_t at) {
+  const double *column = force + at % DIRECTIONS;
+  double row[DIRECTIONS];
+  memcpy(row, force + at / DIRECTIONS * DIRECTIONS, sizeof row);
+  const double pivot = row[at % DIRECTIONS];
+  for (size_t i = 0; i < vertices; ++i) {
+    const double factor = column[i * DIRECTIONS] / pivot;
+    for (size_t d = 0; d < DIRECTIONS; ++d) {
+      force[i * DIRECTIONS + d] -= factor * row[d];
+    }
+  }
+}
+
+static size_t largest_of(const double *force, size_t count) {
+  size_t at = 0;
+  for (size_t k = 1; k < count; ++k) {
+    at = fabs(force[k]) > fabs(force[at]) ? k : at;
+  }
+  return at;
+}
+
+/* f_j(g_r) inverted. */
+static supine_status invert(double *matrix, size_t rank) {
+  lapack_int pivots[SUPINE_SPAN_MAX];
+  const lapack_int n = (lapack_int)rank;
+  return LAPACKE_dgetrf(LAPACK_ROW_MAJOR, n, n, matrix, n, pivots) == 0 &&
+                 LAPACKE_dgetri(LAPACK_ROW_MAJOR, n, matrix, n, pivots) == 0
+             ? SUPINE_OK
+             : SUPINE_ERROR_NUMERICAL;
+}
+
+/* Chooses crosses of the force [count, DIRECTIONS] until next to nothing is left: indices among its
+ * vertices and directions. False: more would be needed. */
+static bool choose(double *force, size_t count, double share, size_t *rank,
+                   size_t of[SUPINE_SPAN_MAX], size_t from[SUPINE_SPAN_MAX]) {
+  size_t at = largest_of(force, count * DIRECTIONS);
+  const double least = share * fabs(force[at]);
+  *rank = 0;
+  while (fabs(force[at]) > least && *rank < SUPINE_SPAN_MAX) {
+    of[*rank] = at / DIRECTIONS;
+    from[(*rank)++] = at % DIRECTIONS;
+    take_cross(force, count, at);
+    at = largest_of(force, count * DIRECTIONS);
+  }
+  return fabs(force[at]) <= least;
+}
+
+supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
+                                            supine_span *span, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t count = n < VERTICES ? n : VERTICES;
+  const size_t values = count * DIRECTIONS;
+  double directions[3 * DIRECTIONS];
+  double range[2 * DIRECTIONS];
+  size_t vertices[VERTICES];
+  size_t from[SUPINE_SPAN_MAX];
+  size_t of[SUPINE_SPAN_MAX];
+  double *force = malloc(values * sizeof *force);
+  double *left = malloc(values * sizeof *left);
+  supine_status status = SUPINE_OK;
+  for (size_t d = 0; d < DIRECTIONS; ++d) {
+    supine_spiral((double)d, DIRECTIONS, 0.0, directions + 3 * d);
+  }
+  if (force == NULL || left == NULL ||
+      supine_physics_height_range(lungs, law->pair, DIRECTIONS, directions, range,
+                                  range + DIRECTIONS) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force");
+    goto cleanup;
+  }
+  for (size_t k = 0; k < count; ++k) {
+    vertices[k] = k * n / count;
+  }
+  const supine_gravities gravities = {DIRECTIONS, directions, range, range + DIRECTIONS};
+  supine_physics_force(lungs, law, &gravities, count, vertices, force);
+  memcpy(left, force, values * sizeof *left);
+  if (!choose(left, count, law->soften == 0.0 ? rounding : left_out, &span->rank, of, from)) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--soften %g takes more than %d functions of gravity: give at most 5",
+                              law->soften, SUPINE_SPAN_MAX);
+    goto cleanup;
+  }
+  for (size_t r = 0; r < span->rank; ++r) {
+    memcpy(span->directions + 3 * r, directions + 3 * from[r], 3 * sizeof *directions);
+    span->vertices[r] = vertices[of[r]];
+    for (size_t c = 0; c < span->rank; ++c) {
+      span->inverse[r * span->rank + c] = force[of[r] * DIRECTIONS + from[c]];
+    }
+  }
+  if (span->rank == 0 || invert(span->inverse, span->rank) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the force is zero everywhere");
+  }
+cleanup:
+  free(force);
+  free(left);
+  return status;
+}
+
+supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
+                                             const supine_span *span,
+                                             const supine_gravities *gravities, double *weights) {
+  const int rank = (int)span->rank;
+  const int count = (int)gravities->count;
+  double *force = malloc((span->rank * gravities->count + 1) * sizeof *force);
+  if (force == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_physics_force(lungs, law, gravities, span->rank, span->vertices, force);
+  cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, count, rank, rank, 1.0, force, count,
+              span->inverse, rank, 0.0, weights, rank);
+  free(force);
+  return SUPINE_OK;
+}

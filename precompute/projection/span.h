@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The force of every direction of gravity as a sum of those of a few directions:
+ *
+ *     f_i(g) = sum over r of f_i(g_r) w_r(g),      f_j(g) = sum over r of f_j(g_r) w_r(g)
+ *
+ * at as many vertices j, of which the second equation finds w (cross approximation: Goreinov,
+ * Tyrtyshnikov and Zamarashkin 1997). Without softening four directions do, or five, and it is
+ * exact; with it, as many as the tolerance asks for. */
+#ifndef SUPINE_SPAN_H
+#define SUPINE_SPAN_H
+
+#include "precompute/physics/force.h"
+
+/* Most directions of a span: those of a soften of some 7. */
+enum { SUPINE_SPAN_MAX = 128 };
+
+typedef struct supine_span {
+  size_t rank;                                       /* R */
+  double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] g_r */
+  size_t vertices[SUPINE_SPAN_MAX];                  /* [R] j */
+  double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] of f_j(g_r) */
+} supine_span;
+
+/* Chooses the directions and vertices.
+ * @retval SUPINE_ERROR_ARGUMENT  the softening asks for more than SUPINE_SPAN_MAX
+ * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (there is no force) */
+supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
+                                            supine_span *span, supine_error *error);
+
+/* w at some directions, [gravities->count, R].
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
+                                             const supine_span *span,
+                                             const supine_gravities *gravities, double *weights);
+
+#endif
