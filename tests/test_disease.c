@@ -128,7 +128,7 @@ static void check_lesions(const supine_lungs *lungs) {
       assert_true(breathed.inside[1] < 0.9);
       assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
       /* At one volume all others take what the lesion leaves, in the same proportion. */
-      assert_true(breathed.far[1] / breathed.far[0] - 1.0 < scaled.far[1] - scaled.far[0] + 1e-9);
+      assert_close(breathed.far[1] / breathed.far[0], scaled.far[1] / scaled.far[0], 1e-9);
       const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
       const change by_small = change_by(lungs, &small, 500.0);
       printf("                         of 18 mm: %.6f to %.6f at 500 mL\n", by_small.far[0],

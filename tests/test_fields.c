@@ -61,6 +61,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
   supine_fields fields = {.direction_count = count, .vertex_count = n};
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.force.soften = soften;
+  model.reach = soften != 0.0 ? 10.0 : 0.0;
   fields.directions = malloc(3 * count * sizeof(double));
   fields.displacement = malloc(3 * count * n * sizeof(double));
   for (size_t d = 0; d < count; ++d) {

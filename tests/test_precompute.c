@@ -267,7 +267,7 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   assert_int_equal(by_modes->shape[0], modes);
   for (size_t kept = 1; kept <= modes; kept += (modes - 1) / 2) {
     const double is = error_of_first(kept, lungs, model, basis, count, directions);
-    assert_close(left[kept - 1], is, 1e-4 * is);
+    assert_close(left[kept - 1], is, (model->force.soften == 0.0 ? 1e-4 : 1e-3) * is);
   }
   const double *bands = by_band->data;
   for (size_t l = 0; l < by_band->shape[0]; ++l) {
@@ -279,7 +279,7 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
 }
 
 /* On the held-out directions themselves, the stated error is what deforming and solving one by one
- * find, to the rounding of float positions. */
+ * find, to the rounding of float positions and, with softening, to what the few solves leave. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -295,7 +295,8 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   supine_accuracy_held_out_directions(HELD_OUT, g);
   true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
   const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
-  assert_close(report.accuracy.relative_rms, relative, 1e-4 * relative);
+  const double rounding = soften == 0.0 ? 1e-4 : 1e-3;
+  assert_close(report.accuracy.relative_rms, relative, rounding * relative);
   assert_close(report.accuracy.rms_mm, sqrt(mean_of(HELD_OUT, error_mm2).mean),
                1e-3 * report.accuracy.rms_mm);
   assert_true(report.accuracy.relative_p95 > report.accuracy.relative_rms);

@@ -174,21 +174,28 @@ static void test_projection_few_solves_sum_to_any_full_solve(void **state) {
 }
 
 static void test_projection_impossible_softening_refused(void **state) {
+  (void)state;
+  supine_mesh mesh = {0};
+  supine_lungs lungs = {0};
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  supine_projection projection;
+  supine_projection made;
   supine_error error;
+  assert_int_equal(supine_phantom_create(20000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   model.force.soften = 1.0;
-  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "--soften needs a reach"));
-  model.reach = 10.0;
-  model.force.soften = 40.0;
-  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
+  model = supine_physics_model(SUPINE_LAW_DEEP);
+  model.force.soften = 18.0;
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "at most 5"));
+  assert_non_null(strstr(error.message, "at most 12"));
   model.force = (supine_force_law){0};
-  assert_int_equal(supine_projection_create(*state, &model, 5, NULL, NULL, &projection, &error),
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
                    SUPINE_ERROR_NUMERICAL);
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&mesh);
 }
 
 /* Singular values and reproduced fields against a dense decomposition of the weighted matrix. */

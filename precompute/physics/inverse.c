@@ -53,6 +53,7 @@ supine_status supine_physics_inverse_force(const supine_network *network, const 
   return status;
 }
 
+/* Eight parameters: the system, the two fields that meet in it, and what comes of them. */
 supine_status supine_physics_inverse_gradient(const supine_network *network,
                                               supine_equilibrium *equilibrium,
                                               const double *stiffness, const double *catch_,

@@ -54,6 +54,7 @@ static supine_status find_cubics(const supine_lungs *lungs, const double *share,
   return status;
 }
 
+/* Eight parameters: the lungs and their law, what was solved, and what comes of it. */
 supine_status supine_accuracy_held_out(const supine_lungs *lungs, const supine_model *model,
                                        const double *directions,
                                        const supine_projection *projection,

@@ -95,9 +95,10 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   supine_physics_force(lungs, law, &gravities, count, vertices, force);
   memcpy(left, force, values * sizeof *left);
   if (!choose(left, count, law->soften == 0.0 ? rounding : left_out, &span->rank, of, from)) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--soften %g takes more than %d functions of gravity: give at most 5",
-                              law->soften, SUPINE_SPAN_MAX);
+    status =
+        supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                         "--soften %g takes more than %d functions of gravity: give at most 12",
+                         law->soften, SUPINE_SPAN_MAX);
     goto cleanup;
   }
   for (size_t r = 0; r < span->rank; ++r) {

@@ -11,7 +11,7 @@
 
 #include "precompute/physics/force.h"
 
-/* Most directions of a span: those of a soften of some 7. */
+/* Most directions of a span: those of a soften of some 12. */
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
