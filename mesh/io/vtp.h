@@ -10,15 +10,16 @@ enum { VTP_ARRAYS = 8, VTP_FIRST_OF_POINTS = 3 };
 
 typedef struct vtp vtp;
 
-/* Puts an array's bytes at *at, which grows. */
-typedef void vtp_fill(const vtp *file, unsigned char **at);
+/* Put the bytes of an array's items `begin` to `end` at `at`. */
+typedef void vtp_fill(const vtp *file, size_t begin, size_t end, unsigned char *at);
 
 /* One array of every frame. */
 typedef struct vtp_array {
   const char *type;
   const char *name;
   unsigned components;
-  size_t bytes;
+  size_t item; /* bytes of a point or triangle: 1, 4 or 12 */
+  size_t count;
   bool still; /* the same in every frame: written once */
   vtp_fill *fill;
 } vtp_array;
@@ -32,9 +33,11 @@ struct vtp {
   uint64_t *offsets;   /* [frames, array_count] */
   size_t next;         /* frame */
   uint64_t written;    /* bytes of the arrays so far */
-  unsigned char *raw;  /* room for any array's bytes */
-  unsigned char *packed;
-  uint64_t *sizes; /* of its blocks */
+  size_t threads;
+  unsigned char *raw;    /* a block for each thread */
+  unsigned char *packed; /* room for any array's blocks */
+  uint64_t *sizes;       /* of its blocks */
+  const vtp_array *packing;
 };
 
 /* Which arrays there are, and room for them; SUPINE_ERROR_MEMORY. */
