@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cblas.h>
 #include <gsl/gsl_errno.h>
 #include <jansson.h>
 
@@ -88,6 +89,7 @@ static void hear_gsl(const char *reason, const char *file, int line, int code) {
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler(hear_gsl);
   json_set_alloc_funcs(allocate_json, free);
+  openblas_set_num_threads(1); /* its threads would spin beside the program's own */
   supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();

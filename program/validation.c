@@ -341,7 +341,7 @@ static supine_status predict_points(const supine_command_subject *s, size_t whic
         supine_inside_biharmonic_fit(n, s->rest.vertices, 3, displacement, CENTRES, &fit, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted, error);
+    supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted);
   }
   for (size_t i = 0; i < 3 * pairs->count && status == SUPINE_OK; ++i) {
     predicted[i] += pairs->from[i];

@@ -187,7 +187,7 @@ static void test_biharmonic_centres_and_affine_come_back(void **state) {
   assert_int_equal(
       supine_inside_biharmonic_fit(COUNT, points, COLUMNS, values, CENTRES, &fit, NULL), SUPINE_OK);
   assert_int_equal(fit.count, CENTRES);
-  assert_int_equal(supine_inside_biharmonic_evaluate(&fit, COUNT, points, found, NULL), SUPINE_OK);
+  supine_inside_biharmonic_evaluate(&fit, COUNT, points, found);
   double noise = 0.0;
   for (size_t i = 0; i < COUNT; ++i) {
     for (size_t k = 0; k < 3; ++k) { /* 60 mm, through a matrix of condition 1e5 or so */

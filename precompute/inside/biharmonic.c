@@ -1,18 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Biharmonic interpolation: well-spread centres, one dense solve, sums over the centres. */
+/* Biharmonic interpolation: well-spread centres, one dense factorisation, sums over the centres. */
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 #include "precompute/inside/biharmonic.h"
 
-enum { AFFINE = 4, BLOCK = 512 };
+/* Columns of the matrix that are eliminated together; points and centres of a tile of sums. */
+enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
-static double apart(const double a[3], const double b[3]) {
+static inline double apart(const double a[3], const double b[3]) {
   const double x = a[0] - b[0];
   const double y = a[1] - b[1];
   const double z = a[2] - b[2];
@@ -36,8 +40,8 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
 }
 
 /* Farthest first: every next centre is the point farthest from all before it. */
-static supine_status choose(size_t count, const double *points, size_t centre_max,
-                            supine_inside_biharmonic *fit) {
+SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
+                                          supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);
   if (distance == NULL) {
     return SUPINE_ERROR_MEMORY;
@@ -58,7 +62,8 @@ static supine_status choose(size_t count, const double *points, size_t centre_ma
     }
     ++fit->count;
     for (size_t i = 0; i < count; ++i) {
-      distance[i] = fmin(distance[i], apart(points + 3 * i, centre));
+      const double d = apart(points + 3 * i, centre);
+      distance[i] = d < distance[i] ? d : distance[i];
     }
     for (size_t i = 0; i < count; ++i) {
       farthest = distance[i] > distance[farthest] ? i : farthest;
@@ -72,32 +77,203 @@ static supine_status choose(size_t count, const double *points, size_t centre_ma
   return SUPINE_OK;
 }
 
-/* [ |p_i - p_j|  1 p ; (1 p)^T  0 ] [w; a B] = [values; 0]. */
-static supine_status solve(const supine_inside_biharmonic *fit, const double *values) {
-  const size_t m = fit->count;
-  const size_t size = m + AFFINE;
-  double *matrix = calloc(size * size, sizeof *matrix);
-  lapack_int *pivots = malloc(size * sizeof *pivots);
-  lapack_int failed = -1;
-  if (matrix != NULL && pivots != NULL) {
-    for (size_t i = 0; i < m; ++i) {
-      const double *p = fit->centres + 3 * i;
-      for (size_t j = 0; j < i; ++j) {
-        matrix[i * size + j] = matrix[j * size + i] = apart(p, fit->centres + 3 * j);
-      }
-      const double affine[AFFINE] = {1.0, p[0], p[1], p[2]};
-      for (size_t a = 0; a < AFFINE; ++a) {
-        matrix[i * size + m + a] = matrix[(m + a) * size + i] = affine[a];
-      }
-      for (size_t r = 0; r < fit->columns; ++r) {
-        fit->weights[r * size + i] = values[fit->chosen[i] * fit->columns + r];
+/* The distances of the centres without their affine part. With l(p) the barycentric coordinates in
+ * the tetrahedron of the first four centres q, a(p) the distances from them and G those among them,
+ *
+ *     N_ij = l_i.b_j + b_i.l_j - |p_i - p_j|,    b = a - G l / 2
+ *
+ * is positive definite over the other centres. */
+typedef struct reduced {
+  size_t size;        /* of N */
+  double slope[3][3]; /* of l_1, l_2, l_3 */
+  double *l, *b;      /* [4 + size, 4] */
+  double *matrix;     /* [size, size], the lower triangle column by column */
+  size_t done;        /* columns eliminated */
+} reduced;
+
+/* Put centres far from a line and from a plane in the third and fourth place; false where all lie
+ * in one plane. */
+static bool find_tetrahedron(supine_inside_biharmonic *fit, double slope[3][3]) {
+  static const double flat = 1e-9;
+  double edge[3][3] = {{0.0}};
+  double across[3] = {0.0, 0.0, 0.0};
+  double most = 0.0;
+  double *c = fit->centres;
+  for (size_t corner = 1; corner < AFFINE && corner < fit->count; ++corner) {
+    size_t best = corner;
+    most = 0.0;
+    for (size_t i = corner; i < fit->count && corner > 1; ++i) {
+      const double to[3] = {c[3 * i] - c[0], c[3 * i + 1] - c[1], c[3 * i + 2] - c[2]};
+      double turned[3];
+      supine_cross(edge[0], to, turned);
+      const double size = corner == 2 ? supine_length(turned) : fabs(supine_dot(across, to));
+      best = size > most ? i : best;
+      most = size > most ? size : most;
+    }
+    const size_t which = fit->chosen[best];
+    fit->chosen[best] = fit->chosen[corner];
+    fit->chosen[corner] = which;
+    for (size_t k = 0; k < 3; ++k) {
+      const double at = c[3 * best + k];
+      c[3 * best + k] = c[3 * corner + k];
+      c[3 * corner + k] = at;
+      edge[corner - 1][k] = at - c[k];
+    }
+    supine_cross(edge[0], edge[1], across);
+  }
+  const double volume = supine_triple(edge[0], edge[1], edge[2]);
+  for (size_t k = 0; k < 3; ++k) {
+    supine_cross(edge[(k + 1) % 3], edge[(k + 2) % 3], slope[k]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      slope[k][axis] /= volume;
+    }
+  }
+  return fit->count >= AFFINE && most > flat;
+}
+
+static void find_coordinates(const double *c, reduced *r) {
+  for (size_t i = 0; i < AFFINE + r->size; ++i) {
+    double *l = r->l + AFFINE * i;
+    const double to[3] = {c[3 * i] - c[0], c[3 * i + 1] - c[1], c[3 * i + 2] - c[2]};
+    l[0] = 1.0;
+    for (size_t k = 1; k < AFFINE; ++k) {
+      l[k] = supine_dot(r->slope[k - 1], to);
+      l[0] -= l[k];
+    }
+    for (size_t k = 0; k < AFFINE; ++k) {
+      double *b = r->b + AFFINE * i + k;
+      *b = apart(c + 3 * i, c + 3 * k);
+      for (size_t j = 0; j < AFFINE; ++j) {
+        *b -= 0.5 * apart(c + 3 * k, c + 3 * j) * l[j];
       }
     }
-    failed = LAPACKE_dgesv(LAPACK_COL_MAJOR, (lapack_int)size, (lapack_int)fit->columns, matrix,
-                           (lapack_int)size, pivots, fit->weights, (lapack_int)size);
   }
-  free(matrix);
-  free(pivots);
+}
+
+SUPINE_CLONES static void fill(const double *centres, const reduced *r) {
+  const double *c = centres + 3 * AFFINE;
+  const double *l = r->l + AFFINE * AFFINE;
+  const double *b = r->b + AFFINE * AFFINE;
+  for (size_t j = 0; j < r->size; ++j) {
+    for (size_t i = j; i < r->size; ++i) {
+      double sum = -apart(c + 3 * i, c + 3 * j);
+      for (size_t k = 0; k < AFFINE; ++k) {
+        sum += l[AFFINE * i + k] * b[AFFINE * j + k] + b[AFFINE * i + k] * l[AFFINE * j + k];
+      }
+      r->matrix[j * r->size + i] = sum;
+    }
+  }
+}
+
+/* Take the last columns eliminated out of those behind, a long block of these and a short one in
+ * turn. */
+static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const reduced *r = context;
+  const size_t n = r->size;
+  const size_t blocks = (n - r->done + COLUMNS - 1) / COLUMNS;
+  const double *last = r->matrix + (r->done - COLUMNS) * n;
+  for (size_t i = begin; i < end; ++i) {
+    const size_t j = r->done + COLUMNS * (i % 2 == 0 ? i / 2 : blocks - 1 - i / 2);
+    const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(n - j), (int)width, COLUMNS, -1.0,
+                last + j, (int)n, last + j, (int)n, 1.0, r->matrix + j * n + j, (int)n);
+  }
+}
+
+/* Cholesky's factorisation, the same whatever the number of threads. */
+static lapack_int factorise(reduced *r) {
+  const size_t n = r->size;
+  lapack_int failed = 0;
+  for (size_t j = 0; j < n && failed == 0; j += COLUMNS) {
+    double *corner = r->matrix + j * n + j;
+    const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
+    const size_t below = n - j - width;
+    failed = LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', (lapack_int)width, corner, (lapack_int)n);
+    if (below > 0 && failed == 0) {
+      cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)below,
+                  (int)width, 1.0, corner, (int)n, corner + width, (int)n);
+      r->done = j + width;
+      supine_parallel_for((below + COLUMNS - 1) / COLUMNS, 2, 0, update_blocks, r);
+    }
+  }
+  return failed;
+}
+
+/* Weights of one column from N z = l.f(q) - f, which is solved in `z`: those of q make up for the
+ * others' affine part, and the affine function meets f(q). */
+static void finish_column(const supine_inside_biharmonic *fit, const reduced *r, const double *z,
+                          const double f[AFFINE], double *weights) {
+  const double *c = fit->centres;
+  const size_t m = fit->count;
+  double left[AFFINE];
+  memcpy(weights + AFFINE, z, r->size * sizeof *z);
+  for (size_t k = 0; k < AFFINE; ++k) {
+    weights[k] = 0.0;
+    for (size_t i = AFFINE; i < m; ++i) {
+      weights[k] -= r->l[AFFINE * i + k] * weights[i];
+    }
+  }
+  for (size_t k = 0; k < AFFINE; ++k) {
+    left[k] = f[k];
+    for (size_t i = 0; i < m; ++i) {
+      left[k] -= apart(c + 3 * k, c + 3 * i) * weights[i];
+    }
+  }
+  weights[m] = left[0];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double *slope = weights + m + 1 + axis;
+    *slope = 0.0;
+    for (size_t k = 1; k < AFFINE; ++k) {
+      *slope += (left[k] - left[0]) * r->slope[k - 1][axis];
+    }
+    weights[m] -= *slope * c[axis];
+  }
+}
+
+/* [ |p_i - p_j|  1 p ; (1 p)^T  0 ] [w; a B] = [values; 0], by N. */
+static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
+  reduced r = {0};
+  if (!find_tetrahedron(fit, r.slope)) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  const size_t m = fit->count;
+  const size_t columns = fit->columns;
+  r.size = m - AFFINE;
+  r.l = malloc(AFFINE * m * sizeof *r.l);
+  r.b = malloc(AFFINE * m * sizeof *r.b);
+  r.matrix = malloc((r.size * r.size + 1) * sizeof *r.matrix);
+  double *z = malloc((r.size * columns + 1) * sizeof *z);
+  lapack_int failed = -1;
+  if (r.l != NULL && r.b != NULL && r.matrix != NULL && z != NULL) {
+    find_coordinates(fit->centres, &r);
+    fill(fit->centres, &r);
+    for (size_t i = 0; i < r.size; ++i) {
+      for (size_t c = 0; c < columns; ++c) {
+        double *to = &z[c * r.size + i];
+        *to = -values[fit->chosen[AFFINE + i] * columns + c];
+        for (size_t k = 0; k < AFFINE; ++k) {
+          *to += r.l[AFFINE * (AFFINE + i) + k] * values[fit->chosen[k] * columns + c];
+        }
+      }
+    }
+    failed = factorise(&r);
+  }
+  if (failed == 0 && r.size > 0) {
+    failed = LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', (lapack_int)r.size, (lapack_int)columns,
+                            r.matrix, (lapack_int)r.size, z, (lapack_int)r.size);
+  }
+  for (size_t c = 0; c < columns && failed == 0; ++c) {
+    double f[AFFINE];
+    for (size_t k = 0; k < AFFINE; ++k) {
+      f[k] = values[fit->chosen[k] * columns + c];
+    }
+    finish_column(fit, &r, z + c * r.size, f, fit->weights + c * (m + AFFINE));
+  }
+  free(r.l);
+  free(r.b);
+  free(r.matrix);
+  free(z);
   return failed == 0 ? SUPINE_OK : failed > 0 ? SUPINE_ERROR_NUMERICAL : SUPINE_ERROR_MEMORY;
 }
 
@@ -136,48 +312,69 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit) {
   *fit = (supine_inside_biharmonic){0};
 }
 
-/* Points of a block, and what multiplies the weights at each: distances, then 1, x, y, z. */
-typedef struct block {
+/* Points and their values. */
+typedef struct evaluation {
   const supine_inside_biharmonic *fit;
   const double *points;
-  double *rows;
-} block;
+  double *values;
+  size_t count;
+} evaluation;
 
-static void fill_rows(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const block *b = context;
-  const supine_inside_biharmonic *fit = b->fit;
-  const size_t m = fit->count;
-  for (size_t i = begin; i < end; ++i) {
-    double *row = b->rows + i * (m + AFFINE);
-    double x[3];
-    for (int k = 0; k < 3; ++k) {
-      x[k] = (b->points[3 * i + (size_t)k] - fit->middle[k]) / fit->unit;
+/* Add the sum over centres [first, last) to the values of the `here` points x. */
+SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
+                                      size_t last, const double (*x)[POINTS], size_t here,
+                                      double *values) {
+  double distance[CENTRES][POINTS];
+  for (size_t j = first; j < last; ++j) {
+    const double *c = fit->centres + 3 * j;
+    for (size_t i = 0; i < POINTS; ++i) {
+      const double d[3] = {x[0][i] - c[0], x[1][i] - c[1], x[2][i] - c[2]};
+      distance[j - first][i] = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     }
-    for (size_t j = 0; j < m; ++j) {
-      row[j] = apart(x, fit->centres + 3 * j);
+  }
+  for (size_t r = 0; r < fit->columns; ++r) {
+    const double *weights = fit->weights + r * (fit->count + AFFINE);
+    double sum[POINTS] = {0.0};
+    for (size_t j = first; j < last; ++j) {
+      for (size_t i = 0; i < POINTS; ++i) {
+        sum[i] += weights[j] * distance[j - first][i];
+      }
     }
-    row[m] = 1.0;
-    memcpy(row + m + 1, x, sizeof x);
+    for (size_t i = 0; i < here; ++i) {
+      values[i * fit->columns + r] += sum[i];
+    }
   }
 }
 
-supine_status supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
-                                                const double *points, double *values,
-                                                supine_error *error) {
-  const size_t width = fit->count + AFFINE;
-  double *rows = malloc(BLOCK * width * sizeof *rows);
-  if (rows == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu centres", fit->count);
+static void evaluate_tiles(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const evaluation *e = context;
+  const supine_inside_biharmonic *fit = e->fit;
+  const size_t m = fit->count;
+  for (size_t tile = begin; tile < end; ++tile) {
+    const size_t at = tile * POINTS;
+    const size_t here = e->count - at < POINTS ? e->count - at : POINTS;
+    double *values = e->values + at * fit->columns;
+    double x[3][POINTS] = {{0.0}};
+    for (size_t i = 0; i < here; ++i) {
+      for (size_t k = 0; k < 3; ++k) {
+        x[k][i] = (e->points[3 * (at + i) + k] - fit->middle[k]) / fit->unit;
+      }
+      for (size_t r = 0; r < fit->columns; ++r) {
+        const double *affine = fit->weights + r * (m + AFFINE) + m;
+        values[i * fit->columns + r] =
+            affine[0] + affine[1] * x[0][i] + affine[2] * x[1][i] + affine[3] * x[2][i];
+      }
+    }
+    for (size_t first = 0; first < m; first += CENTRES) {
+      add_centres(fit, first, first + CENTRES < m ? first + CENTRES : m, (const double(*)[POINTS])x,
+                  here, values);
+    }
   }
-  for (size_t first = 0; first < count; first += BLOCK) {
-    const size_t here = count - first < BLOCK ? count - first : BLOCK;
-    block work = {fit, points + 3 * first, rows};
-    supine_parallel_for(here, 64, 0, fill_rows, &work);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)here, (int)fit->columns, (int)width,
-                1.0, rows, (int)width, fit->weights, (int)width, 0.0, values + first * fit->columns,
-                (int)fit->columns);
-  }
-  free(rows);
-  return SUPINE_OK;
+}
+
+void supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
+                                       const double *points, double *values) {
+  evaluation e = {fit, points, values, count};
+  supine_parallel_for((count + POINTS - 1) / POINTS, 4, 0, evaluate_tiles, &e);
 }

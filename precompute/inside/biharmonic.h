@@ -32,7 +32,7 @@ typedef struct supine_inside_biharmonic {
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
- * Cost: count x M for the choice, 2/3 M^3 multiplications and 8 M^2 bytes for the one
+ * Cost: count x M for the choice, 1/6 M^3 multiplications and 4 M^2 bytes for the one
  * factorisation that serves all columns. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,
@@ -42,10 +42,8 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit);
 /** Values at any points.
  * @param points  [count, 3] mm
  * @param values  [count, columns], written
- * @retval SUPINE_ERROR_MEMORY
  * Cost: M (columns + a square root) a point. */
-supine_status supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
-                                                const double *points, double *values,
-                                                supine_error *error);
+void supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
+                                       const double *points, double *values);
 
 #endif

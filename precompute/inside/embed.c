@@ -108,12 +108,10 @@ static void take_back(embedding *e, size_t begin, size_t end, const double *valu
 
 /* Points [begin, end) of the order, all of one lung, at most BLOCK. In `space`: positions [2
  * BLOCK, 3], values [2 BLOCK, R]; the second half are the surface's points nearest to those whose
- * distance is less than `reach`. Eight parameters and the error: a block is no more than its
- * range. */
-static supine_status move_block(embedding *e, const supine_inside_shell *shell,
-                                const double *displacement, const supine_inside_biharmonic *fit,
-                                double reach, size_t begin, size_t end, double *space,
-                                supine_error *error) {
+ * distance is less than `reach`. Eight parameters: a block is no more than its range. */
+static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
+                       const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
+                       double *space) {
   double *positions = space;
   double *values = space + (size_t)6 * BLOCK;
   const size_t count = end - begin;
@@ -131,11 +129,7 @@ static supine_status move_block(embedding *e, const supine_inside_shell *shell,
       near[near_count++] = i;
     }
   }
-  const supine_status status =
-      supine_inside_biharmonic_evaluate(fit, count + near_count, positions, values, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  supine_inside_biharmonic_evaluate(fit, count + near_count, positions, values);
   double *motion = values + (size_t)2 * BLOCK * e->columns;
   for (size_t j = 0; j < near_count; ++j) {
     const supine_inside_place *place = &e->place[e->order[begin + near[j]]];
@@ -153,30 +147,24 @@ static supine_status move_block(embedding *e, const supine_inside_shell *shell,
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
   take_back(e, begin, end, values);
-  return SUPINE_OK;
 }
 
 /* Adds to sums of squares what the interpolation leaves at the surface's vertices, and their
  * motion.
  */
-static supine_status residual(const embedding *e, const supine_inside_shell *shell,
-                              const double *displacement, const supine_inside_biharmonic *fit,
-                              double *space, double sums[2], supine_error *error) {
+static void residual(const embedding *e, const supine_inside_shell *shell,
+                     const double *displacement, const supine_inside_biharmonic *fit, double *space,
+                     double sums[2]) {
   for (size_t first = 0; first < shell->vertex_count; first += BLOCK) {
     const size_t left = shell->vertex_count - first;
     const size_t count = left < BLOCK ? left : BLOCK;
-    const supine_status status =
-        supine_inside_biharmonic_evaluate(fit, count, shell->vertices + 3 * first, space, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    supine_inside_biharmonic_evaluate(fit, count, shell->vertices + 3 * first, space);
     for (size_t i = 0; i < count * e->columns; ++i) {
       const double wanted = displacement[first * e->columns + i];
       sums[0] += (space[i] - wanted) * (space[i] - wanted);
       sums[1] += wanted * wanted;
     }
   }
-  return SUPINE_OK;
 }
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end, double sums[2],
@@ -199,12 +187,11 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
   status = supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
                                         displacement, centres, &fit, error);
   if (status == SUPINE_OK) {
-    status = residual(e, shell, displacement, &fit, space, sums, error);
+    residual(e, shell, displacement, &fit, space, sums);
   }
   const double reach = reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
-    status = move_block(e, shell, displacement, &fit, reach, at,
-                        at + BLOCK < end ? at + BLOCK : end, space, error);
+    move_block(e, shell, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }
   report->centres += fit.count;
   report->surface += shell->vertex_count;
