@@ -12,7 +12,7 @@
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normals.h"
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 
 /* Metadata under construction. */
 typedef struct entries {

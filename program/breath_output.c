@@ -9,7 +9,7 @@
 #include "sh/base/text.h"
 #include <supine/safetensors.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 
 #include "program/breath_output.h"
 #include "program/template/template.h"

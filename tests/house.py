@@ -100,37 +100,52 @@ def check_files_apart(files):
         faults.append(f"files that include each other in circles: {sorted(graph)}")
 
 
-def check_names(rooms):
-    """External names begin with their room's."""
-    checked = 0
+def objects():
+    """What each object of the rooms defines and uses: (source without its ending, names, names)."""
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:
-            room = (match[1] + match[2]).replace("//", "/")
-            if not name.endswith(".c.o") or not os.path.exists(os.path.join(source, room, name[:-2])):
-                continue
-            prefix = PREFIX.get(room, (f"supine_{os.path.basename(room)}_",))
-            listed = subprocess.run(["nm", "--defined-only", "--extern-only", os.path.join(folder, name)],
-                                    capture_output=True, text=True, check=True).stdout
-            checked += 1
-            for symbol in re.findall(r" [A-Z] (\w+)$", listed, re.M):
-                if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
-                    faults.append(f"{room}/{name[:-2]} defines {symbol}, which does not begin {' or '.join(prefix)}")
-    if checked < len(rooms):
-        faults.append(f"only {checked} objects in {build}")
+            file = os.path.normpath(f"{match[1]}{match[2]}/{name[:-len('.o')]}")
+            if name.endswith(".c.o") and os.path.exists(os.path.join(source, file)):
+                listed = subprocess.run(["nm", "--extern-only", os.path.join(folder, name)],
+                                        capture_output=True, text=True, check=True).stdout
+                yield (file[:-len(".c")], re.findall(r" [A-TV-Z] (\w+)$", listed, re.M),
+                       re.findall(r" U (\w+)$", listed, re.M))
+
+
+def check_names(rooms):
+    """External names begin with their room's, and files do not use each other in circles."""
+    listed = list(objects())
+    home = {name: file for file, defined, _ in listed for name in defined}
+    for file, defined, _ in listed:
+        room = os.path.dirname(file)
+        prefix = PREFIX.get(room, (f"supine_{os.path.basename(room)}_",))
+        for symbol in defined:
+            if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
+                faults.append(f"{file}.c defines {symbol}, which does not begin {' or '.join(prefix)}")
+    graph = {file: {home[name] for name in used if name in home} - {file} for file, _, used in listed}
+    while leaves := {f for f, out in graph.items() if not out & set(graph)}:
+        graph = {f: out for f, out in graph.items() if f not in leaves}
+    while roots := set(graph) - {f for out in graph.values() for f in out}:
+        graph = {f: out for f, out in graph.items() if f not in roots}
+    if graph:
+        faults.append(f"files that use each other in circles: {sorted(graph)}")
+    if len(listed) < len(rooms):
+        faults.append(f"only {len(listed)} objects in {build}")
 
 
 def check_sizes(files):
     """No function above 60 lines, none of more than 7 parameters, unless the comment above it says
     why: a sentence with "lines" or "parameters" in it."""
-    begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)[A-Za-z_][^;{}=#]*?\b(\w+)\(([^;{}]*)\) \{$", re.M)
+    begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)(?:\w[\w ]*\n)?[A-Za-z_][^\n;:{}=#]*(?:\n +[^\n;{}=#]*)*\) \{$", re.M)
+    head = re.compile(r"\b(\w+)\(([^;{}]*)\) \{$")
     for file in files:
         if not file.endswith(".c"):
             continue
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             text = opened.read()
         for found in begin.finditer(text):
-            name, parameters = found.groups()
+            name, parameters = head.search(found.group()).groups()
             lines = text.count("\n", found.start(), text.index("\n}", found.end())) + 2
             before = text[:found.start()].rstrip()
             comment = before[before.rfind("/*"):] if before.endswith("*/") else ""

@@ -15,7 +15,7 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 
 #include "lungs_helpers.h"
 

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 #include "runtime_fixture.h"
 
 void *fixture_allocate(size_t count, size_t size) {

@@ -19,7 +19,7 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"

@@ -8,12 +8,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
 #include <supine/safetensors.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 #include "runtime/safetensors/checksum.h"
 
 #include "runtime_fixture.h"
@@ -143,23 +144,39 @@ static void test_write_bad_arguments_refused(void **state) {
   const supine_tensor reserved = {"__metadata__", SUPINE_U8, 1, {3}, bytes3};
   const supine_metadata checksum = {"checksum", "0"};
   const supine_metadata keys[] = {{"k", "1"}, {"k", "2"}};
-  const char *path = "/nonexistent-folder/file";
   const supine_status bad = SUPINE_ERROR_ARGUMENT;
-  assert_int_equal(supine_writer_safetensors_write(path, twice, 2, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &rank0, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &rank5, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &dtype, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &huge, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &null, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &reserved, 1, NULL, 0, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, &checksum, 1, NULL), bad);
-  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, keys, 2, NULL), bad);
+  FILE *file = fopen("/dev/null", "wb");
+  assert_non_null(file);
+  assert_int_equal(supine_safetensors_write(file, "x", twice, 2, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &rank0, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &rank5, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &dtype, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &huge, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &null, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &reserved, 1, NULL, 0, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &good, 1, &checksum, 1, NULL), bad);
+  assert_int_equal(supine_safetensors_write(file, "x", &good, 1, keys, 2, NULL), bad);
+  assert_int_equal(fclose(file), 0);
+}
+
+static void test_write_refused_or_failing_leaves_no_file(void **state) {
+  (void)state;
+  const supine_tensor good = {"a", SUPINE_U8, 1, {3}, bytes3};
+  const supine_tensor twice[] = {good, good};
+  const char *missing = "/nonexistent-folder/file";
   supine_error error;
-  assert_int_equal(supine_writer_safetensors_write(path, &good, 1, NULL, 0, &error),
+  assert_int_equal(supine_writer_safetensors_write(missing, &good, 1, NULL, 0, &error),
                    SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, path));
+  assert_non_null(strstr(error.message, missing));
   assert_int_equal(supine_writer_safetensors_write("/dev/full", &good, 1, NULL, 0, &error),
                    SUPINE_ERROR_WRITE);
+  char *folder = fixture_folder();
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/a", folder);
+  assert_int_equal(supine_writer_safetensors_write(path, twice, 2, NULL, 0, NULL),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(rmdir(folder), 0); /* nothing is left in it */
+  free(folder);
 }
 
 #define A8 "\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}"
@@ -389,6 +406,7 @@ int main(void) {
       cmocka_unit_test(test_write_header_of_any_length_is_padded_to_eight_bytes),
       cmocka_unit_test(test_write_bytes_outside_utf8_become_question_marks),
       cmocka_unit_test(test_write_bad_arguments_refused),
+      cmocka_unit_test(test_write_refused_or_failing_leaves_no_file),
       cmocka_unit_test(test_open_valid_headers_accepted),
       cmocka_unit_test(test_open_bad_headers_refused),
       cmocka_unit_test(test_open_hostile_lengths_refused),

@@ -74,6 +74,7 @@ double supine_image_get(const supine_image *image, size_t index);
 /** The same for the numbers from + index[0 .. count - 1], or for `count` of them from `begin`. */
 void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
                          double *values);
+/** Store `count` numbers from `begin` on, rounded and clipped to the type. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
 /** Coordinates of a point in voxels: (0, 0, 0) is the first voxel's centre. */

@@ -1,8 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choosing the format by the name's ending, and what all formats share. */
-#include <float.h>
-#include <math.h>
-#include <stdlib.h>
+/* Saving a surface in the format that the name's ending asks for. */
 #include <string.h>
 #include <strings.h>
 
@@ -47,62 +44,6 @@ bool supine_mesh_save_supports(const char *path) {
   return find_function(path) != NULL;
 }
 
-/* Float32 holds it: else a file would be written that cannot be loaded. */
-static bool fits(double x) {
-  return fabs(x) <= (double)FLT_MAX;
-}
-
-supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
-                                       supine_error *error) {
-  if (mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: too large to write: %zu vertices, %zu triangles", path,
-                            mesh->vertex_count, mesh->triangle_count);
-  }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    const double *vertex = mesh->vertices + 3 * i;
-    if (!fits(vertex[0]) || !fits(vertex[1]) || !fits(vertex[2])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: vertex %zu has a coordinate that is not finite", path, i);
-    }
-  }
-  return SUPINE_OK;
-}
-
-static void copy_comment(const char *comment, char *line, size_t size) {
-  size_t length = 0;
-  for (; comment != NULL && comment[length] != '\0' && length < size - 1; ++length) {
-    const unsigned char c = (unsigned char)comment[length];
-    line[length] = comment[length];
-    if (c < ' ' || c == 0x7F) {
-      line[length] = ' ';
-    }
-  }
-  line[length] = '\0';
-}
-
-void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
-                              mesh_writer *writer) {
-  const supine_mesh_save_options chosen =
-      options == NULL ? (supine_mesh_save_options){0} : *options;
-  const bool ras = chosen.axes == SUPINE_AXES_RAS;
-  const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
-  const double horizontal = (ras ? -1.0 : 1.0) / unit;
-  *writer = (mesh_writer){.mesh = mesh,
-                          .rest = chosen.rest,
-                          .expected_error = chosen.expected_error,
-                          .normals = chosen.normals,
-                          .lung = chosen.lung,
-                          .fields = chosen.fields,
-                          .field_count = chosen.field_count,
-                          .factor = {horizontal, horizontal, 1.0 / unit},
-                          .space = ras ? "RAS" : "LPS"};
-  if (chosen.rounding > 0.0) {
-    writer->quantum = exp2(floor(log2(chosen.rounding / unit)));
-  }
-  copy_comment(chosen.comment, writer->comment, sizeof writer->comment);
-}
-
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error) {
   save_function *function = find_function(path);
@@ -128,52 +69,4 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
     return supine_error_set(error, status, "%s: out of memory", path);
   }
   return supine_output_commit(&output, error);
-}
-
-/* To the writer's grid, where it has one. */
-static double rounded(const mesh_writer *writer, double length) {
-  return writer->quantum > 0.0 ? rint(length / writer->quantum) * writer->quantum : length;
-}
-
-void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* a grid for normals, where lengths have one: 0.1 degrees */
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double turned = copysign((double)writer->normals[3 * i + axis],
-                                   (double)writer->normals[3 * i + axis] * writer->factor[axis]);
-    normal[axis] = (float)((writer->quantum > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
-  }
-}
-
-void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
-    position[axis] =
-        (float)(rounded(writer, writer->factor[axis] * writer->mesh->vertices[3 * i + axis]) + 0.0);
-  }
-}
-
-void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
-  double square = 0.0;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double d = writer->mesh->vertices[3 * i + axis] - writer->rest[3 * i + axis];
-    const double scaled = rounded(writer, writer->factor[axis] * d);
-    displacement[axis] = (float)(scaled + 0.0);
-    square += scaled * scaled;
-  }
-  displacement[3] = (float)rounded(writer, sqrt(square));
-}
-
-void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t bits = 0;
-    memcpy(&bits, &values[i], sizeof bits);
-    supine_mesh_put_u32(at, &bits, 1);
-  }
-}
-
-void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    for (unsigned byte = 0; byte < 4; ++byte) {
-      *(*at)++ = (unsigned char)(values[i] >> (8 * byte));
-    }
-  }
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 #include "sh/base/parallel.h"
 
 #include "precompute/inside/biharmonic.h"

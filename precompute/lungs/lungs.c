@@ -259,10 +259,6 @@ void supine_lungs_free(supine_lungs *lungs) {
   *lungs = (supine_lungs){0};
 }
 
-const char *supine_lungs_name(const supine_lungs *lungs, size_t lung) {
-  return lungs->side[lung] > 0 ? "left" : "right";
-}
-
 static double unit_clamp(double value) {
   return fmin(fmax(value, 0.0), 1.0);
 }

@@ -43,7 +43,9 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
 void supine_lungs_free(supine_lungs *lungs);
 
 /** "left" or "right". */
-const char *supine_lungs_name(const supine_lungs *lungs, size_t lung);
+static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lung) {
+  return lungs->side[lung] > 0 ? "left" : "right";
+}
 
 /** The box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the back to
  * the front, Z from the apex to the base. */

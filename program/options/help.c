@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A command's --help, from its table. */
+/* A command's table of options, row by row, and its --help. */
 #include <string.h>
 
 #include "program/options/option.h"
@@ -41,6 +41,18 @@ static void print_text(const char *text, size_t column, size_t left, FILE *file)
     text += length + 1;
     (void)fprintf(file, "%*s", text[0] == '\n' ? 0 : (int)left, "");
     column = left;
+  }
+}
+
+void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
+                          void *context) {
+  for (const supine_option *option = options;
+       option->name != NULL || option->help != NULL || option->table != NULL; ++option) {
+    if (option->table != NULL) {
+      supine_options_visit(option->table, base + option->offset, each, context);
+    } else {
+      each(context, option, base);
+    }
   }
 }
 

@@ -26,18 +26,6 @@ typedef struct reading {
   row rows[ROWS_MAX];
 } reading;
 
-void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
-                          void *context) {
-  for (const supine_option *option = options;
-       option->name != NULL || option->help != NULL || option->table != NULL; ++option) {
-    if (option->table != NULL) {
-      supine_options_visit(option->table, base + option->offset, each, context);
-    } else {
-      each(context, option, base);
-    }
-  }
-}
-
 static void collect(void *context, const supine_option *option, size_t base) {
   reading *r = context;
   if (option->name != NULL && r->count < ROWS_MAX) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Safetensors files: mapping them, and asking what they hold. */
+/* Opening safetensors files, and checking them against their checksum. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -57,47 +57,6 @@ supine_status supine_safetensors_open(const char *path, supine_safetensors **fil
   return status != SUPINE_OK ? status
                              : open_bytes(mapping.bytes == NULL ? "" : mapping.bytes, mapping.size,
                                           mapping, path, file, error);
-}
-
-void supine_safetensors_close(supine_safetensors *file) {
-  if (file == NULL) {
-    return;
-  }
-  supine_platform_unmap(&file->mapping);
-  for (size_t i = 0; file->copies != NULL && i < file->tensor_count; ++i) {
-    free(file->copies[i]);
-  }
-  free(file->copies);
-  free(file->tensors);
-  free(file->metadata);
-  free(file->entries);
-  free(file->header);
-  free(file->name);
-  free(file);
-}
-
-const supine_tensor *supine_safetensors_find(const supine_safetensors *file, const char *name) {
-  for (size_t i = 0; i < file->tensor_count; ++i) {
-    if (strcmp(file->tensors[i].name, name) == 0) {
-      return &file->tensors[i];
-    }
-  }
-  return NULL;
-}
-
-const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key) {
-  for (size_t i = 0; i < file->metadata_count; ++i) {
-    if (strcmp(file->metadata[i].key, key) == 0) {
-      return file->metadata[i].value;
-    }
-  }
-  return NULL;
-}
-
-const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
-                                                       size_t *count) {
-  *count = file->metadata_count;
-  return file->metadata;
 }
 
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {

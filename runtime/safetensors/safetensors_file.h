@@ -4,8 +4,8 @@
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 
-#include "runtime/safetensors/platform.h"
 #include "runtime/safetensors/dtype.h"
+#include "runtime/safetensors/platform.h"
 
 /** A tensor and where the header says that it lies. */
 typedef struct safetensors_entry {

@@ -5,11 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/safetensors/safetensors_write.h"
 #include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/dtype.h"
 #include "runtime/safetensors/json.h"
-#include "sh/base/output.h"
+#include <supine/safetensors.h>
 
 /* The header while it grows, and copies of every string in clean UTF-8. */
 typedef struct writer {
@@ -197,12 +196,11 @@ static void put_header(writer *w, size_t tensor_count, size_t metadata_count) {
   }
 }
 
-supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
-                                              size_t tensor_count, const supine_metadata *metadata,
-                                              size_t metadata_count, supine_error *error) {
+supine_status supine_safetensors_write(FILE *file, const char *name, const supine_tensor *tensors,
+                                       size_t tensor_count, const supine_metadata *metadata,
+                                       size_t metadata_count, supine_error *error) {
   writer w = {0};
-  supine_output output = {0};
-  supine_status status = check_tensors(tensors, tensor_count, path, error);
+  supine_status status = check_tensors(tensors, tensor_count, name, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -210,7 +208,7 @@ supine_status supine_writer_safetensors_write(const char *path, const supine_ten
     w.failed = true;
     goto cleanup;
   }
-  status = check_names(&w, tensor_count, metadata_count, path, error);
+  status = check_names(&w, tensor_count, metadata_count, name, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -218,27 +216,21 @@ supine_status supine_writer_safetensors_write(const char *path, const supine_ten
   if (w.failed) {
     goto cleanup;
   }
-  status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
   const uint64_t length = w.size;
-  (void)fwrite(&length, sizeof length, 1, output.file);
-  (void)fwrite(w.header, 1, w.size, output.file);
+  (void)fwrite(&length, sizeof length, 1, file);
+  (void)fwrite(w.header, 1, w.size, file);
   for (size_t i = 0; i < tensor_count; ++i) {
     size_t size = 0;
     (void)supine_safetensors_tensor_size(&w.tensors[i], &size);
     if (size > 0) {
-      (void)fwrite(w.tensors[i].data, 1, size, output.file);
+      (void)fwrite(w.tensors[i].data, 1, size, file);
     }
   }
-  status = supine_output_commit(&output, error);
 
 cleanup:
   if (w.failed) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", name);
   }
-  supine_output_abandon(&output);
   free(w.header);
   free(w.tensors);
   free(w.metadata);

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "runtime/safetensors/safetensors_write.h"
+#include "precompute/writer.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
 #include "program/stream/volume.h"

@@ -13,6 +13,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include <supine/status.h>
 
@@ -101,6 +102,19 @@ SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_s
  * @retval SUPINE_ERROR_FORMAT  no checksum, or the content differs: the file is corrupted */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
+
+/** Write a file to a stream, and add the metadata "checksum". Tensors are laid out by descending
+ * element size, in the given order within one size, so that each begins at a multiple of its
+ * element size; the header is padded with spaces to a multiple of 8. Bytes of a name, key or value
+ * that are not UTF-8 are written as '?'. Errors of writing stay in the stream: see ferror, fclose.
+ * @param name  of the file, for messages
+ * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
+ *                                range, or the key "checksum", which is the writer's
+ * @retval SUPINE_ERROR_MEMORY */
+SUPINE_API supine_status supine_safetensors_write(FILE *file, const char *name,
+                                                  const supine_tensor *tensors, size_t tensor_count,
+                                                  const supine_metadata *metadata,
+                                                  size_t metadata_count, supine_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: MIT */
+/* Images in files: which format a name asks for, and what is checked of both. */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "sh/base/text.h"
+#include "sh/base/vec3.h"
+
+#include "mesh/image/formats.h"
+
+static bool is_nifti(const char *path) {
+  return supine_text_ends_in_any_case(path, ".nii") ||
+         supine_text_ends_in_any_case(path, ".nii.gz");
+}
+
+bool supine_image_supports(const char *path) {
+  return supine_text_ends_in_any_case(path, ".nrrd") || is_nifti(path);
+}
+
+bool supine_image_is_named(const char *path) {
+  static const char *const others[] = {".mha", ".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
+  bool is = supine_image_supports(path);
+  for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
+    is = is || supine_text_ends_in_any_case(path, others[i]);
+  }
+  return is;
+}
+
+/* Finite, and three directions? A voxel's edges are no closer than a thousandth of a right angle.
+ */
+static bool is_frame(const supine_image *image) {
+  double lengths = 1.0;
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    lengths *= supine_length(s);
+    if (!isfinite(image->origin[a])) {
+      return false;
+    }
+  }
+  return isfinite(lengths) && lengths > 0.0 &&
+         fabs(supine_triple(image->step[0], image->step[1], image->step[2])) > 1e-3 * lengths;
+}
+
+supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
+  struct stat file = {0};
+  supine_image read = {.channels = 1};
+  if (!supine_image_supports(path)) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: an image's name must end in .nrrd, .nii or .nii.gz; others are "
+                            "to be converted, as by 3D Slicer or 'plastimatch convert'",
+                            path);
+  }
+  if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
+                            strerror(errno == 0 ? EISDIR : errno)); /* NOLINT */
+  }
+  supine_status status = is_nifti(path)
+                             ? supine_image_read_nifti(path, (size_t)file.st_size, &read, error)
+                             : supine_image_read_nrrd(path, (size_t)file.st_size, &read, error);
+  if (status == SUPINE_OK && !is_frame(&read)) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: the header's directions are no three axes", path);
+  }
+  if (status != SUPINE_OK) {
+    supine_image_free(&read);
+    return status;
+  }
+  *image = read;
+  return SUPINE_OK;
+}
+
+supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
+                                 supine_error *error) {
+  if (!supine_image_supports(path)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
+  }
+  return is_nifti(path) ? supine_image_write_nifti(path, supine_text_ends_in_any_case(path, ".gz"),
+                                                   image, note, error)
+                        : supine_image_write_nrrd(path, image, note, error);
+}
