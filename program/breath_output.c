@@ -30,6 +30,7 @@ struct breath_output {
   supine_folder folder; /* of a file a frame, with the PVD file beside it, or NULL: it is inside */
   float *positions;     /* [T, N, 3] */
   size_t next;
+  char comment[512];
 };
 
 static char *join(const char *first, const char *second) {
@@ -53,7 +54,11 @@ static void fill_save(breath_output *made) {
   made->fields[2] = (supine_mesh_field){"TimeValue", 1, content->course->time};
   made->save = *content->frame;
   made->save.rest = content->origin;
-  made->save.comment = content->made_by;
+  (void)snprintf(made->comment, sizeof made->comment,
+                 "displacement from %s; volumes are gas and "
+                 "tissue of each lung; %s",
+                 content->origin_name, content->made_by);
+  made->save.comment = made->comment;
   made->save.normals = made->normals;
   made->save.lung = lung == NULL ? NULL : lung->data;
   made->save.fields = made->fields;
@@ -279,7 +284,7 @@ static supine_status commit_tensors(const breath_output *output, supine_error *e
       {"gravity", SUPINE_F64, 2, {t, 3}, content->course->gravity}};
   const supine_metadata metadata[] = {{"format", "supine-breath"},
                                       {"version", "1"},
-                                      {"units", "mm, s, mL above rest"},
+                                      {"units", "mm, s, mL (gas and tissue of each lung)"},
                                       {"axes", "LPS"},
                                       {"made_by", content->made_by}};
   return supine_writer_safetensors_write(output->path, tensors, sizeof tensors / sizeof *tensors,

@@ -14,9 +14,10 @@ typedef struct breath_content {
   const supine_basis *basis;
   const supine_mesh *rest;               /* the basis' surface */
   const double *origin;                  /* [N, 3] where displacement counts from */
+  const char *origin_name;               /* "the scan" */
   const supine_mesh_save_options *frame; /* axes and units of VTP files */
   const breath_course *course;
-  const double *volumes; /* [T, G] mL beyond the basis' surface */
+  const double *volumes; /* [T, G] mL, gas and tissue */
   const char *made_by;   /* in one line */
 } breath_content;
 

@@ -9,7 +9,7 @@
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
 #include "program/options/orientation.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 
 static const char name[] = "breathe";
 
@@ -23,6 +23,7 @@ typedef struct request {
   const char *pv;
   const char *path;
   bool allow_folds, as_scanned;
+  supine_from from;
   double fps, seconds, step; /* 0: not given */
 } request;
 
@@ -48,7 +49,9 @@ static const supine_option table[] = {
      "opposite posture over the left side. Rest turns with it",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
-    {"tidal", 0, "ML", "air of a breath above the posture's rest, both lungs together; default 500",
+    {"tidal", 0, "ML",
+     "air of a breath above the posture's rest (above the scan where no rest is known), both lungs "
+     "together; default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
@@ -73,6 +76,7 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
     {"seconds", 0, "S", "how long; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
@@ -121,13 +125,11 @@ static int compare(const void *a, const void *b) {
 /* What the frames' own surfaces enclose, against what was asked. */
 typedef struct gauge {
   supine_mesh mesh;          /* shares the rest surface's triangles */
-  double rest;               /* mL */
-  double least, peak, worst; /* mL beyond the file's surface */
+  double least, peak, worst; /* mL */
 } gauge;
 
 static supine_status gauge_begin(const supine_mesh *rest, gauge *g) {
-  *g = (gauge){
-      .mesh = *rest, .rest = 1e-3 * supine_mesh_volume(rest), .least = INFINITY, .peak = -INFINITY};
+  *g = (gauge){.mesh = *rest, .least = INFINITY, .peak = -INFINITY};
   g->mesh.vertices = malloc(3 * rest->vertex_count * sizeof *g->mesh.vertices);
   return g->mesh.vertices != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
@@ -136,10 +138,10 @@ static void gauge_frame(gauge *g, const float *xyz, double wanted) {
   for (size_t i = 0; i < 3 * g->mesh.vertex_count; ++i) {
     g->mesh.vertices[i] = (double)xyz[i];
   }
-  const double gained = 1e-3 * supine_mesh_volume(&g->mesh) - g->rest;
-  g->peak = fmax(g->peak, gained);
-  g->least = fmin(g->least, gained);
-  g->worst = fmax(g->worst, fabs(gained - wanted));
+  const double held = 1e-3 * supine_mesh_volume(&g->mesh);
+  g->peak = fmax(g->peak, held);
+  g->least = fmin(g->least, held);
+  g->worst = fmax(g->worst, fabs(held - wanted));
 }
 
 static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
@@ -150,7 +152,7 @@ static void report(const request *wanted, const breath_course *course, const bre
   (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces hold %.2f to %.2f mL, each "
                "within %.2g mL of its volume\n",
                wanted->path, course->count, course->time[course->count - 1], wanted->fps,
-               measured->rest + measured->least, measured->rest + measured->peak, measured->worst);
+               measured->least, measured->peak, measured->worst);
   if (course->fixed) {
     (void)printf("one posture: %zu of the frames by three additions a vertex\n",
                  supine_breath_frames_stepped(frames));
@@ -159,14 +161,15 @@ static void report(const request *wanted, const breath_course *course, const bre
                1e3 * most, 1e3 * budget);
 }
 
+/* Eight parameters: the frames, what is asked of them and where they go. */
 static supine_status play_frames(const breath_course *course, breath_frames *frames,
-                                 breath_output *output, gauge *measured, float *xyz,
-                                 double *seconds, supine_error *error) {
+                                 breath_output *output, const double *asked, gauge *measured,
+                                 float *xyz, double *seconds, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < course->count && status == SUPINE_OK; ++t) {
     seconds[t] = supine_breath_frames_next(frames, xyz);
-    gauge_frame(measured, xyz, course->volume[t]);
+    gauge_frame(measured, xyz, asked[t]);
     status = supine_command_breath_output_add(output, xyz, error);
     if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)course->count)) {
       status =
@@ -189,18 +192,12 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   const size_t ends[2] = {least, most};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
-    double weights[SUPINE_MODES_MAX];
-    double scales[SUPINE_LUNGS_MAX] = {0};
-    status = supine_basis_weights(basis, course->gravity + 3 * ends[i], weights);
+    supine_pose pose;
+    const supine_state state =
+        supine_breath_state(basis, course->gravity + 3 * ends[i], course->volume[ends[i]]);
+    status = supine_basis_pose(basis, &state, &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_basis_scale(basis, weights, course->volume[ends[i]], &scales[0], error);
-    }
-    for (size_t lung = 1; lung < course->lungs; ++lung) {
-      scales[lung] = scales[0];
-    }
-    if (status == SUPINE_OK) {
-      status =
-          supine_options_volume_check(basis, name, wanted->allow_folds, weights, scales, error);
+      status = supine_options_pose_check(basis, name, wanted->allow_folds, &pose, error);
     }
   }
   return status;
@@ -219,41 +216,36 @@ static void warn_of_size(const request *wanted, const breath_content *content) {
   }
 }
 
-/* Where displacement counts from: the basis' surface or, where the first frame is as good as that
- * and would show none, the fullest frame. Viewers take their colours' range from the first. NULL:
- * no memory. */
-static double *find_origin(const supine_basis *basis, const breath_course *course,
-                           const supine_mesh *rest) {
-  static const double unseen = 1.0; /* mL */
-  const size_t count = 3 * rest->vertex_count;
+/* Positions [N, 3] that displacement counts from; NULL: no memory. */
+static double *find_origin(const supine_basis *basis, const supine_pose *pose, float *xyz) {
+  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
   double *origin = malloc(count * sizeof *origin);
-  float *xyz = malloc(count * sizeof *xyz);
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  size_t fullest = 0;
-  for (size_t t = 1; t < course->count; ++t) {
-    fullest = course->volume[t] > course->volume[fullest] ? t : fullest;
+  supine_deform(basis, pose, xyz);
+  for (size_t i = 0; origin != NULL && i < count; ++i) {
+    origin[i] = (double)xyz[i];
   }
-  if (origin != NULL && xyz != NULL) {
-    memcpy(origin, rest->vertices, count * sizeof *origin);
-    if (fabs(course->volume[0]) < unseen &&
-        supine_basis_weights(basis, course->gravity + 3 * fullest, weights) == SUPINE_OK &&
-        supine_basis_scale(basis, weights, course->volume[fullest], &scales[0], NULL) ==
-            SUPINE_OK) {
-      for (size_t lung = 1; lung < SUPINE_LUNGS_MAX; ++lung) {
-        scales[lung] = scales[0];
-      }
-      supine_deform(basis, weights, scales, xyz);
-      for (size_t i = 0; i < count; ++i) {
-        origin[i] = (double)xyz[i];
-      }
-    }
-  } else {
-    free(origin);
-    origin = NULL;
-  }
-  free(xyz);
   return origin;
+}
+
+/* What the lungs together hold in each frame, mL: the posture's rest, or the scan, and the breath.
+ */
+static supine_status find_asked(const supine_basis *basis, const breath_course *course,
+                                double *asked, supine_error *error) {
+  for (size_t t = 0; t < course->count; ++t) {
+    supine_pose pose;
+    double held[SUPINE_LUNGS_MAX];
+    const supine_state begin = supine_breath_state(basis, course->gravity + 3 * t, 0.0);
+    const supine_status status = supine_basis_pose(basis, &begin, &pose, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    supine_basis_volumes(basis, &pose, held);
+    asked[t] = course->volume[t];
+    for (size_t lung = 0; lung < course->lungs; ++lung) {
+      asked[t] += held[lung];
+    }
+  }
+  return SUPINE_OK;
 }
 
 /* Over 60 lines: what a breath needs is made in one place and freed in one. */
@@ -270,8 +262,11 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
   double *origin = NULL;
+  double *asked = malloc(count * sizeof *asked);
+  supine_reference_pose from;
   supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+  if (xyz == NULL || seconds == NULL || asked == NULL ||
+      supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
       gauge_begin(&rest, &measured) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
@@ -283,11 +278,11 @@ static supine_status play(const supine_basis *basis, const request *wanted,
     status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
                                          info->lung_count, &course, error);
   }
-  for (size_t t = 0; status == SUPINE_OK && t < count;
-       ++t) { /* a breath begins at its posture's rest */
-    double at_rest = 0.0;
-    (void)supine_basis_resting_volume(basis, course.gravity + 3 * t, &at_rest);
-    course.volume[t] += at_rest;
+  if (status == SUPINE_OK) {
+    status = find_asked(basis, &course, asked, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_options_reference(basis, &wanted->from, false, &from, error);
   }
   if (status == SUPINE_OK) {
     status = supine_breath_frames_create(basis, &course, &frames, error);
@@ -296,7 +291,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
     status = check_ends(basis, wanted, &course, error);
   }
   if (status == SUPINE_OK) {
-    origin = find_origin(basis, &course, &rest);
+    origin = find_origin(basis, &from.pose, xyz);
     status =
         origin != NULL ? SUPINE_OK : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
@@ -305,6 +300,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
     const breath_content content = {.basis = basis,
                                     .rest = &rest,
                                     .origin = origin,
+                                    .origin_name = from.name,
                                     .frame = frame,
                                     .course = &course,
                                     .volumes = supine_breath_frames_volumes(frames),
@@ -315,7 +311,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = play_frames(&course, frames, output, &measured, xyz, seconds, error);
+  status = play_frames(&course, frames, output, asked, &measured, xyz, seconds, error);
   if (status == SUPINE_OK) {
     status = supine_command_breath_output_commit(output, error);
   }
@@ -329,6 +325,7 @@ cleanup:
   supine_mesh_free(&rest);
   free(measured.mesh.vertices);
   free(origin);
+  free(asked);
   free(xyz);
   free(seconds);
   return status;

@@ -6,7 +6,7 @@
 #include "sh/base/output.h"
 
 #include "program/compare_content.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 #include "program/report/comparison.h"
 
 static const char name[] = "compare";
@@ -34,8 +34,8 @@ typedef struct request {
   const char *html;
   bool json;
   bool by_rms;
-  const char *volume; /* as given, or NULL */
-  bool allow_folds;
+  supine_volume_options volume;
+  supine_from from;
   double breath; /* mL */
   double rms;    /* mm */
 } request;
@@ -43,12 +43,9 @@ typedef struct request {
 static const supine_option table[] = {
     {"postures", 0, "LIST", "which to compare", SUPINE_FILLS(request, postures),
      .standard = "supine,prone,left,right"},
-    {"volume", 0, "VOLUME", "in every posture: " SUPINE_VOLUME_HELP, SUPINE_FILLS(request, volume),
-     .rivals = "breath"},
-    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
-    {"breath", 0, "ML",
-     "air added to that volume, to see which heights ventilate (where rest is known; elsewhere the "
-     "breath is --volume itself)",
+    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {"breath", 0, "ML", "air added to that volume, to see which heights ventilate",
      SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
     {"rms", 0, "MM",
      "root-mean-square displacement in every posture instead: for open surfaces, which have no "
@@ -84,23 +81,16 @@ static int tell(const supine_comparison *comparison, const request *wanted) {
 static int compare(const char *path, const supine_basis *basis, const request *wanted) {
   supine_comparison comparison = {.path = path,
                                   .command = name,
-                                  .allow_folds = wanted->allow_folds,
+                                  .allow_folds = wanted->volume.allow_folds,
                                   .basis = basis,
-                                  .inflation = {SUPINE_INFLATION_RMS, wanted->rms},
+                                  .state = wanted->volume.state,
+                                  .rms = wanted->rms,
+                                  .from = wanted->from,
                                   .breath = wanted->breath};
-  supine_volume volume = supine_options_volume_default(basis);
   supine_error error;
-  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
-    return supine_options_usage(
-        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
-        wanted->volume);
-  }
-  if (!wanted->by_rms && volume.kind == SUPINE_VOLUME_REST) {
-    comparison.inflation = (supine_inflation){SUPINE_INFLATION_REST, volume.ml};
-  } else if (!wanted->by_rms) {
-    static const double anywhere[3] = {0.0, 1.0, 0.0}; /* full and the scan do not turn */
-    comparison.inflation = (supine_inflation){SUPINE_INFLATION_VOLUME,
-                                              supine_options_volume_of(basis, &volume, anywhere)};
+  comparison.state.gravity[1] = 1.0;
+  if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    comparison.state.volume = supine_basis_default_volume(basis);
   }
   int result = supine_options_posture_list_parse(name, wanted->postures, &comparison.postures);
   if (result != SUPINE_EXIT_OK) {
@@ -118,8 +108,8 @@ static int compare(const char *path, const supine_basis *basis, const request *w
       return supine_options_usage(name,
                                   "what is inside has no surface: -o and --rms are for lungs");
     }
-    return supine_command_compare_content(name, basis, &comparison.postures, &volume, wanted->json,
-                                          wanted->csv);
+    return supine_command_compare_content(name, basis, &comparison.postures, &comparison.state,
+                                          wanted->json, wanted->csv);
   }
   if (supine_report_find(&comparison, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
@@ -147,7 +137,8 @@ const supine_command supine_command_compare = {
     "how far postures differ, and who ventilates where",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about =
-        "Says how far the lungs move in each posture and between every two, how much each lung "
+        "Says how far the lungs have moved in each posture since supine at rest and between every "
+        "two, how much each lung "
         "holds, and which heights ventilate in a breath; then searches all directions of gravity "
         "for the two that differ most and for the one that is farthest from supine. Of what is "
         "inside ('supine embed') it says how far each named part moves between every two postures, "

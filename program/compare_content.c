@@ -2,6 +2,7 @@
 /* How far named points move between postures, and where to. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <jansson.h>
 
@@ -11,31 +12,25 @@
 #include "program/compare_content.h"
 #include "program/names.h"
 
-/* Where everything is in every posture: moves [postures, names, 3], mm from rest. */
+/* Where everything is in every posture: moves [postures, names, 3], mm from the reference surface.
+ */
 typedef struct comparison {
   const supine_posture_list *postures;
   supine_command_names names;
   double *moves;
 } comparison;
 
-/* Means over each name's vertices in one posture. */
-static supine_status find_moves(const supine_basis *basis, const double gravity[3], double volume,
+/* Means over each name's vertices in one state. */
+static supine_status find_moves(const supine_basis *basis, const supine_state *state,
                                 const supine_command_names *names, float *step, double *moves,
                                 supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  supine_status status = supine_basis_weights(basis, gravity, weights);
-  if (status == SUPINE_OK) {
-    status = supine_basis_scale(basis, weights, volume, &scales[0], error);
-  }
+  supine_pose pose;
+  const supine_status status = supine_basis_pose(basis, state, &pose, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  for (size_t lung = 1; lung < info->lung_count; ++lung) {
-    scales[lung] = scales[0];
-  }
-  supine_displace_range(basis, weights, scales, 0, info->vertex_count, step);
+  supine_displace_range(basis, &pose, 0, info->vertex_count, step);
   for (size_t begin = 0; begin < info->vertex_count;) { /* a name's vertices follow each other */
     const size_t name = names->part[names->order[begin]];
     double sum[3] = {0.0, 0.0, 0.0};
@@ -144,7 +139,7 @@ static supine_status write_all(const comparison *c, bool json, const char *csv,
 }
 
 int supine_command_compare_content(const char *command, const supine_basis *basis,
-                                   const supine_posture_list *postures, const supine_volume *volume,
+                                   const supine_posture_list *postures, const supine_state *volume,
                                    bool json, const char *csv) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   comparison c = {.postures = postures};
@@ -159,9 +154,9 @@ int supine_command_compare_content(const char *command, const supine_basis *basi
     status = supine_error_set(&error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
   }
   for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
-    status = find_moves(basis, postures->item[i].gravity,
-                        supine_options_volume_of(basis, volume, postures->item[i].gravity),
-                        &c.names, step, c.moves + 3 * i * c.names.count, &error);
+    supine_state state = *volume;
+    memcpy(state.gravity, postures->item[i].gravity, sizeof state.gravity);
+    status = find_moves(basis, &state, &c.names, step, c.moves + 3 * i * c.names.count, &error);
   }
   if (status == SUPINE_OK) {
     status = write_all(&c, json, csv, &error);

@@ -6,13 +6,13 @@
 #include <supine/runtime.h>
 
 #include "program/options/posture_list.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 
 /* Prints, for every two postures and every name, how far what goes by it moves and where to: the
  * mean over its vertices. As a table, or as JSON; and as CSV where `csv` is not NULL. An exit code.
  * @param volume  in every posture */
 int supine_command_compare_content(const char *command, const supine_basis *basis,
-                                   const supine_posture_list *postures, const supine_volume *volume,
+                                   const supine_posture_list *postures, const supine_state *volume,
                                    bool json, const char *csv);
 
 #endif

@@ -11,13 +11,14 @@
 #include "program/deform_content.h"
 #include "program/options/basis_input.h"
 #include "program/options/orientation.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 
 static const char name[] = "deform";
 
 typedef struct request {
   supine_orientation orientation;
   supine_volume_options volume;
+  supine_from from;
   bool has_scale, as_scanned;
   double scale;
   supine_deform_content content;
@@ -33,21 +34,22 @@ static const supine_option table[] = {
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Positions at the given scales as doubles, for measuring and saving; normals [N, 3] where they are
- * not NULL. */
-static supine_status deformed_mesh(const supine_basis *basis, const double *weights,
-                                   const double *scales, supine_mesh *mesh, float *normals) {
+/* Positions of a pose as doubles, for measuring and saving; normals [N, 3] where they are not NULL.
+ */
+static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
+                                   supine_mesh *mesh, float *normals) {
   const size_t n = mesh->vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
   if (xyz == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, pose, xyz);
   if (normals != NULL) {
     supine_normals(basis, xyz, normals);
   }
@@ -68,58 +70,72 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
   return largest;
 }
 
-/* Breath scales for what was asked: a largest displacement, or volumes. */
-static int find_scales(const supine_basis *basis, const request *wanted, const double gravity[3],
-                       const double *weights, const supine_mesh *rest, supine_mesh *mesh,
-                       double *scales) {
-  const size_t lungs = supine_basis_get_info(basis)->lung_count;
+/* The pose asked for: a largest displacement from the reference surface, or volumes. */
+static int find_pose(const supine_basis *basis, const request *wanted, const double gravity[3],
+                     supine_mesh *mesh, supine_pose *pose) {
   if (!wanted->has_scale) {
-    return supine_options_volume_scales(basis, name, &wanted->volume, gravity, weights, scales);
-  }
-  for (size_t j = 0; j < lungs; ++j) {
-    scales[j] = 1.0;
+    return supine_options_pose(basis, name, &wanted->volume, gravity, pose);
   }
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  if (deformed_mesh(basis, weights, scales, mesh, NULL) != SUPINE_OK) {
+  supine_mesh reference = {0};
+  (void)supine_basis_weights(basis, gravity, pose->weights); /* a unit vector is legal */
+  supine_pose_fill(pose, 1.0);
+  if (supine_options_basis_rest_mesh(basis, &reference) != SUPINE_OK ||
+      deformed_mesh(basis, pose, mesh, NULL) != SUPINE_OK) {
+    supine_mesh_free(&reference);
     return supine_options_fail(name, &error);
   }
-  const double largest = largest_displacement(rest, mesh);
+  const double largest = largest_displacement(&reference, mesh);
+  supine_mesh_free(&reference);
   if (!(largest > 0.0)) {
     supine_options_say(name, "nothing moves in this direction: no scale gives %g mm",
                        wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
-  for (size_t j = 0; j < lungs; ++j) {
-    scales[j] = wanted->scale / largest;
-  }
+  supine_pose_fill(pose, wanted->scale / largest);
   return SUPINE_EXIT_OK;
+}
+
+/* One line: where the surface went, how far it moved and what it holds. */
+static void report(const char *path, const double gravity[3], const supine_mesh *mesh,
+                   const supine_mesh *from, const char *reference, bool volumes) {
+  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
+               gravity[1], gravity[2], largest_displacement(from, mesh), reference);
+  if (volumes) {
+    const double held = 1e-3 * supine_mesh_volume(mesh);
+    (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(from));
+  }
+  (void)putchar('\n');
 }
 
 /* Over 60 lines: what a surface needs is made in one place and freed in one. */
 static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX] = {0};
-  supine_mesh rest = {0};
+  supine_pose pose;
+  supine_reference_pose reference;
+  supine_mesh from = {0};
   supine_mesh mesh = {0};
   float *normals = NULL;
+  char comment[128];
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   int result = SUPINE_EXIT_OK;
-  if (supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
+  if (supine_options_basis_rest_mesh(basis, &from) != SUPINE_OK ||
       supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK ||
-      supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {
+      supine_options_reference(basis, &wanted->from, false, &reference, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  result = find_scales(basis, wanted, gravity, weights, &rest, &mesh, scales);
+  result = find_pose(basis, wanted, gravity, &mesh, &pose);
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
   if (supine_command_deform_content_wanted(&wanted->content)) {
-    result = supine_command_deform_content(&wanted->content, name, basis, weights, scales);
+    result = supine_command_deform_content(&wanted->content, name, basis, &pose, &reference,
+                                           wanted->from.given);
     goto cleanup;
   }
-  supine_mesh_save_options save = {.rest = rest.vertices};
+  (void)snprintf(comment, sizeof comment, "displacement from %s", reference.name);
+  supine_mesh_save_options save = {.rest = from.vertices, .comment = comment};
   result = supine_options_basis_frame(basis, name, wanted->as_scanned, &save);
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
@@ -128,11 +144,12 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   double volumes[SUPINE_LUNGS_MAX];
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
                                       {"volume_mL", info->lung_count, volumes}};
-  for (size_t i = 0; info->has_volume && i < info->lung_count; ++i) {
-    volumes[i] = supine_basis_lung_volume(basis, i, weights, scales[i]);
+  if (info->has_volume) {
+    supine_basis_volumes(basis, &pose, volumes);
   }
   normals = malloc(3 * mesh.vertex_count * sizeof *normals);
-  if (normals == NULL || deformed_mesh(basis, weights, scales, &mesh, normals) != SUPINE_OK) {
+  if (normals == NULL || deformed_mesh(basis, &reference.pose, &from, NULL) != SUPINE_OK ||
+      deformed_mesh(basis, &pose, &mesh, normals) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
@@ -140,22 +157,15 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
   save.field_count = info->has_volume ? 2 : 1;
-  const double largest = largest_displacement(&rest, &mesh);
-  const double gained = 1e-3 * (supine_mesh_volume(&mesh) - supine_mesh_volume(&rest));
   if (supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm", wanted->content.path,
-               gravity[0], gravity[1], gravity[2], largest);
-  if (info->has_volume && supine_basis_metadata(basis, "content") == NULL) {
-    (void)printf(", %+.2f mL%s", gained,
-                 info->resting_volume != NULL ? " from full inflation" : "");
-  }
-  (void)putchar('\n');
+  report(wanted->content.path, gravity, &mesh, &from, reference.name,
+         info->has_volume && supine_basis_metadata(basis, "content") == NULL);
   result = supine_options_finish(name);
 cleanup:
-  supine_mesh_free(&rest);
+  supine_mesh_free(&from);
   supine_mesh_free(&mesh);
   free(normals);
   return result;
@@ -186,16 +196,17 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_deform = {
     name,
     "deform a basis for a posture and a volume",
-    .usage = "BASIS --posture NAME [--volume ML] -o FILE",
+    .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE",
     .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
              "writes the surface. This is what the run-time library does each frame.",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine deform lungs.safetensors --posture prone --volume 500 -o prone.vtp\n"
-             "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=100,right=250 "
-             "-o out.ply\n"
-             "  supine deform nodules.safetensors --posture prone -o nodules-prone.csv\n"
-             "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
+    .notes =
+        "Examples:\n"
+        "  supine deform lungs.safetensors --posture prone --volume rest+500 -o prone.vtp\n"
+        "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
+        "-o out.ply\n"
+        "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"
+        "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -9,8 +9,8 @@
 #include "sh/base/vec3.h"
 
 #include "program/deform_content.h"
-#include "program/names.h"
 #include "program/field/field.h"
+#include "program/names.h"
 
 /* How far outside the lungs a field fades to 0, mm: no steeper than the tissue moves. 'supine
  * embed' leaves as much room around. */
@@ -20,8 +20,8 @@ const supine_option supine_command_deform_content_options[] = {
     {.help =
          "What is inside ('supine embed'): -o FILE.csv writes moved points by name; of a grid:"},
     {"field-out", 0, "FILE",
-     ".nrrd: displacements in mm, LPS, from each node at rest to where its tissue goes; they fade "
-     "out within 60 mm of the lungs",
+     ".nrrd: displacements in mm, LPS, from each node of the scan (or of --from) to where its "
+     "tissue goes; they fade out within 60 mm of the lungs",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT, .endings = ".nrrd"},
     {"inverse", 0, NULL,
      "from each node of the moved lungs to where its tissue was, as resampling an image takes it",
@@ -62,7 +62,7 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
 
 /* name, lung, x, y, z and where that is now. */
 static supine_status write_points(const char *path, const supine_basis *basis,
-                                  const double *weights, const double *scales,
+                                  const supine_pose *pose, const supine_reference_pose *from,
                                   supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
@@ -72,42 +72,53 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   if (status != SUPINE_OK) {
     return status;
   }
-  float *step = malloc(3 * n * sizeof *step);
-  if (step == NULL) {
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *before = malloc(3 * n * sizeof *before);
+  if (xyz == NULL || before == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
   } else {
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
-    supine_displace_range(basis, weights, scales, 0, n, step);
-    (void)fputs("name,lung,x,y,z,dx,dy,dz,mm\n", output.file);
+    supine_deform(basis, pose, xyz);
+    supine_deform(basis, &from->pose, before);
+    (void)fprintf(output.file,
+                  "# x,y,z: position, mm, LPS; dx,dy,dz,mm: displacement from %s\n"
+                  "name,lung,x,y,z,dx,dy,dz,mm\n",
+                  from->name);
     for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
       const size_t at = names.order[i];
-      const float *p = info->vertices + 3 * at;
-      const float *u = step + 3 * at;
-      const double d[3] = {(double)u[0], (double)u[1], (double)u[2]};
+      const float *p = xyz + 3 * at;
+      const float *q = before + 3 * at;
+      const double d[3] = {(double)p[0] - (double)q[0], (double)p[1] - (double)q[1],
+                           (double)p[2] - (double)q[2]};
       (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n",
                     names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
-                    (double)p[0] + d[0], (double)p[1] + d[1], (double)p[2] + d[2], d[0], d[1], d[2],
-                    supine_length(d));
+                    (double)p[0], (double)p[1], (double)p[2], d[0], d[1], d[2], supine_length(d));
     }
     status = supine_output_commit(&output, error);
   }
   if (status == SUPINE_OK) {
-    (void)printf("%s: %zu points\n", path, n);
+    (void)printf("%s: %zu %s, displacement from %s\n", path, n, n == 1 ? "point" : "points",
+                 from->name);
   }
-  free(step);
+  free(xyz);
+  free(before);
   supine_command_names_close(&names);
   return status;
 }
 
-static supine_status write_field(const supine_deform_content *wanted, const supine_field *forward,
-                                 const supine_field *inverse, supine_error *error) {
+static supine_status write_field(const supine_deform_content *wanted, const char *from,
+                                 const supine_field *forward, const supine_field *inverse,
+                                 supine_error *error) {
+  char note[256];
   const supine_image *nodes = wanted->inverse ? &inverse->nodes : &forward->nodes;
-  const char *note =
+  (void)snprintf(
+      note, sizeof note,
       wanted->inverse
-          ? "displacement v(y), mm, LPS: the tissue at y, deformed, was at y + v(y) at rest"
-          : "displacement u(x), mm, LPS: the tissue at x, at rest, goes to x + u(x)";
+          ? "displacement v(y), mm, LPS: the tissue at y, deformed, was at y + v(y) in %s"
+          : "displacement u(x), mm, LPS: the tissue at x, in %s, goes to x + u(x)",
+      from);
   const supine_status status = supine_image_write(wanted->field, nodes, note, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
@@ -145,13 +156,64 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
+/* The field from one state to another: back to the scan by the inverse of the first, and on by the
+ * second. */
+static supine_status join_fields(const supine_field *first, supine_field *second,
+                                 supine_error *error) {
+  supine_field back = {0};
+  supine_field_residual residual;
+  const supine_status status = supine_field_invert(first, &back, &residual, error);
+  const size_t *size = second->nodes.size;
+  float *u = malloc(3 * size[0] * size[1] * size[2] * sizeof *u);
+  if (u == NULL || status != SUPINE_OK) {
+    free(u);
+    supine_field_free(&back);
+    return status != SUPINE_OK ? status
+                               : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    const float *v = (const float *)back.nodes.values + 3 * i;
+    double place[3];
+    double moved[3];
+    supine_field_place(&second->nodes, i, place);
+    for (size_t k = 0; k < 3; ++k) {
+      place[k] += (double)v[k];
+    }
+    supine_field_at(second, place, moved);
+    for (size_t k = 0; k < 3; ++k) {
+      u[3 * i + k] = (float)(moved[k] + (double)v[k]);
+    }
+  }
+  free(second->nodes.values);
+  second->nodes.values = u;
+  supine_field_free(&back);
+  return SUPINE_OK;
+}
+
+/* The field from one pose to another; a pose of the scan needs no way back. */
+static supine_status find_field(const supine_basis *basis, const supine_pose *pose,
+                                const supine_reference_pose *before, bool other,
+                                supine_field *field, supine_error *error) {
+  supine_field first = {0};
+  supine_status status = supine_field_create(basis, pose, fade, field, error);
+  if (status == SUPINE_OK && other) {
+    status = supine_field_create(basis, &before->pose, fade, &first, error);
+  }
+  if (status == SUPINE_OK && other) {
+    status = join_fields(&first, field, error);
+  }
+  supine_field_free(&first);
+  return status;
+}
+
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
-                               const double *weights, const double *scales, supine_error *error) {
+                               const supine_pose *pose, const supine_reference_pose *before,
+                               bool other, supine_error *error) {
   const char *from = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_field forward = {0};
   supine_field inverse = {0};
   supine_image image = {0};
-  supine_status status = supine_field_create(basis, weights, scales, fade, &forward, error);
+  supine_status status = find_field(basis, pose, before, other, &forward, error);
   if (status == SUPINE_OK && from != NULL) {
     status = supine_image_read(from, &image, error);
   }
@@ -159,7 +221,7 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
     status = invert(&forward, &inverse, error);
   }
   if (status == SUPINE_OK && wanted->field != NULL) {
-    status = write_field(wanted, &forward, &inverse, error);
+    status = write_field(wanted, before->name, &forward, &inverse, error);
   }
   if (status == SUPINE_OK && from != NULL) {
     status = write_image(wanted, &inverse, &image, error);
@@ -171,15 +233,15 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
 }
 
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
-                                  const supine_basis *basis, const double *weights,
-                                  const double *scales) {
+                                  const supine_basis *basis, const supine_pose *pose,
+                                  const supine_reference_pose *from, bool other) {
   supine_error error;
   supine_status status = SUPINE_OK;
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
-    status = move_grid(wanted, basis, weights, scales, &error);
+    status = move_grid(wanted, basis, pose, from, other, &error);
   }
   if (status == SUPINE_OK && wanted->path != NULL && is_csv(wanted->path)) {
-    status = write_points(wanted->path, basis, weights, scales, &error);
+    status = write_points(wanted->path, basis, pose, from, &error);
   }
   return status == SUPINE_OK ? supine_options_finish(command)
                              : supine_options_fail(command, &error);

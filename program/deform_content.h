@@ -5,7 +5,7 @@
 
 #include <supine/runtime.h>
 
-#include "program/options/command.h"
+#include "program/options/state.h"
 
 typedef struct supine_deform_content {
   const char *path;   /* -o */
@@ -23,9 +23,11 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
 /* Is what is wanted none of a surface's files? */
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 
-/* Writes what is wanted, and says what it wrote; an exit code. */
+/* Writes what is wanted, and says what it wrote; an exit code.
+ * @param from   what displacements count from, and the state that images are in
+ * @param other  that is not the scan */
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
-                                  const supine_basis *basis, const double *weights,
-                                  const double *scales);
+                                  const supine_basis *basis, const supine_pose *pose,
+                                  const supine_reference_pose *from, bool other);
 
 #endif

@@ -12,58 +12,40 @@ static const double seen_through = 0.35; /* opacity of lungs with something insi
 int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
                               const supine_command_drawing *wanted, const supine_posture_item *item,
                               supine_command_drawn *found) {
-  const size_t lungs = supine_basis_get_info(basis)->lung_count;
-  supine_error error = {SUPINE_ERROR_NUMERICAL, "gravity has no direction"};
-  if (supine_basis_weights(basis, item->gravity, found->weights) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
-  }
   if (wanted->scale == 0.0) {
-    return supine_options_volume_scales(basis, name, &wanted->volume, item->gravity, found->weights,
-                                        found->scales);
+    return supine_options_pose(basis, name, &wanted->volume, item->gravity, &found->pose);
   }
   supine_distance_statistics statistics;
-  for (size_t lung = 0; lung < lungs; ++lung) {
-    found->scales[lung] = 1.0;
-  }
-  supine_compare_distances(compare, found->weights, found->scales, NULL, NULL, found->value);
+  (void)supine_basis_weights(basis, item->gravity, found->pose.weights); /* a unit vector */
+  supine_pose_fill(&found->pose, 1.0);
+  supine_compare_distances(compare, &found->pose, NULL, found->value);
   supine_compare_statistics(compare, found->value, &statistics);
   if (!(statistics.max > 0.0)) {
     supine_options_say(name, "nothing moves in %s: no scale gives %g mm", item->name,
                        wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
-  for (size_t lung = 0; lung < lungs; ++lung) {
-    found->scales[lung] = wanted->scale / statistics.max;
-  }
+  supine_pose_fill(&found->pose, wanted->scale / statistics.max);
   return SUPINE_EXIT_OK;
 }
 
 void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
-                                const supine_command_drawn *reference, supine_command_drawn *shown,
+                                const supine_pose *from, supine_command_drawn *shown,
                                 double ends[2]) {
   supine_distance_statistics statistics;
-  supine_compare_distances(compare, shown->weights, shown->scales,
-                           reference != NULL ? reference->weights : NULL,
-                           reference != NULL ? reference->scales : NULL, shown->value);
+  supine_compare_distances(compare, &shown->pose, from, shown->value);
   supine_compare_statistics(compare, shown->value, &statistics);
   ends[0] = fmax(ends[0], statistics.p95);
   ends[1] = fmax(ends[1], statistics.max);
   size_t used = 0;
   if (supine_basis_get_info(basis)->has_volume) {
-    double gain = 0.0;
+    double held[SUPINE_LUNGS_MAX];
+    double volume = 0.0;
+    supine_basis_volumes(basis, &shown->pose, held);
     for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-      gain += supine_basis_lung_volume(basis, lung, shown->weights, shown->scales[lung]);
+      volume += held[lung];
     }
-    if (supine_basis_get_info(basis)->resting_volume != NULL) { /* what the lungs hold */
-      double held[SUPINE_LUNGS_MAX];
-      supine_options_volume_reference(basis, held);
-      for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-        gain += held[lung];
-      }
-    }
-    used = (size_t)snprintf(
-        shown->subtitle, sizeof shown->subtitle,
-        supine_basis_get_info(basis)->resting_volume != NULL ? "%.0f mL, " : "%+.0f mL, ", gain);
+    used = (size_t)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, ", volume);
   }
   (void)snprintf(shown->subtitle + used, sizeof shown->subtitle - used, "mean %.1f, max %.1f mm",
                  statistics.mean, statistics.max);
@@ -79,38 +61,30 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
                                         const double gravity[3]) {
   supine_panel panel = {.title = title,
                         .subtitle = shown->subtitle,
-                        .weights = shown->weights,
-                        .scales = shown->scales,
+                        .pose = &shown->pose,
                         .value = shown->value,
                         .marks = wanted->inside != NULL ? &shown->marks.marks : NULL};
   memcpy(panel.gravity, gravity, sizeof panel.gravity);
   return panel;
 }
 
-/* Six parameters: what is drawn, what was asked, what was found. */
-supine_picture supine_command_drawing_picture(const supine_basis *basis,
-                                              const supine_command_drawing *wanted,
-                                              const char *reference, const double ends[2],
-                                              size_t panels, char *label) {
-  (void)snprintf(label, 128, "%s%s, mm",
-                 reference != NULL ? "difference from "
-                 : supine_basis_get_info(basis)->resting_volume != NULL
-                     ? "displacement from full inflation"
-                     : "displacement from rest",
-                 reference != NULL ? reference : "");
+supine_picture supine_command_drawing_picture(const supine_command_drawing *wanted,
+                                              const char *from, const double ends[2], size_t panels,
+                                              char *label) {
+  (void)snprintf(label, 128, "displacement from %s, mm", from);
   const double opacity = wanted->opacity > 0.0    ? wanted->opacity
                          : wanted->inside != NULL ? seen_through
                                                   : 1.0;
-  supine_picture picture = {
-      .panel_count = panels,
-      .view = wanted->view,
-      .view_count = wanted->view_count,
-      .heading = wanted->title,
-      .bar_label = label,
-      .colours = reference != NULL ? SUPINE_COLOURS_DIFFERENCE : SUPINE_COLOURS_DISPLACEMENT,
-      .largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(ends[0]),
-      .transparency = 1.0 - opacity,
-      .dark = wanted->theme == 1};
+  supine_picture picture = {.panel_count = panels,
+                            .view = wanted->view,
+                            .view_count = wanted->view_count,
+                            .heading = wanted->title,
+                            .bar_label = label,
+                            .colours = SUPINE_COLOURS_DISPLACEMENT,
+                            .largest = wanted->largest > 0.0 ? wanted->largest
+                                                             : supine_render_bar_end(ends[0]),
+                            .transparency = 1.0 - opacity,
+                            .dark = wanted->theme == 1};
   picture.beyond = ends[1] > picture.largest;
   choose_size(wanted, &picture);
   return picture;

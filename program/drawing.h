@@ -9,7 +9,7 @@
 #include "program/breath/breath_course.h"
 #include "program/inside.h"
 #include "program/options/posture_list.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 #include "program/render/render.h"
 
 /* What the options say. */
@@ -17,7 +17,7 @@ typedef struct supine_command_drawing {
   const char *output;
   const char *postures;
   supine_volume_options volume;
-  const char *reference; /* posture that colours are the difference from, or NULL */
+  supine_from from; /* what colours and moves count from */
   const char *title;
   const char *inside; /* a file, or NULL */
   double scale;       /* mm, or 0: by volume */
@@ -33,15 +33,14 @@ typedef struct supine_command_drawing {
 
 /* One posture, ready to be drawn. */
 typedef struct supine_command_drawn {
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
+  supine_pose pose;
   float *value; /* [N] */
   char subtitle[96];
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* Weights and scales for gravity along a direction of that name; an exit code. `value` [N] is
- * written over. */
+/* The pose for gravity along a direction of that name; an exit code. `value` [N] is written over.
+ */
 int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
                               const supine_command_drawing *wanted, const supine_posture_item *item,
                               supine_command_drawn *found);
@@ -49,15 +48,14 @@ int supine_command_drawn_find(const supine_basis *basis, const supine_compare *c
 /* What the colours show, and the words below the posture's name; `ends`, of the colours, grow: the
  * 95th percentile, the largest. */
 void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
-                                const supine_command_drawn *reference, supine_command_drawn *shown,
+                                const supine_pose *from, supine_command_drawn *shown,
                                 double ends[2]);
 
 /* The picture around panels that the caller sets; `label` [128] is the bar's words.
- * @param reference  the name of the posture that colours are the difference from, or NULL */
-supine_picture supine_command_drawing_picture(const supine_basis *basis,
-                                              const supine_command_drawing *wanted,
-                                              const char *reference, const double ends[2],
-                                              size_t panels, char *label);
+ * @param from  the name of the state that colours count from */
+supine_picture supine_command_drawing_picture(const supine_command_drawing *wanted,
+                                              const char *from, const double ends[2], size_t panels,
+                                              char *label);
 
 /* A panel of a state. */
 supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
@@ -66,7 +64,7 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
 
 /* The turn as an animation; an exit code. */
 int supine_command_drawing_turn(const supine_basis *basis, const supine_command_drawing *wanted,
-                                const supine_posture_item *reference);
+                                const supine_reference_pose *from);
 
 /* "supine:left:10s" into a breath_turn, as --turn takes it; an exit code or SUPINE_OPTION_MISFIT.
  */

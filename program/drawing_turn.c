@@ -40,8 +40,7 @@ int supine_command_read_turn(const char *command, const char *value, breath_turn
 typedef struct turning {
   const supine_basis *basis;
   const supine_command_drawing *wanted;
-  const supine_command_drawn *reference; /* or NULL */
-  const char *reference_name;
+  const supine_reference_pose *from;
   supine_compare *compare;
   supine_renderer *renderer;
   supine_basis *inside; /* or NULL */
@@ -64,14 +63,14 @@ static int find_frame(turning *t, size_t frame, supine_posture_item *item,
                  angle);
   const int result = supine_command_drawn_find(t->basis, t->compare, t->wanted, item, shown);
   if (result == SUPINE_EXIT_OK) {
-    supine_command_drawn_value(t->basis, t->compare, t->reference, shown, t->ends);
+    supine_command_drawn_value(t->basis, t->compare, &t->from->pose, shown, t->ends);
   }
   return result;
 }
 
 static supine_picture make_picture(turning *t, supine_panel *panel, char *label) {
   supine_picture picture =
-      supine_command_drawing_picture(t->basis, t->wanted, t->reference_name, t->ends, 1, label);
+      supine_command_drawing_picture(t->wanted, t->from->name, t->ends, 1, label);
   picture.panel = panel;
   picture.extent = (const double(*)[4])t->extent;
   return picture;
@@ -109,9 +108,7 @@ static supine_status play(turning *t, supine_command_drawn *shown, supine_animat
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a frame");
     }
     if (status == SUPINE_OK && t->inside != NULL) {
-      status = supine_command_marks_make(t->inside, &t->names, shown->weights, shown->scales,
-                                         t->reference != NULL ? t->reference->weights : NULL,
-                                         t->reference != NULL ? t->reference->scales : NULL,
+      status = supine_command_marks_make(t->inside, &t->names, &shown->pose, &t->from->pose,
                                          &shown->marks, error);
     }
     supine_panel panel = supine_command_drawn_panel(t->wanted, shown, item.name, item.gravity);
@@ -168,11 +165,11 @@ static int animate(turning *t, supine_command_drawn *shown) {
 }
 
 int supine_command_drawing_turn(const supine_basis *basis, const supine_command_drawing *wanted,
-                                const supine_posture_item *reference) {
+                                const supine_reference_pose *from) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   const double frames = floor(wanted->turn.seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0;
-  turning t = {.basis = basis, .wanted = wanted};
-  supine_command_drawn shown[2] = {{.value = NULL}}; /* a frame; the reference */
+  turning t = {.basis = basis, .wanted = wanted, .from = from};
+  supine_command_drawn shown = {.value = NULL};
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   int result = SUPINE_EXIT_OK;
   if (!(frames <= FRAMES_MAX)) {
@@ -180,7 +177,7 @@ int supine_command_drawing_turn(const supine_basis *basis, const supine_command_
                                 FRAMES_MAX);
   }
   t.count = frames < 2.0 ? 2 : (size_t)frames;
-  float *values = malloc(2 * n * sizeof *values);
+  float *values = malloc(n * sizeof *values);
   supine_status status =
       values != NULL ? supine_compare_create(basis, &t.compare, &error) : SUPINE_ERROR_MEMORY;
   status = status == SUPINE_OK ? supine_render_create(basis, &t.renderer, &error) : status;
@@ -191,14 +188,8 @@ int supine_command_drawing_turn(const supine_basis *basis, const supine_command_
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  shown[0].value = values;
-  shown[1].value = values + n;
-  if (reference != NULL) {
-    result = supine_command_drawn_find(basis, t.compare, wanted, reference, &shown[1]);
-    t.reference = &shown[1];
-    t.reference_name = reference->name;
-  }
-  result = result == SUPINE_EXIT_OK ? animate(&t, &shown[0]) : result;
+  shown.value = values;
+  result = animate(&t, &shown);
 cleanup:
   supine_command_names_close(&t.names);
   supine_basis_close(t.inside);

@@ -177,11 +177,8 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
                  content->grid.size[2]);
   }
   (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
-  if (shells->scan_scale != 0.0) {
-    (void)printf(
-        "taken to be where the scan was, %.0f mL below full inflation; the file holds it at "
-        "full inflation\n",
-        -info->scan_volume);
+  if (shells->scan.gains[0][0] != 0.0) {
+    (void)puts("given where the scan had it; the file holds it at full inflation");
   }
   if (report->centres < report->surface) {
     (void)printf("interpolated from %zu of %zu vertices; at the others that leaves %.2g %% of the "

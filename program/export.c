@@ -44,7 +44,7 @@ static const supine_option table[] = {
      ".glb: glTF 2.0 morph targets: any engine deforms the lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
-    {"volume", 0, "ML",
+    {"breath", 0, "ML",
      "depth of the breath that is played, and up to which clamp-safe weights stay within 0 and 1",
      SUPINE_FILLS(request, volume), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
@@ -65,7 +65,7 @@ static const supine_option table[] = {
      "raw: a target for each mode of the basis; weights of either sign (default)\n"
      "8: at most eight targets, for engines that promise no more: the best eight; says what they "
      "leave out\n"
-     "clamp-safe: weights within 0 and 1 for every posture and every breath up to --volume, for "
+     "clamp-safe: weights within 0 and 1 for every posture and every breath up to --breath, for "
      "engines that clamp them: the base is shifted and the targets are rescaled, so that rest is "
      "not at weight 0\n"
      "8,clamp-safe: both",
@@ -191,7 +191,7 @@ const supine_command supine_command_export = {
         "  supine export lungs.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.glb --animate\n"
         "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
-        "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --volume 1000",
+        "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --breath 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

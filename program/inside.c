@@ -50,33 +50,27 @@ static void add_part(const supine_command_names *names, size_t part, const size_
   out->mark[out->marks.count++] = middle;
 }
 
-/* Eight parameters: two states of the same content. */
 supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const double *weights,
-                                        const double *scales, const double *reference_weights,
-                                        const double *reference_scales, supine_command_marks *marks,
+                                        const supine_command_names *names, const supine_pose *pose,
+                                        const supine_pose *from, supine_command_marks *marks,
                                         supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
-  float *from = malloc(3 * n * sizeof *from);
+  float *before = malloc(3 * n * sizeof *before);
   supine_command_marks made = {.mark = malloc((n + names->count) * sizeof(supine_mark)),
                                .label = calloc(names->count, sizeof *made.label)};
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (xyz != NULL && from != NULL && made.mark != NULL && made.label != NULL) {
-    supine_deform(inside, weights, scales, xyz);
-    if (reference_weights != NULL) {
-      supine_deform(inside, reference_weights, reference_scales, from);
-    } else {
-      memcpy(from, info->vertices, 3 * n * sizeof *from);
-    }
+  if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
+    supine_deform(inside, pose, xyz);
+    supine_deform(inside, from, before);
     for (size_t at = 0; at < n;) { /* a part's vertices are together */
       const uint32_t part = names->part[names->order[at]];
       size_t end = at;
       while (end < n && names->part[names->order[end]] == part) {
         ++end;
       }
-      add_part(names, part, names->order + at, end - at, xyz, from, &made);
+      add_part(names, part, names->order + at, end - at, xyz, before, &made);
       at = end;
     }
     made.marks.mark = made.mark;
@@ -85,7 +79,7 @@ supine_status supine_command_marks_make(const supine_basis *inside,
     status = SUPINE_OK;
   }
   free(xyz);
-  free(from);
+  free(before);
   supine_command_marks_free(&made);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory for %zu points", n);

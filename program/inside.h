@@ -25,12 +25,11 @@ typedef struct supine_command_marks {
   char (*label)[48];
 } supine_command_marks;
 
-/* @param reference  weights and scales that moves count from; NULL: the file's surface
+/* @param from  what moves count from
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const double *weights,
-                                        const double *scales, const double *reference_weights,
-                                        const double *reference_scales, supine_command_marks *marks,
+                                        const supine_command_names *names, const supine_pose *pose,
+                                        const supine_pose *from, supine_command_marks *marks,
                                         supine_error *error);
 void supine_command_marks_free(supine_command_marks *marks);
 

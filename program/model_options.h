@@ -4,10 +4,10 @@
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
-#include "precompute/physics/solve.h"
-#include "precompute/precompute.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
+#include "precompute/physics/solve.h"
+#include "precompute/precompute.h"
 
 #include "program/label_options.h"
 

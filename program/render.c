@@ -37,8 +37,8 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
 }
 
 /* Draws and writes what states and colours were found for. */
-static int draw(const supine_basis *basis, const request *wanted, supine_renderer *renderer,
-                const supine_posture_list *postures, const char *reference, const state *states,
+static int draw(const request *wanted, supine_renderer *renderer,
+                const supine_posture_list *postures, const char *from, const state *states,
                 const double ends[2]) {
   supine_panel panel[SUPINE_PANELS_MAX];
   char label[128];
@@ -47,22 +47,20 @@ static int draw(const supine_basis *basis, const request *wanted, supine_rendere
                                           postures->item[i].gravity);
   }
   supine_picture picture =
-      supine_command_drawing_picture(basis, wanted, reference, ends, postures->count, label);
+      supine_command_drawing_picture(wanted, from, ends, postures->count, label);
   picture.panel = panel;
   return write_picture(wanted, renderer, &picture);
 }
 
 /* What is inside, in each state. */
 static supine_status find_marks(const supine_basis *basis, const char *path, state *states,
-                                size_t count, const state *reference, supine_error *error) {
+                                size_t count, const supine_pose *from, supine_error *error) {
   supine_basis *inside = NULL;
   supine_command_names names = {0};
   supine_status status = supine_command_inside_open(basis, path, &inside, &names, error);
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = supine_command_marks_make(inside, &names, states[i].weights, states[i].scales,
-                                       reference != NULL ? reference->weights : NULL,
-                                       reference != NULL ? reference->scales : NULL,
-                                       &states[i].marks, error);
+    status =
+        supine_command_marks_make(inside, &names, &states[i].pose, from, &states[i].marks, error);
   }
   supine_command_names_close(&names);
   supine_basis_close(inside);
@@ -70,7 +68,7 @@ static supine_status find_marks(const supine_basis *basis, const char *path, sta
 }
 
 static int render(const supine_basis *basis, const request *wanted,
-                  const supine_posture_list *postures, const supine_posture_item *reference) {
+                  const supine_posture_list *postures, const supine_reference_pose *from) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   const size_t count = postures->count;
   supine_compare *compare = NULL;
@@ -78,36 +76,30 @@ static int render(const supine_basis *basis, const request *wanted,
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   double ends[2] = {0.0, 0.0}; /* of the colours: 95th percentile, largest */
   int result = SUPINE_EXIT_OK;
-  state *states = calloc(count + 1, sizeof *states); /* the reference is the last */
-  float *values = malloc((count + 1) * n * sizeof *values);
+  state *states = calloc(count, sizeof *states);
+  float *values = malloc(count * n * sizeof *values);
   if (states == NULL || values == NULL ||
       supine_compare_create(basis, &compare, &error) != SUPINE_OK ||
       supine_render_create(basis, &renderer, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  for (size_t i = 0; i <= count && result == SUPINE_EXIT_OK; ++i) {
+  for (size_t i = 0; i < count && result == SUPINE_EXIT_OK; ++i) {
     states[i].value = values + i * n;
-    if (i < count || reference != NULL) {
-      result = supine_command_drawn_find(basis, compare, wanted,
-                                         i < count ? &postures->item[i] : reference, &states[i]);
-    }
+    result = supine_command_drawn_find(basis, compare, wanted, &postures->item[i], &states[i]);
   }
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
   for (size_t i = 0; i < count; ++i) {
-    supine_command_drawn_value(basis, compare, reference != NULL ? &states[count] : NULL,
-                               &states[i], ends);
+    supine_command_drawn_value(basis, compare, &from->pose, &states[i], ends);
   }
   if (wanted->inside != NULL &&
-      find_marks(basis, wanted->inside, states, count, reference != NULL ? &states[count] : NULL,
-                 &error) != SUPINE_OK) {
+      find_marks(basis, wanted->inside, states, count, &from->pose, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  result = draw(basis, wanted, renderer, postures, reference != NULL ? reference->name : NULL,
-                states, ends);
+  result = draw(wanted, renderer, postures, from->name, states, ends);
 cleanup:
   supine_render_destroy(renderer);
   supine_compare_destroy(compare);
@@ -168,21 +160,6 @@ static int read_views(const char *command, const char *text, void *field) {
   }
 }
 
-static int read_colour(const char *command, const char *text, void *field) {
-  request *wanted = field;
-  (void)command;
-  static const char difference[] = "difference:";
-  if (strcmp(text, "displacement") == 0) {
-    wanted->reference = NULL;
-    return SUPINE_EXIT_OK;
-  }
-  if (strncmp(text, difference, strlen(difference)) == 0) {
-    wanted->reference = text + strlen(difference);
-    return SUPINE_EXIT_OK;
-  }
-  return SUPINE_OPTION_MISFIT;
-}
-
 static int read_turn(const char *command, const char *text, void *field) {
   request *wanted = field;
   return supine_command_read_turn(command, text, &wanted->turn);
@@ -210,8 +187,7 @@ static const supine_option table[] = {
      "anterior (default), posterior, left, right, lateral (from the left), head, feet, oblique; "
      "several come below each other",
      .read = read_views},
-    {"colour", 0, "WHAT", "displacement (default: from rest), or difference:POSTURE",
-     .read = read_colour, .wants = "displacement or difference:POSTURE", .alias = "color"},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
      "end of the colour bar; default: what 95 % of the surface does not exceed, rounded up; a "
      "pointed end says that some values lie beyond",
@@ -229,8 +205,7 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 /* The options make sense together; then the postures are read. */
-static int check(const request *wanted, supine_posture_list *postures,
-                 supine_posture_list *reference) {
+static int check(const request *wanted, supine_posture_list *postures) {
   const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* the other: .png */
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
     return supine_options_usage(name, wanted->turns
@@ -240,16 +215,11 @@ static int check(const request *wanted, supine_posture_list *postures,
   if (wanted->turns != moving) {
     return supine_options_usage(name, "--turn makes a .webp, postures a .png");
   }
-  int result = wanted->turns ? SUPINE_EXIT_OK
-                             : supine_options_posture_list_parse(name, wanted->postures, postures);
-  if (result == SUPINE_EXIT_OK && wanted->reference != NULL) {
-    result = supine_options_posture_list_parse(name, wanted->reference, reference);
-  }
+  const int result = wanted->turns
+                         ? SUPINE_EXIT_OK
+                         : supine_options_posture_list_parse(name, wanted->postures, postures);
   if (result != SUPINE_EXIT_OK) {
     return result;
-  }
-  if (reference->count > 1) {
-    return supine_options_usage(name, "--colour difference: takes one posture");
   }
   return postures->count <= SUPINE_PANELS_MAX
              ? SUPINE_EXIT_OK
@@ -265,19 +235,22 @@ static void begin(void *chosen) {
 static int run(void *chosen, const supine_arguments *given) {
   const request *wanted = chosen;
   supine_posture_list postures = {.count = 0};
-  supine_posture_list reference = {.count = 0};
+  supine_reference_pose from;
   supine_basis *basis = NULL;
   supine_error error;
-  int result = check(wanted, &postures, &reference);
+  int result = check(wanted, &postures);
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
   if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
-  const supine_posture_item *from = reference.count == 1 ? &reference.item[0] : NULL;
-  result = wanted->turns ? supine_command_drawing_turn(basis, wanted, from)
-                         : render(basis, wanted, &postures, from);
+  if (supine_options_reference(basis, &wanted->from, true, &from, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  } else {
+    result = wanted->turns ? supine_command_drawing_turn(basis, wanted, &from)
+                           : render(basis, wanted, &postures, &from);
+  }
   supine_basis_close(basis);
   return result;
 }
@@ -301,7 +274,7 @@ const supine_command supine_command_render = {
         "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone "
         "\\\n"
         "      -o inside.png\n"
-        "  supine render lungs.safetensors --posture prone --colour difference:supine \\\n"
+        "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
         "      --view anterior,lateral,posterior --theme dark -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

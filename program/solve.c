@@ -11,7 +11,7 @@
 #include "program/model_options.h"
 #include "program/options/basis_input.h"
 #include "program/options/orientation.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 
 static const char name[] = "solve";
 
@@ -19,7 +19,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  const char *volume; /* as given, or NULL */
+  supine_volume_options volume;
   bool has_scale, has_vertex, as_scanned;
   double scale;
   size_t vertex;
@@ -28,10 +28,7 @@ typedef struct request {
 static const supine_option table[] = {
     {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
-    {"volume", 0, "VOLUME",
-     "rest (default: the end of a quiet expiration in that posture), full, rest+500, rest-200, or "
-     "a number: mL relative to the scan, all lungs together",
-     SUPINE_FILLS(request, volume), .rivals = "breath"},
+    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM",
      "largest displacement instead, mm; negative: the other way. Default where no rest is known: F "
      "d as it is, F what a vertex catches of the force, d in mm",
@@ -115,7 +112,8 @@ static supine_status find_scale(const supine_lungs *lungs, const request *wanted
                                 const supine_solution *solution, double *scale,
                                 supine_error *error) {
   const supine_reference *reference = &wanted->model.reference;
-  supine_volume volume = {SUPINE_VOLUME_REST, 0.0};
+  supine_volume volume = wanted->volume.state.volume;
+  const bool told = volume.kind != SUPINE_VOLUME_DEFAULT;
   *scale = 1.0;
   if (wanted->has_scale) {
     const double largest = supine_physics_solution_largest(solution);
@@ -124,17 +122,23 @@ static supine_status find_scale(const supine_lungs *lungs, const request *wanted
                ? SUPINE_OK
                : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
   }
-  if (wanted->volume == NULL && !reference->known) {
+  if (!told && !reference->known) {
     return SUPINE_OK;
   }
   if (!solution->has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "--volume needs a closed surface: close it, or give --scale");
   }
-  if (wanted->volume != NULL) {
-    (void)supine_options_volume_parse(wanted->volume, &volume);
+  volume.kind = told ? volume.kind : SUPINE_VOLUME_REST;
+  if (!reference->known && volume.kind <= SUPINE_VOLUME_FULL) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "rest and full are unknown of a scan taken as it is: give scan+ML or an "
+        "absolute volume, as 2600mL");
   }
-  double state = volume.kind == SUPINE_VOLUME_SCAN ? reference->scan_volume : 0.0;
+  double state = volume.kind == SUPINE_VOLUME_SCAN       ? reference->scan_volume
+                 : volume.kind == SUPINE_VOLUME_ABSOLUTE ? -1e-3 * supine_mesh_volume(&lungs->mesh)
+                                                         : 0.0;
   if (volume.kind == SUPINE_VOLUME_REST && reference->known) {
     const supine_status status = resting_scale(lungs, wanted, g, scale, error);
     if (status != SUPINE_OK) {
@@ -207,12 +211,6 @@ static int run(void *chosen, const supine_arguments *given) {
     return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
                                 wanted->path);
   }
-  supine_volume volume;
-  if (wanted->volume != NULL && !supine_options_volume_parse(wanted->volume, &volume)) {
-    return supine_options_usage(
-        name, "--volume takes rest, full, rest+ML, or mL relative to the scan, not '%s'",
-        wanted->volume);
-  }
   if (!wanted->has_vertex) {
     result = supine_options_orientation_finish(&wanted->orientation, name, g);
   }
@@ -245,7 +243,7 @@ const supine_command supine_command_solve = {
              "writes the deformed surface: the reference that a basis is measured against.",
     .options = table,
     .notes = "Examples:\n"
-             "  supine solve left.ply right.ply --posture prone --volume 500 -o prone.vtp\n"
+             "  supine solve left.ply right.ply --posture prone --volume rest+500 -o prone.vtp\n"
              "  supine solve lungs.ply --unit-force 0 -o column.csv",
     SUPINE_SURFACES,
     .request_size = sizeof(request),

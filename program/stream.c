@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "program/options/command.h"
+#include "program/options/state.h"
 #include "program/stream/address.h"
 #include "program/stream/live_page.h"
 #include "program/stream/server.h"
@@ -19,7 +20,9 @@ typedef struct request {
   const char *listen, *connect, *device, *called;
   double down[3], body[4]; /* body: quaternion W, X, Y, Z */
   int send, space;
-  const char *volume, *pv;
+  supine_state volume;
+  bool has_volume;
+  const char *pv;
   supine_pv_breath breath;
   double smooth, fps, seconds;
   size_t peers;
@@ -48,12 +51,11 @@ static const supine_option table[] = {
     {"smooth", 0, "MS", "steadies a trembling tracker; a turning body is shown so much later",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms"},
     {.help = "How full the lungs are:"},
-    {"volume", 0, "V",
-     "rest, full, rest+ML, or mL from the basis' reference; default: they breathe, on top of the "
-     "posture's rest. A STRING of device VOLUME sets it too, and an NDARRAY of one number, mL "
-     "above "
-     "rest",
-     SUPINE_FILLS(request, volume)},
+    {"volume", 0, "VOLUME",
+     "instead of breathing, always: " SUPINE_VOLUME_HELP
+     ". A STRING of device VOLUME sets it too, and an NDARRAY of one number, mL above rest",
+     SUPINE_FILLS(request, volume), .read = supine_options_read_volume,
+     SUPINE_SAYS_GIVEN(request, has_volume)},
     {"tidal", 0, "ML", "air of a breath; default 500", SUPINE_FILLS(request, breath.tidal),
      SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
@@ -62,7 +64,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {.help = "What is sent:"},
     {"send", 0, "WHAT",
-     "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's scale; "
+     "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's three "
+     "gains; "
      "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come "
      "once. A "
      "peer chooses by a STRING of "
@@ -198,8 +201,9 @@ static supine_status open_page(const request *wanted, const char *basis, char **
 static supine_status set_volume(const request *wanted, supine_stream_volume *volume,
                                 supine_error *error) {
   supine_pv pv = *supine_breath_normal();
-  if (wanted->volume != NULL) {
-    return supine_stream_volume_fix(volume, wanted->volume, error);
+  if (wanted->has_volume) {
+    volume->fixed = wanted->volume;
+    return SUPINE_OK;
   }
   const supine_status status =
       wanted->pv == NULL ? SUPINE_OK : supine_breath_load(wanted->pv, &pv, error);

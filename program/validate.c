@@ -18,28 +18,23 @@ typedef struct request {
   size_t count;
   supine_orientation orientation;
   supine_mesh_load_options load;
-  supine_volume volume;
+  supine_volume_options volume;
   double scale;
-  bool has_volume, has_scale, reverse, json;
+  bool has_scale, reverse, json;
 } request;
 
 static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
 
 /* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
 static int read_posture(const char *command, const char *text, supine_command_state *state) {
-  size_t colons = 0;
-  for (const char *at = text; (at = strchr(at, ':')) != NULL; ++at) {
-    ++colons;
-  }
-  const char *last = colons == 1 || colons == 3 ? strrchr(text, ':') : NULL;
-  const size_t length = last != NULL ? (size_t)(last - text) : strlen(text);
-  if (length == 0 || length >= sizeof state->posture ||
-      (last != NULL && !supine_options_volume_parse(last + 1, &state->volume))) {
+  supine_error error;
+  if (text[0] == '\0' || strlen(text) >= sizeof state->posture) {
     return SUPINE_OPTION_MISFIT;
   }
-  state->has_volume = last != NULL;
-  (void)snprintf(state->posture, sizeof state->posture, "%.*s", (int)length, text);
-  return supine_options_posture(command, state->posture, state->gravity);
+  (void)snprintf(state->posture, sizeof state->posture, "%s", text);
+  return supine_state_parse(text, &state->state, &error) == SUPINE_OK
+             ? SUPINE_EXIT_OK
+             : supine_options_usage(command, "%s", error.message);
 }
 
 static int read_from(const char *command, const char *text, void *field) {
@@ -68,13 +63,6 @@ static int read_state(const char *command, const char *text, void *field) {
   return read_posture(command, posture, state);
 }
 
-static int read_volume(const char *command, const char *text, void *field) {
-  request *wanted = field;
-  (void)command;
-  wanted->has_volume = true;
-  return supine_options_fits(supine_options_volume_parse(text, &wanted->volume));
-}
-
 #define FILLS(member) SUPINE_FILLS(request, member)
 
 static const supine_option table[] = {
@@ -90,12 +78,11 @@ static const supine_option table[] = {
     {"from", 0, "POSTURE[:VOLUME]",
      "the state that motion starts from, as landmarks and the maps beside the prediction have it; "
      "default: the basis's scan itself",
-     FILLS(from), .read = read_from,
-     .wants = "a posture, and :rest, :full, :rest+ML or :ML after it"},
-    {"volume", 0, "VOLUME",
-     "of states that name none: rest, full, rest+500, or mL relative to the scan. Default: a "
-     "patient's own state as it was fitted, else what the state's surface holds",
-     .read = read_volume, .wants = "rest, full, rest+ML or mL", .rivals = "breath"},
+     FILLS(from), .read = read_from, .wants = "a state, as supine:rest"},
+    {.help =
+         "The volume of states that name none (default: a patient's own state as it was fitted, "
+         "else what the state's surface holds):"},
+    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
      .wants = "a number", .rivals = "breath"},
     {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
@@ -187,8 +174,9 @@ static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]
 
 static json_t *encode_state(const supine_command_state *state,
                             const supine_command_outcome *outcome) {
-  json_t *root = json_pack("{s:[f, f, f], s:f}", "gravity", state->gravity[0], state->gravity[1],
-                           state->gravity[2], "scale", outcome->scale);
+  json_t *root =
+      json_pack("{s:[f, f, f], s:f}", "gravity", state->state.gravity[0], state->state.gravity[1],
+                state->state.gravity[2], "scale", outcome->scale);
   if (state->path != NULL) {
     (void)json_object_set_new(root, "file", json_string(state->path));
   }
@@ -245,11 +233,10 @@ static int set_states(const request *wanted, supine_command_subject *s) {
     supine_command_state *state = &s->state[i];
     *state = wanted->state[i];
     if (state->posture[0] == '\0') {
-      memcpy(state->gravity, gravity, sizeof gravity);
+      memcpy(state->state.gravity, gravity, sizeof gravity);
     }
-    if (!state->has_volume) {
-      state->has_volume = wanted->has_volume;
-      state->volume = wanted->volume;
+    if (state->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+      state->state.volume = wanted->volume.state.volume;
       state->has_scale = wanted->has_scale;
       state->scale = wanted->scale;
     }
@@ -312,7 +299,7 @@ static int run(void *chosen, const supine_arguments *given) {
     result = set_states(wanted, &s);
   }
   if (result == SUPINE_EXIT_OK && s.basis == NULL &&
-      !supine_command_law_says(&s, s.state[0].gravity)) {
+      !supine_command_law_says(&s, s.state[0].state.gravity)) {
     result =
         supine_options_usage(name, "%s alone knows its own posture only: make a basis of it", path);
   }

@@ -65,20 +65,16 @@ bool supine_command_law_says(const supine_command_subject *subject, const double
   return subject->has_patient && same_direction(gravity, subject->record.state.gravity);
 }
 
-/* The surface at weights and one scale for all lungs, [N, 3]. */
-static supine_status deform(const supine_basis *basis, const double *weights, double scale,
-                            double *positions, supine_error *error) {
+/* The surface in a pose, [N, 3]. */
+static supine_status deform(const supine_basis *basis, const supine_pose *pose, double *positions,
+                            supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  double scales[SUPINE_LUNGS_MAX];
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   if (xyz == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
                             info->vertex_count);
   }
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    scales[lung] = scale;
-  }
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, pose, xyz);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
     positions[i] = (double)xyz[i];
   }
@@ -86,87 +82,73 @@ static supine_status deform(const supine_basis *basis, const double *weights, do
   return SUPINE_OK;
 }
 
-/* Gravity and volume of the scan itself, where it is not the file's surface. */
-static supine_status take_scan(supine_command_subject *s, supine_error *error) {
-  const double volume = supine_basis_get_info(s->basis)->scan_volume;
-  const char *text = supine_basis_metadata(s->basis, "scan_gravity");
-  double *g = s->from.gravity;
-  if (volume == 0.0) {
-    s->from.has_scale = true; /* 0: the file's surface, in any posture */
-    g[1] = 1.0;
-    return SUPINE_OK;
+/* mL of all lungs in a pose; 0 of an open surface. */
+static double held(const supine_basis *basis, const supine_pose *pose) {
+  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  double sum = 0.0;
+  if (supine_basis_get_info(basis)->has_volume) {
+    supine_basis_volumes(basis, pose, volumes);
   }
-  if (text == NULL || sscanf(text, "%lf,%lf,%lf", &g[0], &g[1], &g[2]) != 3) { /* NOLINT */
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis was scanned %g mL from full inflation, but does not say in "
-                            "which posture: name it, as --from supine:rest",
-                            volume);
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    sum += volumes[lung];
   }
-  s->from.has_volume = true;
-  s->from.volume = (supine_volume){SUPINE_VOLUME_SCAN, 0.0};
-  return SUPINE_OK;
+  return sum;
 }
 
 supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error) {
   supine_command_subject *s = subject;
-  double weights[SUPINE_MODES_MAX];
-  supine_status status = SUPINE_OK;
+  supine_pose pose;
   if (s->basis == NULL) {
     return SUPINE_OK;
   }
   if (s->from.posture[0] == '\0') {
-    status = take_scan(s, error);
+    s->from.state = supine_basis_scan(s->basis);
   }
-  if (status == SUPINE_OK) {
-    status = supine_basis_weights(s->basis, s->from.gravity, weights);
+  /* Where no rest is known, a posture alone is the scan. */
+  if (s->from.state.volume.kind == SUPINE_VOLUME_DEFAULT &&
+      !supine_basis_get_info(s->basis)->has_rest) {
+    s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
   }
-  /* Where no rest is known, a posture alone is the file's surface in it. */
-  if (status == SUPINE_OK && !s->from.has_scale &&
-      (s->from.has_volume || supine_basis_get_info(s->basis)->resting_volume != NULL)) {
-    const supine_volume volume =
-        s->from.has_volume ? s->from.volume : supine_options_volume_default(s->basis);
-    s->from_millilitres = supine_options_volume_of(s->basis, &volume, s->from.gravity);
-    status = supine_basis_scale(s->basis, weights, s->from_millilitres, &s->from_scale, error);
+  const supine_status status = supine_basis_pose(s->basis, &s->from.state, &pose, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  return status != SUPINE_OK || s->from_scale == 0.0
-             ? status
-             : deform(s->basis, weights, s->from_scale, s->rest.vertices, error);
+  s->from_millilitres = held(s->basis, &pose);
+  s->from_scale = pose.gains[0][0];
+  return deform(s->basis, &pose, s->rest.vertices, error);
 }
 
 /* --- a prediction ---------------------------------------------------------------------------- */
 
-/* The breath scale: as asked, as the patient was fitted, or that of the state's volume. */
-static supine_status find_scale(const supine_command_subject *s, const supine_command_state *state,
+/* The gains: as asked, as the patient was fitted, or those of the state's volume. */
+static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
-  double held[SUPINE_LUNGS_MAX];
-  double beyond = 0.0; /* mL beyond the file's surface */
+  supine_state asked = state->state;
+  const bool told = asked.volume.kind != SUPINE_VOLUME_DEFAULT;
   const bool measured = mesh->vertex_count > 0 && supine_basis_get_info(s->basis)->has_volume;
-  if (state->has_volume) {
-    beyond = supine_options_volume_of(s->basis, &state->volume, state->gravity);
-  } else if (measured) {
-    supine_options_volume_reference(s->basis, held);
-    beyond = 1e-3 * supine_mesh_volume(mesh);
-    for (size_t lung = 0; lung < supine_basis_get_info(s->basis)->lung_count; ++lung) {
-      beyond -= held[lung];
-    }
+  supine_status status = SUPINE_OK;
+  if (!told && measured) {
+    asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(mesh)};
   }
-  outcome->has_millilitres = state->has_volume || measured;
-  outcome->millilitres = beyond - s->from_millilitres;
-  outcome->scale = state->scale;
+  outcome->has_millilitres = told || measured;
   if (state->has_scale) {
-    return SUPINE_OK;
+    supine_pose_fill(&outcome->pose, state->scale);
+  } else if (!told && s->count == 1 && supine_command_law_says(s, asked.gravity)) {
+    supine_pose_fill(&outcome->pose, s->record.inflation);
+  } else if (!outcome->has_millilitres) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "how full is the other state? Landmarks do not tell: --volume, or "
+                              "--scale");
+  } else {
+    status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
   }
-  if (!state->has_volume && s->count == 1 && supine_command_law_says(s, state->gravity)) {
-    outcome->scale = s->record.inflation;
-    return SUPINE_OK;
+  if (status == SUPINE_OK) {
+    outcome->scale = outcome->pose.gains[0][0];
+    outcome->millilitres = (measured && !told ? asked.volume.ml : held(s->basis, &outcome->pose)) -
+                           s->from_millilitres;
   }
-  if (!outcome->has_millilitres) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "how full is the other state? Landmarks do not tell: --volume, or "
-                            "--scale");
-  }
-  return supine_basis_scale(s->basis, outcome->weights, beyond, &outcome->scale, error);
+  return status;
 }
 
 static supine_status predict_surface(const supine_command_subject *s,
@@ -179,16 +161,17 @@ static supine_status predict_surface(const supine_command_subject *s,
   if (outcome->predicted == NULL || outcome->nearest == NULL) {
     return supine_error_set(error, status, "no memory for %zu vertices", n);
   }
-  status = supine_basis_weights(s->basis, state->gravity, outcome->weights);
+  status = supine_basis_weights(s->basis, state->state.gravity, outcome->pose.weights);
   if (status == SUPINE_OK) {
-    status = find_scale(s, state, mesh, outcome, error);
+    status = find_gains(s, state, mesh, outcome, error);
   }
   if (status == SUPINE_OK) {
-    status = deform(s->basis, outcome->weights, outcome->scale, outcome->predicted, error);
+    status = deform(s->basis, &outcome->pose, outcome->predicted, error);
   }
   for (size_t i = 0; status == SUPINE_OK && i < n; ++i) {
     double motion[3] = {0.0, 0.0, 0.0};
-    if (supine_command_law_says(s, state->gravity)) { /* between the scans that it was fitted to */
+    if (supine_command_law_says(
+            s, state->state.gravity)) { /* between the scans that it was fitted to */
       supine_patient_motion(&s->record.patient, s->rest.vertices + 3 * i, motion);
     }
     for (size_t k = 0; k < 3; ++k) {
@@ -222,7 +205,9 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale, search *look,
                                  double *positions, double *rms, supine_error *error) {
-  const supine_status status = deform(s->basis, outcome->weights, scale, positions, error);
+  supine_pose pose = outcome->pose;
+  supine_pose_fill(&pose, scale);
+  const supine_status status = deform(s->basis, &pose, positions, error);
   *rms = INFINITY;
   if (status == SUPINE_OK) {
     double sum = 0.0;
@@ -286,7 +271,7 @@ void supine_command_find_line(supine_command_subject *subject) {
     for (size_t i = 0; i < s->count; ++i) {
       const supine_command_outcome *of = &s->outcome[i];
       if (!of->has_best || !of->has_millilitres ||
-          !same_direction(s->state[i].gravity, s->state[0].gravity)) {
+          !same_direction(s->state[i].state.gravity, s->state[0].state.gravity)) {
         continue;
       }
       const double scale = of->best_scale - s->from_scale;
@@ -315,7 +300,7 @@ static supine_status predict_points(const supine_command_subject *s, size_t whic
   const supine_command_outcome *outcome = &s->outcome[which];
   const size_t n = s->rest.vertex_count;
   supine_inside_biharmonic fit = {0};
-  if (supine_command_law_says(s, s->state[which].gravity) &&
+  if (supine_command_law_says(s, s->state[which].state.gravity) &&
       !supine_patient_is_uneven(&s->record)) {
     const double times = s->basis == NULL ? 1.0 : outcome->scale * s->record.inflation;
     for (size_t i = 0; i < pairs->count; ++i) {

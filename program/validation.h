@@ -7,7 +7,7 @@
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/validate.h"
 #include "program/options/orientation.h"
-#include "program/options/volume.h"
+#include "program/options/state.h"
 
 enum { SUPINE_COMMAND_STATES_MAX = 8 };
 
@@ -15,16 +15,15 @@ enum { SUPINE_COMMAND_STATES_MAX = 8 };
 typedef struct supine_command_state {
   const char *path;                      /* its surface; NULL: landmarks alone */
   char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not said */
-  double gravity[3];
-  bool has_volume, has_scale;
-  supine_volume volume;
-  double scale; /* of the file's surface; negative below full inflation */
+  supine_state state;                    /* of default volume: not said */
+  bool has_scale;
+  double scale; /* the gain instead; negative below full inflation */
 } supine_command_state;
 
 /* What came of one. */
 typedef struct supine_command_outcome {
-  double weights[SUPINE_MODES_MAX];
-  double scale;
+  supine_pose pose;
+  double scale; /* its gain */
   bool has_millilitres;
   double millilitres; /* from the state that motion starts from */
   double *predicted;  /* [N, 3] */
@@ -41,7 +40,7 @@ typedef struct supine_command_subject {
   bool has_patient;
   supine_patient_record record;
   supine_command_state from;
-  double from_scale, from_millilitres; /* of the file's surface, beyond it */
+  double from_scale, from_millilitres; /* gain and volume of the state that motion starts from */
   supine_mesh rest;                    /* where motion starts from */
   size_t count;
   supine_command_state state[SUPINE_COMMAND_STATES_MAX];

@@ -51,7 +51,6 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
   const supine_command_subject *s = subject;
   const size_t n = s->rest.vertex_count;
   supine_panel panel[SUPINE_COMMAND_STATES_MAX] = {{0}};
-  double scales[SUPINE_COMMAND_STATES_MAX][SUPINE_LUNGS_MAX];
   char subtitle[SUPINE_COMMAND_STATES_MAX][96];
   supine_renderer *renderer = NULL;
   double largest = 0.0;
@@ -67,9 +66,6 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
       continue;
     }
     find_values(s, outcome, values + count * n, &largest, &end);
-    for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-      scales[count][lung] = outcome->scale;
-    }
     const supine_patient_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     const int used = outcome->has_millilitres ? snprintf(subtitle[count], sizeof subtitle[count],
                                                          "%+.0f mL, ", outcome->millilitres)
@@ -79,10 +75,9 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
     panel[count] = (supine_panel){.title = s->state[i].posture[0] != '\0' ? s->state[i].posture
                                                                           : s->state[i].path,
                                   .subtitle = subtitle[count],
-                                  .weights = outcome->weights,
-                                  .scales = scales[count],
+                                  .pose = &outcome->pose,
                                   .value = values + count * n};
-    memcpy(panel[count].gravity, s->state[i].gravity, sizeof panel[count].gravity);
+    memcpy(panel[count].gravity, s->state[i].state.gravity, sizeof panel[count].gravity);
     ++count;
   }
   supine_picture picture = {.panel = panel,

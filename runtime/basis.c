@@ -281,25 +281,101 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Volumes that count from the file's surface: at rest, and in the scan. */
-static supine_status check_rest(const check *c, supine_basis *basis) {
-  static const size_t terms = RESTING_TERMS;
-  const char *scan = supine_safetensors_metadata(c->file, "scan_volume_ml");
-  if (scan != NULL) {
+/* Read `count` numbers, separated by commas, of a metadata string; false where it has others. */
+static bool read_numbers(const char *text, size_t count, double *values) {
+  for (size_t i = 0; i < count; ++i) {
     char *end = NULL;
-    basis->info.scan_volume = strtod(scan, &end);
-    if (end == scan || *end != '\0' || !isfinite(basis->info.scan_volume)) {
-      return refuse(c, "scan_volume_ml is no number: %.16s", scan);
+    values[i] = strtod(text, &end);
+    if (end == text || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
+      return false;
+    }
+    text = end + 1;
+  }
+  return true;
+}
+
+/* mL that each lung of the reference surface encloses. */
+static void measure_lungs(supine_basis *basis) {
+  const supine_basis_info *info = &basis->info;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    const uint32_t *corner = info->triangles + 3 * t;
+    size_t lung = 0;
+    while (corner[0] >= info->lung_begin[lung + 1]) {
+      ++lung;
+    }
+    const float *origin = info->vertices + 3 * info->lung_begin[lung];
+    double p[3][3];
+    for (size_t i = 0; i < 9; ++i) {
+      p[i / 3][i % 3] =
+          (double)info->vertices[3 * (size_t)corner[i / 3] + i % 3] - (double)origin[i % 3];
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t j = (i + 1) % 3;
+      const size_t k = (i + 2) % 3;
+      basis->reference_volume[lung] += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
     }
   }
-  if (supine_safetensors_find(c->file, "resting_volume") == NULL) {
+}
+
+/* The volume of the reference, by lung. Content has not the lungs' surface: its file states them.
+ */
+static supine_status check_reference(const check *c, supine_basis *basis) {
+  const char *stated = supine_safetensors_metadata(c->file, "reference_volume_ml");
+  basis->info.reference_volume = basis->reference_volume;
+  if (!basis->info.has_volume) {
     return SUPINE_OK;
   }
-  basis->info.resting_volume = want_shape(c, "resting_volume", SUPINE_F64, 1, &terms);
-  if (basis->info.resting_volume == NULL) {
+  if (supine_safetensors_metadata(c->file, "content") == NULL || stated == NULL) {
+    measure_lungs(basis);
+    return SUPINE_OK;
+  }
+  return read_numbers(stated, basis->info.lung_count, basis->reference_volume)
+             ? SUPINE_OK
+             : refuse(c, "reference_volume_ml has no number for each lung: %.32s", stated);
+}
+
+/* The scan's state: a file of fields, or of a scan taken as it is, has its surface as reference. */
+static supine_status check_scan(const check *c, supine_basis *basis) {
+  const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
+  const char *gravity = supine_safetensors_metadata(c->file, "scan_gravity");
+  const char *scanned = supine_safetensors_metadata(c->file, "scanned");
+  const char *upright = supine_safetensors_metadata(c->file, "full_upright_gain");
+  const char *route = supine_safetensors_metadata(c->file, "route");
+  double by_lung[SUPINE_LUNGS_MAX] = {0};
+  const size_t count = volume != NULL && strchr(volume, ',') != NULL ? basis->info.lung_count : 1;
+  if (volume != NULL && !read_numbers(volume, count, by_lung)) {
+    return refuse(c, "scan_volume_ml is no number: %.32s", volume);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    basis->scan_volume += by_lung[i];
+  }
+  basis->scan_gravity[1] = 1;
+  if (gravity != NULL && !read_numbers(gravity, 3, basis->scan_gravity)) {
+    return refuse(c, "scan_gravity is not three numbers: %.48s", gravity);
+  }
+  if (upright != NULL && !read_numbers(upright, 1, &basis->upright_gain)) {
+    return refuse(c, "full_upright_gain is no number: %.16s", upright);
+  }
+  basis->info.is_fields = route != NULL && strcmp(route, "fields") == 0;
+  basis->info.has_full = basis->info.has_rest || (scanned != NULL && strcmp(scanned, "full") == 0);
+  return SUPINE_OK;
+}
+
+/* Volumes at rest: by lung, or of all lungs together in files of version 1 and 2. */
+static supine_status check_rest(const check *c, supine_basis *basis) {
+  const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
+  if (tensor == NULL) {
+    return SUPINE_OK;
+  }
+  const size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
+  basis->rest_by_lung = tensor->rank == 2;
+  const size_t rank = basis->rest_by_lung ? 2 : 1;
+  basis->resting = want_shape(c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
+  if (basis->resting == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  return finite_doubles(basis->info.resting_volume, terms)
+  basis->info.has_rest = true;
+  return finite_doubles(basis->resting, rank == 2 ? shape[0] * shape[1] : shape[1])
              ? SUPINE_OK
              : refuse(c, "resting_volume is not finite, or 2^30 and more");
 }
@@ -418,8 +494,8 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface, check_field, check_modes,  check_lungs,
-      check_volume,  check_rest,  check_normals};
+      check_surface,   check_field, check_modes, check_lungs,  check_volume,
+      check_reference, check_rest,  check_scan,  check_normals};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }

@@ -34,19 +34,20 @@ static void batch_tiles(const supine_basis *basis, size_t count, block *scratch,
                                     .held = scratch->held[j],
                                     .continues = t > 0,
                                     .continued = t + here < tiles};
-      basis->kernels->deform(wide, scratch->folded + j * basis->info.mode_count, 0, here, &target);
+      basis->kernels->deform(wide, scratch->folded + j * (basis->info.mode_count + 3), 0, here,
+                             &target);
     }
   }
 }
 
-void supine_deform_batch(const supine_basis *basis, size_t count, const double *weights,
-                         const double *scales, size_t begin, size_t end, float *xyz) {
+void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
+                         size_t begin, size_t end, float *xyz) {
   block scratch;
   supine_tiles wide = {0};
   const size_t modes = basis->info.mode_count;
   const size_t lungs = basis->info.lung_count;
   const size_t apart = 3 * (end - begin);
-  const size_t group = WEIGHT_NUMBERS / modes < GROUP ? WEIGHT_NUMBERS / modes : GROUP;
+  const size_t group = WEIGHT_NUMBERS / (modes + 3) < GROUP ? WEIGHT_NUMBERS / (modes + 3) : GROUP;
   const double bytes = (double)count * (double)apart * sizeof *xyz;
   const bool stream = bytes > STREAM_BATCH_BYTES;
   supine_tiles_layout(&wide, SUPINE_STORAGE_EXACT, modes, basis->info.vector, BLOCK_TILES);
@@ -67,18 +68,15 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const double *
     for (size_t j = 0; j < count; j += group) {
       const size_t here = count - j < group ? count - j : group;
       for (size_t i = 0; i < here; ++i) {
-        supine_fold(basis, weights + (j + i) * modes, scales[(j + i) * lungs + lung],
-                    scratch.folded + i * modes);
+        supine_fold(basis, &poses[j + i], lung, scratch.folded + i * (modes + 3));
       }
       batch_tiles(basis, here, &scratch, &wide, from / TILE, (to - from) / TILE,
                   xyz + j * apart + 3 * (from - begin), apart, stream);
     }
     for (size_t j = 0; j < count; ++j) {
-      const double *w = weights + j * modes;
-      const double *s = scales + j * lungs;
       float *positions = xyz + j * apart;
-      supine_deform_range(basis, w, s, first, from, positions + 3 * (first - begin));
-      supine_deform_range(basis, w, s, to, last, positions + 3 * (to - begin));
+      supine_deform_range(basis, &poses[j], first, from, positions + 3 * (first - begin));
+      supine_deform_range(basis, &poses[j], to, last, positions + 3 * (to - begin));
     }
   }
   supine_stream_fence(stream);

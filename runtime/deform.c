@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformed positions x_i = p_i + s (w . c_i) d_i, in runs of whole tiles of one lung. */
+/* Deformed positions x_ij = p_ij + gain_j (w . c_i) d_ij, in runs of whole tiles of one lung. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -53,43 +53,41 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
-static void deform_lungs(const supine_basis *basis, const double *weights, const double *scales,
-                         size_t begin, size_t end, const supine_target *target) {
-  float folded[SUPINE_MODES_MAX];
+static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  float folded[SUPINE_MODES_MAX + 3];
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = supine_target_after(target, first - begin);
-      supine_fold(basis, weights, scales[lung], folded);
+      supine_fold(basis, pose, lung, folded);
       supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, first, last, &here);
     }
   }
   supine_stream_fence(target->stream);
 }
 
-void supine_deform_range(const supine_basis *basis, const double *weights, const double *scales,
-                         size_t begin, size_t end, float *xyz) {
+void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, float *xyz) {
   const supine_target target = {
       .x = xyz, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, weights, scales, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, &target);
 }
 
-void supine_deform(const supine_basis *basis, const double *weights, const double *scales,
-                   float *xyz) {
-  supine_deform_range(basis, weights, scales, 0, basis->info.vertex_count, xyz);
+void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
+  supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
 }
 
-/* Eight parameters: those of supine_deform_range, with a place for each axis. */
-void supine_deform_separate(const supine_basis *basis, const double *weights, const double *scales,
-                            size_t begin, size_t end, float *x, float *y, float *z) {
+void supine_deform_separate(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                            size_t end, float *x, float *y, float *z) {
   const supine_target target = {
       .x = x, .y = y, .z = z, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, weights, scales, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, &target);
 }
 
-void supine_displace_range(const supine_basis *basis, const double *weights, const double *scales,
-                           size_t begin, size_t end, float *xyz) {
+void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                           size_t end, float *xyz) {
   const supine_target target = {.x = xyz, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, weights, scales, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, &target);
 }

@@ -4,18 +4,18 @@
 
 #include "runtime/internal.h"
 
-double supine_basis_error(const supine_basis *basis, const double *weights, const double *scales) {
+double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   const double unit = 0x1p-24; /* half a unit in the last place of a float */
   const size_t modes = basis->info.mode_count;
   double stored = 0;
   double moved = 0;
   for (size_t k = 0; k < modes; ++k) {
-    stored += fabs(weights[k]) * basis->mode_error[k];
-    moved += fabs(weights[k]) * basis->mode_size[k];
+    stored += fabs(pose->weights[k]) * basis->mode_error[k];
+    moved += fabs(pose->weights[k]) * basis->mode_size[k];
   }
   double scale = 0;
-  for (size_t i = 0; i < basis->info.lung_count; ++i) {
-    scale = fmax(scale, fabs(scales[i]));
+  for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
+    scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
   /* Packing, folding and the sum over modes round K + 8 times; the last addition rounds each
    * coordinate. */
@@ -24,19 +24,15 @@ double supine_basis_error(const supine_basis *basis, const double *weights, cons
   return 1.001 * (scale * stored + basis->rest_error + rounding);
 }
 
-/* The largest displacement at scale 1. */
-static double largest_displacement(const supine_basis *basis, const double *weights) {
+/* The largest displacement of a pose. */
+static double largest_displacement(const supine_basis *basis, const supine_pose *pose) {
   enum { BLOCK = 1024 };
   float xyz[3 * BLOCK];
-  double scales[SUPINE_LUNGS_MAX];
-  for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
-    scales[i] = 1;
-  }
   const size_t n = basis->info.vertex_count;
   float top = 0;
   for (size_t begin = 0; begin < n; begin += BLOCK) {
     const size_t end = n - begin < BLOCK ? n : begin + BLOCK;
-    supine_displace_range(basis, weights, scales, begin, end, xyz);
+    supine_displace_range(basis, pose, begin, end, xyz);
     for (size_t i = 0; i < end - begin; ++i) {
       const float *u = xyz + 3 * i;
       const float square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
@@ -51,26 +47,22 @@ double supine_basis_storage_error(const supine_basis *basis) {
   static const double distance = 20; /* mm, on an open surface */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
+    supine_pose pose;
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
-    const double gravity[3] = {cell[0], cell[1], cell[2]};
-    double weights[SUPINE_MODES_MAX];
-    double scale = 0;
-    if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK) {
+    const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
+    if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
       continue; /* the centre of the cube */
     }
     if (basis->info.has_volume) {
-      if (supine_basis_scale(basis, weights, volume, &scale, NULL) != SUPINE_OK) {
-        continue; /* no such breath in this direction */
+      if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
+        continue; /* no such volume in this direction */
       }
     } else {
-      const double largest = largest_displacement(basis, weights);
-      scale = largest > 0 ? distance / largest : 0;
+      supine_pose_fill(&pose, 1);
+      const double largest = largest_displacement(basis, &pose);
+      supine_pose_fill(&pose, largest > 0 ? distance / largest : 0);
     }
-    double scales[SUPINE_LUNGS_MAX];
-    for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
-      scales[i] = scale;
-    }
-    const double error = supine_basis_error(basis, weights, scales);
+    const double error = supine_basis_error(basis, &pose);
     worst = isnan(error) ? INFINITY : fmax(worst, error); /* numbers beyond floats */
   }
   return worst;

@@ -29,17 +29,17 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
   return SUPINE_OK;
 }
 
-supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
-                                const double *scales, float *uniforms) {
+supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose, float *weights,
+                                float *gains) {
   const size_t modes = basis->info.mode_count;
-  const size_t room = (modes + 3) / 4 * 4;
   if (!fits(basis)) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    for (size_t k = 0; k < room; ++k) {
-      uniforms[lung * room + k] = k < modes ? (float)(scales[lung] * weights[k]) : 0;
-    }
+  for (size_t k = 0; k < (modes + 3) / 4 * 4; ++k) {
+    weights[k] = k < modes ? (float)pose->weights[k] : 0;
+  }
+  for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
+    gains[i] = (float)pose->gains[i / 3][i % 3];
   }
   return SUPINE_OK;
 }
@@ -60,15 +60,15 @@ supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, si
   return SUPINE_OK;
 }
 
-supine_status supine_gl_normal_weights(const supine_basis *basis, const double *weights,
-                                       const double *scales, float *uniforms) {
+supine_status supine_gl_normal_weights(const supine_basis *basis, const supine_pose *pose,
+                                       float *uniforms) {
   const size_t modes = basis->info.normal_count;
   const size_t words = supine_tiles_normal_words(modes);
   double v[SUPINE_LUNGS_MAX * SUPINE_NORMAL_MODES_MAX];
   if (words == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  supine_basis_normal_weights(basis, weights, scales, v);
+  supine_basis_normal_weights(basis, pose, v);
   memset(uniforms, 0, 3 * words * basis->info.lung_count * sizeof *uniforms);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     for (size_t j = 0; j < modes; ++j) {

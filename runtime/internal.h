@@ -35,8 +35,14 @@ struct supine_basis {
   double mode_scale[SUPINE_MODES_MAX];
   double mode_error[SUPINE_MODES_MAX]; /**< largest error by packing, mm at weight and scale 1 */
   double mode_size[SUPINE_MODES_MAX];  /**< largest displacement, mm at weight and scale 1 */
-  double rest_error;                   /**< largest error of a rest position, mm */
-  double rest_size;                    /**< largest distance of a rest position from 0, mm */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< what info.reference_volume points to */
+  const double *resting; /**< [G, 9] mL beyond the reference, or [9] for all lungs; or NULL */
+  bool rest_by_lung;     /**< which of both; all lungs share one scale where it is [9] */
+  double upright_gain;   /**< of the reference volume that full inflation holds more upright */
+  double scan_volume;    /**< mL of the scan beyond the reference */
+  double scan_gravity[3];
+  double rest_error; /**< largest error of a rest position, mm */
+  double rest_size;  /**< largest distance of a rest position from 0, mm */
 };
 
 /** Packs the tensors into tiles of that storage (not AUTO), in place of those before.
@@ -65,8 +71,14 @@ supine_target supine_target_after(const supine_target *target, size_t count);
 /** supine_basis_info.storage_error of the tiles as they are. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** What the kernels multiply by: weights times scale times the units of the packed coefficients.
- * @param folded  [K] */
-void supine_fold(const supine_basis *basis, const double *weights, double scale, float *folded);
+/** Fill in what the kernels multiply by: weights times the units of the packed coefficients, then
+ * the three gains of a lung.
+ * @param folded  [K + 3] */
+void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
+
+/** Fill in the one gain at which the lungs together hold `volume` mL beyond the reference.
+ * @param pose  has its weights
+ * @retval SUPINE_ERROR_NUMERICAL */
+supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
 
 #endif

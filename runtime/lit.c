@@ -67,27 +67,26 @@ static void lung_weights(const supine_basis *basis, size_t lung, const double *w
   }
 }
 
-void supine_basis_normal_weights(const supine_basis *basis, const double *weights,
-                                 const double *scales, double *normal_weights) {
+void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
+                                 double *normal_weights) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    lung_weights(basis, lung, weights, scales[lung],
+    lung_weights(basis, lung, pose->weights, pose->gains[lung][0],
                  normal_weights + lung * basis->info.normal_count);
   }
 }
 
 /* What the kernels multiply by, of one lung. */
-static void fold(const supine_basis *basis, size_t lung, const double *weights, double scale,
-                 float *folded) {
+static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
-  lung_weights(basis, lung, weights, scale, v);
+  lung_weights(basis, lung, pose->weights, pose->gains[lung][0], v);
   for (size_t j = 0; j < basis->info.normal_count; ++j) {
     folded[j] = (float)(normal_unit() * v[j]);
   }
 }
 
 /* Normals of vertices begin <= i < end, which may be of several lungs. */
-static void light(const supine_basis *basis, const double *weights, const double *scales,
-                  size_t begin, size_t end, bool stream, float *normals) {
+static void light(const supine_basis *basis, const supine_pose *pose, size_t begin, size_t end,
+                  bool stream, float *normals) {
   const supine_target target = {
       .x = normals, .stream = stream, .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
   float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* words are filled up to three modes */
@@ -96,40 +95,38 @@ static void light(const supine_basis *basis, const double *weights, const double
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = supine_target_after(&target, first - begin);
-      fold(basis, lung, weights, scales[lung], folded);
+      fold(basis, lung, pose, folded);
       supine_deform_lung(basis->kernels->light, &basis->lit, folded, first, last, &here);
     }
   }
   supine_stream_fence(stream);
 }
 
-supine_status supine_deform_lit_range(const supine_basis *basis, const double *weights,
-                                      const double *scales, size_t begin, size_t end, float *xyz,
-                                      float *normals) {
+supine_status supine_deform_lit_range(const supine_basis *basis, const supine_pose *pose,
+                                      size_t begin, size_t end, float *xyz, float *normals) {
   if (basis->info.normal_count == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
   if (xyz != NULL) {
-    supine_deform_range(basis, weights, scales, begin, end, xyz);
+    supine_deform_range(basis, pose, begin, end, xyz);
   }
-  light(basis, weights, scales, begin, end, basis->stream, normals);
+  light(basis, pose, begin, end, basis->stream, normals);
   return SUPINE_OK;
 }
 
-supine_status supine_deform_lit(const supine_basis *basis, const double *weights,
-                                const double *scales, float *xyz, float *normals) {
-  return supine_deform_lit_range(basis, weights, scales, 0, basis->info.vertex_count, xyz, normals);
+supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose, float *xyz,
+                                float *normals) {
+  return supine_deform_lit_range(basis, pose, 0, basis->info.vertex_count, xyz, normals);
 }
 
-/* Eight parameters: those of supine_deform_batch, with the normals. */
 supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
-                                      const double *weights, const double *scales, size_t begin,
-                                      size_t end, float *xyz, float *normals) {
+                                      const supine_pose *poses, size_t begin, size_t end,
+                                      float *xyz, float *normals) {
   if (basis->info.normal_count == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
   if (xyz != NULL) {
-    supine_deform_batch(basis, count, weights, scales, begin, end, xyz);
+    supine_deform_batch(basis, count, poses, begin, end, xyz);
   }
   const bool stream =
       3.0 * (double)(end - begin) * (double)count * sizeof *normals > STREAM_BATCH_BYTES;
@@ -139,8 +136,7 @@ supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
     const size_t next = (at / step + 1) * step;
     const size_t last = next < end ? next : end;
     for (size_t j = 0; j < count; ++j) {
-      light(basis, weights + j * basis->info.mode_count, scales + j * basis->info.lung_count, at,
-            last, stream, normals + 3 * (j * (end - begin) + at - begin));
+      light(basis, &poses[j], at, last, stream, normals + 3 * (j * (end - begin) + at - begin));
     }
     at = last;
   }

@@ -2,13 +2,12 @@
 // A vertex of a deformed lung and its normal, for vertex shaders. GLSL ES 3.00 and GLSL 3.30 core: put
 // this text after the #version line (and, for ES, "precision highp float;").
 //
-//     x = rest + (w . c) direction        w: K numbers of each lung, c: K numbers a vertex
+//     x = reference + gain (w . c) direction    w: K weights, gain: 3 numbers of each lung, c: K numbers a vertex
 //     n = sum over j of v_j n_j           v: Q numbers of each lung, n_j: Q vectors a vertex
 //
 // Attributes come from supine_gl_pack and supine_gl_pack_normals, the uniforms from supine_gl_weights
-// and supine_gl_normal_weights (supine/runtime.h). Weights include each lung's breath scale and are
-// chosen by rest.w, the lung's number, so that all lungs are one draw. K + 3 multiplications and K + 2
-// additions a vertex, and 3 Q of each for a normal.
+// and supine_gl_normal_weights (supine/runtime.h). Gains are chosen by rest.w, the lung's number, so that
+// all lungs are one draw. K + 6 multiplications and K + 2 additions a vertex, and 3 Q of each for a normal.
 
 #ifndef SUPINE_LUNGS
 #define SUPINE_LUNGS 2
@@ -20,30 +19,37 @@
 #define SUPINE_WORDS 2 // of three of the normals' modes each, (Q + 2) / 3
 #endif
 
-uniform vec4 supine_weights[SUPINE_LUNGS * SUPINE_VECTORS];
+uniform vec4 supine_weights[SUPINE_VECTORS];
+uniform vec3 supine_gains[SUPINE_LUNGS];
 uniform vec3 supine_normal_weights[SUPINE_LUNGS * SUPINE_WORDS];
 
-float supine_amount(vec4 rest, int part, vec4 c) {
-  return dot(supine_weights[int(rest.w) * SUPINE_VECTORS + part], c);
+vec3 supine_place(vec4 rest, vec3 direction, float amount) {
+  return rest.xyz + supine_gains[int(rest.w)] * amount * direction;
 }
 
 vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0) {
-  return rest.xyz + supine_amount(rest, 0, c0) * direction;
+  return supine_place(rest, direction, dot(supine_weights[0], c0));
 }
 
+#if SUPINE_VECTORS > 1
 vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1) {
-  return rest.xyz + (supine_amount(rest, 0, c0) + supine_amount(rest, 1, c1)) * direction;
+  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1));
 }
+#endif
 
+#if SUPINE_VECTORS > 2
 vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2) {
-  return rest.xyz + (supine_amount(rest, 0, c0) + supine_amount(rest, 1, c1) +
-                     supine_amount(rest, 2, c2)) * direction;
+  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
+                                        dot(supine_weights[2], c2));
 }
+#endif
 
+#if SUPINE_VECTORS > 3
 vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
-  return rest.xyz + (supine_amount(rest, 0, c0) + supine_amount(rest, 1, c1) +
-                     (supine_amount(rest, 2, c2) + supine_amount(rest, 3, c3))) * direction;
+  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
+                                        (dot(supine_weights[2], c2) + dot(supine_weights[3], c3)));
 }
+#endif
 
 // What word `part` of the normal's modes adds: the sum over all parts points along the normal, as long
 // as the area around the vertex is beside its area at rest. The modes are 13, 10 and 9 bits.

@@ -116,3 +116,19 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   *scale = side > 0 ? cubic_solve(c, volume, 0, far) : cubic_solve(c, volume, far, 0);
   return SUPINE_OK;
 }
+
+double supine_volume_form_at(const supine_volume_form *form, const double gains[3]) {
+  const double *f = form->of;
+  const double x = gains[0];
+  const double y = gains[1];
+  const double z = gains[2];
+  return x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] +
+         x * y * z * f[6];
+}
+
+supine_status supine_volume_form_scale(const supine_volume_form *form, double volume, double *scale,
+                                       supine_error *error) {
+  const double *f = form->of;
+  const double cubic[3] = {f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]};
+  return supine_volume_scale(cubic, volume, scale, error);
+}

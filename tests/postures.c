@@ -9,6 +9,8 @@
 
 #include "mesh/mesh.h"
 
+#include "tests/poses.h"
+
 const char *const posture_figure_names[POSTURE_COUNT] = {"supine", "prone",   "left",
                                                          "right",  "upright", "inverted"};
 
@@ -23,14 +25,14 @@ static supine_status place(const supine_basis *basis, const double *gravity, dou
   double scales[SUPINE_LUNGS_MAX];
   supine_status status = supine_basis_weights(basis, gravity, weights);
   if (status == SUPINE_OK) {
-    status = supine_basis_scale(basis, weights, volume, &scales[0], error);
+    status = posed_scale(basis, weights, volume, &scales[0], error);
   }
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < 2; ++j) {
       scales[j] = scales[0];
-      lungs[j] = supine_basis_lung_volume(basis, j, weights, scales[0]);
+      lungs[j] = posed_lung_volume(basis, j, weights, scales[0]);
     }
-    supine_deform(basis, weights, scales, xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
   }
   return status;
 }
@@ -118,7 +120,7 @@ supine_status postures_measure(const supine_basis *basis, posture_figures figure
     supine_slab slabs[2][QUARTERS];
     *f = (posture_figures){0};
     (void)supine_posture_gravity(posture_figure_names[p], gravity);
-    (void)supine_basis_resting_volume(basis, gravity, &rest);
+    (void)posed_rest(basis, gravity, &rest);
     status = place(basis, gravity, rest, xyz[p == 0 ? 0 : 1], before, error);
     if (status == SUPINE_OK) {
       status = place(basis, gravity, rest + breath, xyz[2], after, error);

@@ -213,10 +213,11 @@ void fixture_write(const fixture *f, const char *path) {
       {"version", "2"},
       {"kind", f->vector ? "vector" : "scalar"},
       {"units", "mm"},
+      {"route", f->fields ? "fields" : "linear"},
   };
   supine_error error = {0};
-  const supine_status status =
-      supine_writer_safetensors_write(path, tensors, count, metadata, 4, &error);
+  const supine_status status = supine_writer_safetensors_write(
+      path, tensors, count, metadata, sizeof metadata / sizeof *metadata, &error);
   if (status != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -20,6 +20,7 @@ typedef struct fixture {
   unsigned char *lung; /* [N] */
   double *linear, *quadratic, *cubic;
   const double *resting; /* [9], the caller's; NULL: nothing is known of rest */
+  bool fields;           /* says that its numbers are another simulator's fields */
   size_t normals;        /* Q; 0 but for fixture_add_normals */
   int16_t *normal;       /* [N, 3, Q] */
   double *normal_weight; /* [G, Q, (K + 1)(K + 2) / 2] */

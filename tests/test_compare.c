@@ -16,6 +16,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 enum { LUNGS_MAX = 3 };
 
 static void check_near(double found, double wanted, double tolerance, int line) {
@@ -139,13 +141,13 @@ static void check_rms(bool vector, size_t modes, size_t lungs) {
     for (size_t i = 0; i < m.f->vertices; ++i) {
       square += share[i] * distance[i] * distance[i];
     }
-    const double rms =
-        supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]);
+    const double rms = supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                                          POSED(m.basis, p.weights[1], p.scales[1]));
     assert_near(rms, sqrt(square), 1e-6 * sqrt(square));
-    assert_true(
-        rms == supine_compare_rms(m.compare, p.weights[1], p.scales[1], p.weights[0], p.scales[0]));
-    assert_true(
-        0 == supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[0], p.scales[0]));
+    assert_true(rms == supine_compare_rms(m.compare, POSED(m.basis, p.weights[1], p.scales[1]),
+                                          POSED(m.basis, p.weights[0], p.scales[0])));
+    assert_true(0 == supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                                        POSED(m.basis, p.weights[0], p.scales[0])));
     free(distance);
   }
   free(share);
@@ -170,8 +172,9 @@ static void test_rms_to_rest_equals_scale_zero(void **state) {
   uint64_t random = 5;
   pair p = random_pair(&m, &random);
   p.scales[1][0] = p.scales[1][1] = 0;
-  assert_true(supine_compare_rms(m.compare, p.weights[0], p.scales[0], NULL, NULL) ==
-              supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]));
+  assert_true(supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]), NULL) ==
+              supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                                 POSED(m.basis, p.weights[1], p.scales[1])));
   unmake(&m);
 }
 
@@ -210,15 +213,16 @@ static void test_statistics_random_pairs_equal_sorting(void **state) {
       total += sorted[at++].share;
     }
     supine_distance_statistics found;
-    supine_compare_distances(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1],
-                             distance);
+    supine_compare_distances(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                             POSED(m.basis, p.weights[1], p.scales[1]), distance);
     supine_compare_statistics(m.compare, distance, &found);
     assert_near(found.mean, mean, 1e-6 * mean);
     assert_near(found.rms, sqrt(square), 1e-6 * sqrt(square));
     assert_near(found.p95, sorted[at].distance, 1e-6 * mean);
     assert_near(found.max, sorted[m.f->vertices - 1].distance, 1e-6 * found.max);
     assert_near(found.rms,
-                supine_compare_rms(m.compare, p.weights[0], p.scales[0], p.weights[1], p.scales[1]),
+                supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                                   POSED(m.basis, p.weights[1], p.scales[1])),
                 1e-6 * found.rms);
     free(direct);
   }
@@ -259,7 +263,7 @@ static void test_energy_sums_to_mean_square_over_sphere(void **state) {
       double weights[SUPINE_MODES_MAX];
       const double scales[2] = {1, 1};
       assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
-      const double rms = supine_compare_rms(m.compare, weights, scales, NULL, NULL);
+      const double rms = supine_compare_rms(m.compare, POSED(m.basis, weights, scales), NULL);
       mean += weight / (2.0 * LONGITUDES) * rms * rms;
     }
   }
@@ -267,67 +271,54 @@ static void test_energy_sums_to_mean_square_over_sphere(void **state) {
   unmake(&m);
 }
 
-static void test_scale_each_inflation_reaches_it(void **state) {
+static void test_compare_pose_rms_reaches_it(void **state) {
   (void)state;
   made m = make(401, 6, 3, 2, false, true);
-  const double g[3] = {0.3, -0.5, 0.7};
-  double weights[SUPINE_MODES_MAX];
-  double scale = 0;
-  assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
-  supine_inflation inflation = {SUPINE_INFLATION_RMS, 3.7};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
-                   SUPINE_OK);
-  const double scales[2] = {scale, scale};
-  assert_near(supine_compare_rms(m.compare, weights, scales, NULL, NULL), 3.7, 1e-12);
-  inflation = (supine_inflation){SUPINE_INFLATION_SCALE, 0.37};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
-                   SUPINE_OK);
-  assert_true(scale == 0.37);
-  const double volume = supine_basis_lung_volume(m.basis, 0, weights, 0.11) +
-                        supine_basis_lung_volume(m.basis, 1, weights, 0.11);
-  inflation = (supine_inflation){SUPINE_INFLATION_VOLUME, volume};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
-                   SUPINE_OK);
-  assert_near(scale, 0.11, 1e-9);
+  const supine_state asked = {.gravity = {0.3, -0.5, 0.7}};
+  supine_pose pose;
+  assert_int_equal(supine_compare_pose(m.compare, &asked, 3.7, &pose, NULL), SUPINE_OK);
+  assert_near(supine_compare_rms(m.compare, &pose, NULL), 3.7, 1e-12);
   unmake(&m);
 }
 
 /* Beyond the rest of that direction of gravity: constant and linear terms by hand. */
-static void test_scale_from_rest_reaches_the_posture_s_own(void **state) {
+static void test_compare_pose_volume_counts_from_the_posture_s_rest(void **state) {
   (void)state;
   static const double resting[9] = {-40, 7, -5, 3}; /* of Y_00, Y_1-1, Y_10, Y_11: y, z, x */
   made m = make_resting(401, 6, 3, 2, false, true, resting);
-  const double g[3] = {0.6, -0.48, 0.64};
-  double weights[SUPINE_MODES_MAX];
-  double scale = 0;
-  assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
-  const supine_inflation inflation = {SUPINE_INFLATION_REST, 11};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, g, weights, &scale, NULL),
-                   SUPINE_OK);
+  supine_state asked = {.gravity = {0.6, -0.48, 0.64}, .volume = {SUPINE_VOLUME_REST, 11}};
+  const double *g = asked.gravity;
+  const double *reference = supine_basis_get_info(m.basis)->reference_volume;
+  supine_pose pose;
+  double held[2];
+  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, NULL), SUPINE_OK);
+  supine_basis_volumes(m.basis, &pose, held);
   const double rest =
       0.5 * sqrt(1 / M_PI) * -40 + 0.5 * sqrt(3 / M_PI) * (7 * g[1] + -5 * g[2] + 3 * g[0]);
-  assert_near(supine_basis_lung_volume(m.basis, 0, weights, scale) +
-                  supine_basis_lung_volume(m.basis, 1, weights, scale),
-              rest + 11, 1e-9);
-  const double none[3] = {0, 0, 0};
+  assert_near(held[0] + held[1] - reference[0] - reference[1], rest + 11, 1e-9);
+  memset(asked.gravity, 0, sizeof asked.gravity);
   supine_error error;
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, none, weights, &scale, &error),
-                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, &error), SUPINE_ERROR_ARGUMENT);
   assert_string_equal(error.message, "gravity has no direction");
   unmake(&m);
 }
 
-static void test_scale_open_or_still_is_refused(void **state) {
+static void test_compare_pose_open_or_still_is_refused(void **state) {
   (void)state;
   made m = make(401, 6, 3, 2, false, false);
-  const double still[6] = {0};
-  double scale = 0;
+  supine_state asked = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_ABSOLUTE, 100}};
+  supine_pose pose;
   supine_error error;
-  supine_inflation inflation = {SUPINE_INFLATION_VOLUME, 100};
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, still, &scale, &error),
+  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
-  inflation.kind = SUPINE_INFLATION_RMS;
-  assert_int_equal(supine_compare_scale(m.compare, &inflation, still, still, &scale, &error),
+  unmake(&m);
+  fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
+  memset(f->coefficient, 0, 3 * f->vertices * sizeof *f->coefficient);
+  size_t size = 0;
+  m = (made){.f = f, .bytes = fixture_bytes(f, &size)};
+  assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_pose(m.compare, &asked, 5, &pose, &error),
                    SUPINE_ERROR_NUMERICAL);
   unmake(&m);
 }
@@ -350,42 +341,44 @@ static void test_create_surface_without_area_is_refused(void **state) {
   fixture_destroy(f);
 }
 
-static double rms_of_directions(const made *m, const supine_inflation *inflation, const double a[3],
-                                const double b[3]) {
-  double weights[2][SUPINE_MODES_MAX];
-  double scales[2][LUNGS_MAX];
+static double rms_of_directions(const made *m, const double a[3], const double b[3]) {
+  supine_pose pose[2];
   const double *g[2] = {a, b};
   for (int side = 0; side < 2; ++side) {
-    double scale = 0;
-    assert_int_equal(supine_basis_weights(m->basis, g[side], weights[side]), SUPINE_OK);
-    assert_int_equal(
-        supine_compare_scale(m->compare, inflation, g[side], weights[side], &scale, NULL),
-        SUPINE_OK);
-    scales[side][0] = scales[side][1] = scales[side][2] = scale;
+    const supine_state state = {.gravity = {g[side][0], g[side][1], g[side][2]}};
+    assert_int_equal(supine_compare_pose(m->compare, &state, 0, &pose[side], NULL), SUPINE_OK);
   }
-  return supine_compare_rms(m->compare, weights[0], scales[0], weights[1], scales[1]);
+  return supine_compare_rms(m->compare, &pose[0], &pose[1]);
+}
+
+/* A basis of fields, whose default state is the fields as they are. */
+static made make_fields(size_t vertices, size_t modes, size_t band, size_t lungs) {
+  fixture *f = fixture_create(vertices, modes, band, lungs, false, false, 5, 41);
+  f->fields = true;
+  size_t size = 0;
+  made m = {.f = f, .bytes = fixture_bytes(f, &size)};
+  assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
+  return m;
 }
 
 static void test_search_finds_what_no_random_direction_beats(void **state) {
   (void)state;
-  static const double supine[3] = {0, 1, 0};
-  made m = make(601, 9, 3, 2, false, false);
-  const supine_inflation inflation = {SUPINE_INFLATION_SCALE, 0.8};
+  const supine_state supine = {.gravity = {0, 1, 0}};
+  made m = make_fields(601, 9, 3, 2);
   supine_extremes found;
-  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 1000, &found, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_compare_search(m.compare, &supine, 0, 1000, &found, NULL), SUPINE_OK);
   assert_int_equal(found.directions, 1000);
-  assert_near(found.pair_rms, rms_of_directions(&m, &inflation, found.pair[0], found.pair[1]),
-              1e-9);
-  assert_near(found.farthest_rms, rms_of_directions(&m, &inflation, supine, found.farthest), 1e-9);
+  assert_near(found.pair_rms, rms_of_directions(&m, found.pair[0], found.pair[1]), 1e-9);
+  assert_near(found.farthest_rms, rms_of_directions(&m, supine.gravity, found.farthest), 1e-9);
   uint64_t random = 3;
   for (int repeat = 0; repeat < 20000; ++repeat) {
     double a[3];
     double b[3];
     random_direction(&random, a);
     random_direction(&random, b);
-    assert_true(rms_of_directions(&m, &inflation, a, b) <= found.pair_rms);
-    assert_true(rms_of_directions(&m, &inflation, a, supine) <= found.farthest_rms);
+    assert_true(rms_of_directions(&m, a, b) <= found.pair_rms);
+    assert_true(rms_of_directions(&m, a, supine.gravity) <= found.farthest_rms);
   }
   unmake(&m);
 }
@@ -394,6 +387,7 @@ static void test_search_finds_what_no_random_direction_beats(void **state) {
 static void test_search_one_axis_finds_its_poles(void **state) {
   (void)state;
   fixture *f = fixture_create(203, 1, 1, 1, false, false, 5, 41);
+  f->fields = true;
   memset(f->mode, 0, 4 * sizeof *f->mode);
   f->mode[2] = 1;
   size_t size = 0;
@@ -401,11 +395,9 @@ static void test_search_one_axis_finds_its_poles(void **state) {
   made m = {.f = f, .bytes = bytes};
   assert_int_equal(supine_basis_open_memory(bytes, size, &m.basis, NULL), SUPINE_OK);
   assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
-  const supine_inflation inflation = {SUPINE_INFLATION_SCALE, 1};
-  const double tilted[3] = {0, 3, 1}; /* any length; its pole is the far one, -z */
+  const supine_state tilted = {.gravity = {0, 3, 1}}; /* any length; its pole is the far one, -z */
   supine_extremes found;
-  assert_int_equal(supine_compare_search(m.compare, &inflation, tilted, 500, &found, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_compare_search(m.compare, &tilted, 0, 500, &found, NULL), SUPINE_OK);
   assert_near(fabs(found.pair[0][2]), 1, 1e-10);
   assert_near(found.pair[0][2], -found.pair[1][2], 1e-10);
   assert_near(found.farthest[2], -1, 1e-10);
@@ -415,23 +407,22 @@ static void test_search_one_axis_finds_its_poles(void **state) {
 static void test_search_bad_arguments_are_refused(void **state) {
   (void)state;
   made m = make(203, 4, 2, 1, false, false);
-  supine_inflation inflation = {SUPINE_INFLATION_SCALE, 1};
   supine_extremes found;
   supine_error error;
-  const double supine[3] = {0, 1, 0};
-  const double none[3] = {0, 0, 0};
-  const double nan[3] = {0, NAN, 0};
-  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 1, &found, &error),
+  supine_state from = {.gravity = {0, 1, 0}};
+  assert_int_equal(supine_compare_search(m.compare, &from, 5, 1, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 16385, &found, &error),
+  assert_int_equal(supine_compare_search(m.compare, &from, 5, 16385, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_search(m.compare, &inflation, none, 100, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_search(m.compare, &inflation, nan, 100, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  inflation.kind = SUPINE_INFLATION_VOLUME;
-  assert_int_equal(supine_compare_search(m.compare, &inflation, supine, 100, &found, &error),
+  from.volume = (supine_volume){SUPINE_VOLUME_SCAN, 100};
+  assert_int_equal(supine_compare_search(m.compare, &from, 0, 100, &found, &error),
                    SUPINE_ERROR_OPEN_SURFACE);
+  from.gravity[1] = NAN;
+  assert_int_equal(supine_compare_search(m.compare, &from, 5, 100, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  from.gravity[1] = 0;
+  assert_int_equal(supine_compare_search(m.compare, &from, 5, 100, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
   unmake(&m);
 }
 
@@ -564,14 +555,14 @@ static void test_slabs_of_any_state_sum_to_the_exact_volume(void **state) {
     const double scales[2] = {0.7, 1.2};
     random_direction(&random, g);
     assert_int_equal(supine_basis_weights(m.basis, g, weights), SUPINE_OK);
-    supine_deform(m.basis, weights, scales, xyz);
+    supine_deform(m.basis, POSED(m.basis, weights, scales), xyz);
     assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
     for (size_t lung = 0; lung < 2; ++lung) {
       double gain = 0;
       for (size_t s = 0; s < SLABS; ++s) {
         gain += slabs[lung * SLABS + s].gain;
       }
-      assert_near(gain, supine_basis_lung_volume(m.basis, lung, weights, scales[lung]),
+      assert_near(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
                   1e-3); /* mL: float positions */
     }
   }
@@ -612,9 +603,9 @@ int main(void) {
       cmocka_unit_test(test_rms_to_rest_equals_scale_zero),
       cmocka_unit_test(test_statistics_random_pairs_equal_sorting),
       cmocka_unit_test(test_energy_sums_to_mean_square_over_sphere),
-      cmocka_unit_test(test_scale_each_inflation_reaches_it),
-      cmocka_unit_test(test_scale_from_rest_reaches_the_posture_s_own),
-      cmocka_unit_test(test_scale_open_or_still_is_refused),
+      cmocka_unit_test(test_compare_pose_rms_reaches_it),
+      cmocka_unit_test(test_compare_pose_volume_counts_from_the_posture_s_rest),
+      cmocka_unit_test(test_compare_pose_open_or_still_is_refused),
       cmocka_unit_test(test_create_surface_without_area_is_refused),
       cmocka_unit_test(test_search_finds_what_no_random_direction_beats),
       cmocka_unit_test(test_search_one_axis_finds_its_poles),

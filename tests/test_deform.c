@@ -15,6 +15,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 /* A made basis in memory, and one opened basis of it. */
 typedef struct opened {
   fixture *f;
@@ -91,11 +93,12 @@ static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool ve
       double scales[SUPINE_LUNGS_MAX];
       random_frame(basis, &random, weights, scales);
       fixture_deform(o.f, weights, scales, exact);
-      supine_deform(basis, weights, scales, xyz);
+      supine_deform(basis, POSED(basis, weights, scales), xyz);
       const double error = farthest(xyz, exact, 0, vertices);
-      if (!(error <= supine_basis_error(basis, weights, scales))) {
+      if (!(error <= supine_basis_error(basis, POSED(basis, weights, scales)))) {
         fail_msg("N %zu K %zu lungs %zu storage %d code %d: %g mm, stated %g", vertices, modes,
-                 lungs, storage, simd, error, supine_basis_error(basis, weights, scales));
+                 lungs, storage, simd, error,
+                 supine_basis_error(basis, POSED(basis, weights, scales)));
       }
       supine_basis_close(basis);
     }
@@ -144,9 +147,9 @@ static void test_basis_error_bound_near_what_happens(void **state) {
       double scales[SUPINE_LUNGS_MAX];
       random_frame(basis, &random, weights, scales);
       fixture_deform(o.f, weights, scales, exact);
-      supine_deform(basis, weights, scales, xyz);
+      supine_deform(basis, POSED(basis, weights, scales), xyz);
       const double ratio =
-          farthest(xyz, exact, 0, 3000) / supine_basis_error(basis, weights, scales);
+          farthest(xyz, exact, 0, 3000) / supine_basis_error(basis, POSED(basis, weights, scales));
       assert_true(ratio <= 1);
       best = ratio > best ? ratio : best;
     }
@@ -280,7 +283,7 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
   double weights[SUPINE_MODES_MAX];
   double scales[SUPINE_LUNGS_MAX];
   random_frame(basis, &random, weights, scales);
-  supine_deform(basis, weights, scales, whole);
+  supine_deform(basis, POSED(basis, weights, scales), whole);
   for (int trial = 0; trial < trials; ++trial) {
     const double a = (fixture_random(&random) + 1) / 2;
     const double b = (fixture_random(&random) + 1) / 2;
@@ -298,7 +301,7 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
     for (size_t i = 0; i < 3 * (count + 64); ++i) {
       split[i] = mark;
     }
-    supine_deform_range(basis, weights, scales, begin, end, part + shift);
+    supine_deform_range(basis, POSED(basis, weights, scales), begin, end, part + shift);
     assert_memory_equal(part + shift, whole + 3 * begin, 3 * count * sizeof *part);
     for (size_t i = 0; i < 64; ++i) {
       assert_true((i < shift ? part[i] : part[i + 3 * count]) == mark);
@@ -306,7 +309,7 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
     float *x = split + shift;
     float *y = x + count + 21;
     float *z = y + count + 22;
-    supine_deform_separate(basis, weights, scales, begin, end, x, y, z);
+    supine_deform_separate(basis, POSED(basis, weights, scales), begin, end, x, y, z);
     for (size_t i = 0; i < count; ++i) {
       const float *p = whole + 3 * (begin + i);
       assert_true(x[i] == p[0] && y[i] == p[1] && z[i] == p[2]);
@@ -316,7 +319,7 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
     }
     assert_true((shift == 0 || x[-1] == mark) && z[count] == mark);
   }
-  supine_deform_range(basis, weights, scales, 5, 5, NULL); /* nothing to do */
+  supine_deform_range(basis, POSED(basis, weights, scales), 5, 5, NULL); /* nothing to do */
   free(whole);
   free(part);
   free(split);
@@ -354,11 +357,12 @@ static void test_displace_range_rest_added_is_deform(void **state) {
       float moved[3 * 86];
       random_frame(basis, &random, weights, scales);
       fixture_deform(o.f, weights, scales, exact);
-      supine_displace_range(basis, weights, scales, 3, 89, moved);
+      supine_displace_range(basis, POSED(basis, weights, scales), 3, 89, moved);
       for (size_t i = 0; i < (size_t)3 * 86; ++i) {
         moved[i] += o.f->vertex[9 + i];
       }
-      assert_true(farthest(moved, exact, 3, 89) <= supine_basis_error(basis, weights, scales));
+      assert_true(farthest(moved, exact, 3, 89) <=
+                  supine_basis_error(basis, POSED(basis, weights, scales)));
       supine_basis_close(basis);
     }
     drop(&o);
@@ -379,14 +383,15 @@ static void test_step_many_steps_reach_the_volume(void **state) {
   enum { STEPS = 60 };
   const double small[2] = {scales[0] / STEPS, scales[1] / STEPS};
   const double none[2] = {0, 0};
-  supine_displace_range(basis, weights, small, 0, 100, step);
-  supine_deform(basis, weights, none, xyz);
+  supine_displace_range(basis, POSED(basis, weights, small), 0, 100, step);
+  supine_deform(basis, POSED(basis, weights, none), xyz);
   for (int i = 0; i < STEPS; ++i) {
     supine_step(100, step, xyz);
   }
   fixture_deform(o.f, weights, scales, exact);
   const double drift = STEPS * 0x1p-24 * 512 * 1.8; /* half a unit a step, three axes */
-  assert_true(farthest(xyz, exact, 0, 100) <= supine_basis_error(basis, weights, scales) + drift);
+  assert_true(farthest(xyz, exact, 0, 100) <=
+              supine_basis_error(basis, POSED(basis, weights, scales)) + drift);
   supine_basis_close(basis);
   drop(&o);
 }
@@ -411,11 +416,13 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
       for (size_t i = 0; i < 3 * count * (end - begin); ++i) {
         xyz[i] = 1e30F; /* nowhere, where nothing is written */
       }
-      supine_deform_batch(basis, count, weights, scales, begin, end, xyz);
+      supine_deform_batch(basis, count, posed_batch(basis, count, weights, scales), begin, end,
+                          xyz);
       for (size_t j = 0; j < count; ++j) {
         fixture_deform(o.f, weights + j * modes, scales + 2 * j, exact);
         const double error = farthest(xyz + 3 * j * (end - begin), exact, begin, end);
-        if (!(error <= supine_basis_error(basis, weights + j * modes, scales + 2 * j))) {
+        if (!(error <=
+              supine_basis_error(basis, POSED(basis, weights + j * modes, scales + 2 * j)))) {
           fail_msg("orientation %zu storage %d code %d: %g mm", j, storage, simd, error);
         }
       }
@@ -450,16 +457,20 @@ static void test_gl_pack_slots_without_a_mode_are_zero(void **state) {
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
   float attributes[VERTICES * FLOATS];
-  float uniforms[2 * SLOTS];
+  float uniforms[SLOTS];
+  float gains[6];
   const double weights[MODES] = {0.3, -0.7, 1.9, 0.4, -2.2};
   const double scales[2] = {2.0, -0.5};
   memset(attributes, 0x77, sizeof attributes);
   memset(uniforms, 0x77, sizeof uniforms);
   assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_OK);
-  assert_int_equal(supine_gl_weights(basis, weights, scales, uniforms), SUPINE_OK);
-  for (size_t k = 0; k < 2 * SLOTS; ++k) {
-    const size_t mode = k % SLOTS;
-    assert_true(uniforms[k] == (mode < MODES ? (float)(scales[k / SLOTS] * weights[mode]) : 0.0F));
+  assert_int_equal(supine_gl_weights(basis, POSED(basis, weights, scales), uniforms, gains),
+                   SUPINE_OK);
+  for (size_t k = 0; k < SLOTS; ++k) {
+    assert_true(uniforms[k] == (k < MODES ? (float)weights[k] : 0.0F));
+  }
+  for (size_t k = 0; k < 6; ++k) {
+    assert_true(gains[k] == (float)scales[k / 3]);
   }
   for (size_t i = 0; i < VERTICES; ++i) {
     assert_true(attributes[FLOATS * i + 3] == (float)o.f->lung[i]);

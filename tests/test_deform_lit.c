@@ -14,6 +14,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 enum { VERTICES = 211, MODES = 5, BATCH = 3 };
 
 /* A sum of up to 66 products, and a root, round to less than this. */
@@ -114,8 +116,9 @@ static void check_formula(size_t normals, supine_simd simd) {
     float plain[3 * VERTICES];
     double v[2 * SUPINE_NORMAL_MODES_MAX];
     assert_int_equal(supine_basis_get_info(o.basis)->normal_count, normals);
-    assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, xyz, lit), SUPINE_OK);
-    supine_deform(o.basis, o.weights, o.scales, plain);
+    assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), xyz, lit),
+                     SUPINE_OK);
+    supine_deform(o.basis, POSED(o.basis, o.weights, o.scales), plain);
     assert_memory_equal(xyz, plain, sizeof xyz);
     for (size_t i = 0; i < VERTICES; ++i) {
       double n[3];
@@ -124,7 +127,7 @@ static void check_formula(size_t normals, supine_simd simd) {
         assert_true(fabs((double)lit[3 * i + axis] - n[axis]) <= near);
       }
     }
-    supine_basis_normal_weights(o.basis, o.weights, o.scales, v);
+    supine_basis_normal_weights(o.basis, POSED(o.basis, o.weights, o.scales), v);
     for (size_t lung = 0; lung < 2; ++lung) {
       double want[SUPINE_NORMAL_MODES_MAX];
       expected_weights(o.f, lung, o.weights, o.scales[lung], want);
@@ -152,13 +155,14 @@ static void test_lit_ranges_are_parts_of_the_whole(void **state) {
     opened o = open_lit(8, (supine_simd)simd);
     float whole[3 * VERTICES];
     for (size_t begin = 0; o.basis != NULL && begin < VERTICES; begin += 13) {
-      assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, NULL, whole), SUPINE_OK);
+      assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), NULL, whole),
+                       SUPINE_OK);
       for (size_t end = begin; end <= VERTICES; end += 11) {
         float part[3 * VERTICES + 1];
         part[3 * (end - begin)] = 12345;
-        assert_int_equal(
-            supine_deform_lit_range(o.basis, o.weights, o.scales, begin, end, NULL, part),
-            SUPINE_OK);
+        assert_int_equal(supine_deform_lit_range(o.basis, POSED(o.basis, o.weights, o.scales),
+                                                 begin, end, NULL, part),
+                         SUPINE_OK);
         assert_memory_equal(part, whole + 3 * begin, 3 * (end - begin) * sizeof *part);
         assert_true(part[3 * (end - begin)] == 12345); /* nothing beyond */
       }
@@ -175,15 +179,18 @@ static void test_lit_batch_is_one_after_the_other(void **state) {
   float *lit = fixture_allocate(3 * BATCH * COUNT, sizeof *lit);
   float *positions = fixture_allocate(3 * BATCH * COUNT, sizeof *positions);
   float one[3 * COUNT];
-  assert_int_equal(
-      supine_deform_lit_batch(o.basis, BATCH, o.weights, o.scales, BEGIN, END, xyz, lit),
-      SUPINE_OK);
-  supine_deform_batch(o.basis, BATCH, o.weights, o.scales, BEGIN, END, positions);
+  assert_int_equal(supine_deform_lit_batch(o.basis, BATCH,
+                                           posed_batch(o.basis, BATCH, o.weights, o.scales), BEGIN,
+                                           END, xyz, lit),
+                   SUPINE_OK);
+  supine_deform_batch(o.basis, BATCH, posed_batch(o.basis, BATCH, o.weights, o.scales), BEGIN, END,
+                      positions);
   assert_memory_equal(xyz, positions, 3 * BATCH * COUNT * sizeof *xyz);
   for (size_t j = 0; j < BATCH; ++j) {
-    assert_int_equal(supine_deform_lit_range(o.basis, o.weights + j * MODES, o.scales + 2 * j,
-                                             BEGIN, END, NULL, one),
-                     SUPINE_OK);
+    assert_int_equal(
+        supine_deform_lit_range(o.basis, POSED(o.basis, o.weights + j * MODES, o.scales + 2 * j),
+                                BEGIN, END, NULL, one),
+        SUPINE_OK);
     assert_memory_equal(lit + 3 * j * COUNT, one, sizeof one);
   }
   free(xyz);
@@ -196,9 +203,10 @@ static void test_lit_without_normals_refused(void **state) {
   (void)state;
   float xyz[3 * VERTICES];
   opened o = open_lit(0, SUPINE_SIMD_AUTO);
-  assert_int_equal(supine_deform_lit(o.basis, o.weights, o.scales, xyz, xyz),
+  assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
-  assert_int_equal(supine_deform_lit_batch(o.basis, 1, o.weights, o.scales, 0, VERTICES, xyz, xyz),
+  assert_int_equal(supine_deform_lit_batch(o.basis, 1, posed_batch(o.basis, 1, o.weights, o.scales),
+                                           0, VERTICES, xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   drop(&o);
   o = open_lit(8, SUPINE_SIMD_AUTO);
@@ -208,7 +216,7 @@ static void test_lit_without_normals_refused(void **state) {
   supine_basis_options options = {sizeof options, .without_normals = true};
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
   assert_int_equal(supine_basis_get_info(basis)->normal_count, 0);
-  assert_int_equal(supine_deform_lit(basis, o.weights, o.scales, xyz, xyz),
+  assert_int_equal(supine_deform_lit(basis, POSED(basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   supine_basis_close(basis);
   /* A program from before that option: what lies beyond its options is not read. */

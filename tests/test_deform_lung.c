@@ -17,6 +17,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 enum { BAND = 3, MODES = 16, DIRECTIONS = 2000 };
 
 /* Vertices and triangles of an OBJ file into a fixture that has room; false where there is none. */
@@ -175,8 +177,8 @@ static void test_deform_real_lung_every_path_within_stated_error(void **state) {
         if (basis == NULL) {
           continue;
         }
-        const double stated = supine_basis_error(basis, weights, &scale);
-        supine_deform(basis, weights, &scale, xyz);
+        const double stated = supine_basis_error(basis, POSED(basis, weights, &scale));
+        supine_deform(basis, POSED(basis, weights, &scale), xyz);
         double top = 0;
         for (size_t i = 0; i < f->vertices; ++i) {
           const double x = (double)xyz[3 * i] - exact[3 * i];

@@ -55,7 +55,7 @@ static void test_export_usage_errors_are_1(void **state) {
   EXPECT(1, "must end in .html or .glb", basis, "-o", ".glb");
   EXPECT(1, "did you mean clamp-safe", basis, "-o", glb, "--profile", "clampsafe");
   EXPECT(1, "raw, 8 or clamp-safe", basis, "-o", glb, "--profile", "wonderful");
-  EXPECT(1, "above 0", basis, "-o", glb, "--volume", "-3");
+  EXPECT(1, "above 0", basis, "-o", glb, "--breath", "-3");
   EXPECT(1, "above 0", basis, "-o", glb, "--scale", "x");
   EXPECT(1, "are for .glb", basis, "-o", page, "--animate");
   EXPECT(1, "is for .html", basis, "-o", glb, "--title", "x");
@@ -76,7 +76,7 @@ static void test_export_output_errors_are_4(void **state) {
 static void test_export_numerical_errors_are_5(void **state) {
   (void)state;
   EXPECT(5, "nothing moves", still, "-o", glb);
-  EXPECT(5, "mL", basis, "-o", glb, "--profile", "clamp-safe", "--volume", "1e12");
+  EXPECT(5, "mL", basis, "-o", glb, "--profile", "clamp-safe", "--breath", "1e12");
 }
 
 int main(void) {

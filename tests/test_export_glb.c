@@ -19,6 +19,8 @@
 #include "program/export/targets.h"
 #include "sh/base/vec3.h"
 
+#include "tests/poses.h"
+
 enum { MODES = 11, BAND = 4, VERTICES = 40 };
 
 static char *folder;
@@ -124,10 +126,10 @@ static void check_positions(const char *path, double depth, double tolerance) {
   double scales[2] = {depth, depth};
   assert_int_equal(supine_basis_weights(source.basis, gravity, weights), SUPINE_OK);
   if (source.info->has_volume) {
-    assert_int_equal(supine_basis_scale(source.basis, weights, depth, &scales[0], NULL), SUPINE_OK);
+    assert_int_equal(posed_scale(source.basis, weights, depth, &scales[0], NULL), SUPINE_OK);
     scales[1] = scales[0];
   }
-  supine_deform(source.basis, weights, scales, xyz);
+  supine_deform(source.basis, POSED(source.basis, weights, scales), xyz);
   assert_int_equal(supine_sh_evaluate(BAND, gravity, y), SUPINE_OK);
   const json_t *modes =
       json_object_get(json_object_get(json_object_get(mesh, "extras"), "supine"), "modes");

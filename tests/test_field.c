@@ -8,6 +8,8 @@
 #include "program/field/field.h"
 #include "sh/base/vec3.h"
 
+#include "tests/poses.h"
+
 static char folder[] = "/tmp/supine-field-XXXXXX";
 static supine_basis *surface;
 static supine_basis *grid;
@@ -67,7 +69,7 @@ static int teardown(void **state) {
 static supine_field made_field(void) {
   supine_field field;
   supine_error error;
-  if (supine_field_create(grid, weights, scales, 60.0, &field, &error) != SUPINE_OK) {
+  if (supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return field;
@@ -94,7 +96,7 @@ static void test_field_nodes_cells_and_border(void **state) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
   float *moved = malloc(3 * info->vertex_count * sizeof *moved);
-  supine_displace_range(grid, weights, scales, 0, info->vertex_count, moved);
+  supine_displace_range(grid, POSED(grid, weights, scales), 0, info->vertex_count, moved);
   for (size_t i = 0; i < info->vertex_count; i += 97) {
     double p[3];
     double u[3];
@@ -146,8 +148,7 @@ static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
   if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  const double own[2] = {below.scan_scale, below.scan_scale};
-  assert_int_equal(supine_field_create(grid, below.scan_weights, own, 60.0, &field, &error),
+  assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error),
                    SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
   for (size_t i = 0; i < 3 * count; ++i) { /* rounding of float32 positions */
@@ -155,7 +156,7 @@ static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
   }
   supine_field_free(&field);
   /* a node inside, as a point */
-  assert_int_equal(supine_field_create(grid, weights, scales, 60.0, &field, &error), SUPINE_OK);
+  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error), SUPINE_OK);
   size_t node = count / 2;
   while (!field.inside[node]) {
     ++node;
@@ -177,7 +178,7 @@ static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
       SUPINE_OK);
   supine_basis *point = helper_open(in_folder("point"));
   float xyz[3];
-  supine_deform(point, weights, scales, xyz);
+  supine_deform(point, POSED(point, weights, scales), xyz);
   for (size_t k = 0; k < 3; ++k) {
     assert_close((double)xyz[k] - place[k],
                  (double)((const float *)field.nodes.values)[3 * node + k], 1e-4);
@@ -315,7 +316,7 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   assert_int_equal(report.in_lung[0], LANDMARKS);
   supine_basis *inside = helper_open(in_folder("points"));
   float xyz[3 * LANDMARKS];
-  supine_deform(inside, weights, scales, xyz);
+  supine_deform(inside, POSED(inside, weights, scales), xyz);
   for (int i = 0; i < 3 * LANDMARKS; ++i) {
     out[i / 3][i % 3] = kept[i / 3][i % 3] = (double)xyz[i];
   }
@@ -419,7 +420,7 @@ static void test_field_of_no_grid_refused(void **state) {
   (void)state;
   supine_field field;
   supine_error error;
-  assert_int_equal(supine_field_create(surface, weights, scales, 60.0, &field, &error),
+  assert_int_equal(supine_field_create(surface, POSED(surface, weights, scales), 60.0, &field, &error),
                    SUPINE_ERROR_FORMAT);
   assert_non_null(strstr(error.message, "supine embed"));
 }
@@ -456,7 +457,7 @@ static void test_field_malformed_grids_refused(void **state) {
     supine_basis *bad = helper_open(in_folder("lie"));
     supine_field field;
     supine_error error;
-    assert_int_equal(supine_field_create(bad, weights, scales, 60.0, &field, &error),
+    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), 60.0, &field, &error),
                      SUPINE_ERROR_FORMAT);
     assert_non_null(strstr(error.message, "malformed"));
     supine_basis_close(bad);

@@ -24,6 +24,8 @@
 
 #include "lungs_helpers.h"
 
+#include "tests/poses.h"
+
 static char folder[] = "/tmp/supine-fields-XXXXXX";
 static supine_lungs lungs;
 
@@ -222,7 +224,7 @@ static void check_stated_error(const supine_lungs *of, bool scalar, const char *
     double weights[SUPINE_MODES_MAX];
     const double scales[2] = {1.0, 1.0};
     assert_int_equal(supine_basis_weights(basis, others.directions + 3 * d, weights), SUPINE_OK);
-    supine_deform(basis, weights, scales, xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
     for (size_t i = 0; i < 3 * n; ++i) {
       const double should = others.displacement[3 * n * d + i];
       const double is = (double)xyz[i] - (double)(float)of->mesh.vertices[i];
@@ -346,9 +348,9 @@ static void test_fit_vector_volumes_exact(void **state) {
     double scales[2];
     random_direction(&seed, g);
     assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
-    assert_int_equal(supine_basis_scale(basis, weights, 200.0, scales, NULL), SUPINE_OK);
+    assert_int_equal(posed_scale(basis, weights, 200.0, scales, NULL), SUPINE_OK);
     scales[1] = scales[0];
-    supine_deform(basis, weights, scales, xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
     for (size_t i = 0; i < 3 * n; ++i) {
       moved[i] = (double)xyz[i];
     }

@@ -21,6 +21,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
 
 /* Functions common to both APIs, from the context's own library. */
@@ -185,7 +187,8 @@ typedef struct model {
   size_t modes;
   float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] */
   uint32_t *words;   /* [VERTICES, WORDS, 3] */
-  float weights[LUNGS * SUPINE_GL_MODES];
+  float weights[SUPINE_GL_MODES];
+  float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];
 } model;
 
@@ -231,7 +234,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
   gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
   gl->UseProgram(program);
-  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), LUNGS * vectors, m->weights);
+  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), vectors, m->weights);
+  gl->Uniform3fv(gl->GetUniformLocation(program, "supine_gains"), LUNGS, m->gains);
   gl->Uniform3fv(gl->GetUniformLocation(program, "supine_normal_weights"), LUNGS * WORDS,
                  m->normal_weights);
   gl->Enable(GL_RASTERIZER_DISCARD);
@@ -269,13 +273,16 @@ static void check_modes(const gl_api *gl, const char *version, const char *libra
   const double scales[LUNGS] = {1.7, -0.9};
   double weights[SUPINE_GL_MODES];
   assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-  assert_int_equal(supine_gl_weights(basis, weights, scales, m.weights), SUPINE_OK);
-  assert_int_equal(supine_gl_normal_weights(basis, weights, scales, m.normal_weights), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, POSED(basis, weights, scales), m.weights, m.gains),
+                   SUPINE_OK);
+  assert_int_equal(supine_gl_normal_weights(basis, POSED(basis, weights, scales), m.normal_weights),
+                   SUPINE_OK);
   run_shader(gl, program, &m, gpu);
-  assert_int_equal(supine_deform_lit(basis, weights, scales, cpu, cpu + 3 * VERTICES), SUPINE_OK);
+  assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), cpu, cpu + 3 * VERTICES),
+                   SUPINE_OK);
   double moved = 0;
   /* Both round as supine_basis_error says, so they differ by at most twice that. */
-  const double bound = 2 * supine_basis_error(basis, weights, scales);
+  const double bound = 2 * supine_basis_error(basis, POSED(basis, weights, scales));
   assert_true(bound < 1e-3);
   for (size_t i = 0; i < VERTICES; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {

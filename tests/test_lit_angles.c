@@ -19,6 +19,8 @@
 
 #include "lungs_helpers.h"
 
+#include "tests/poses.h"
+
 enum { STATES = 192 };
 
 /* Promised, degrees. */
@@ -77,15 +79,14 @@ static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, flo
   supine_error error = {0};
   random_direction(seed, gravity);
   assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_resting_volume(basis, gravity, &rest), SUPINE_OK);
+  assert_int_equal(posed_rest(basis, gravity, &rest), SUPINE_OK);
   assert_true(rest < 0.0);
-  assert_int_equal(
-      supine_basis_scale(basis, weights, rest * helper_random(seed), &scales[0], &error),
-      SUPINE_OK);
+  assert_int_equal(posed_scale(basis, weights, rest * helper_random(seed), &scales[0], &error),
+                   SUPINE_OK);
   for (size_t lung = 1; lung < info->lung_count; ++lung) {
     scales[lung] = scales[0];
   }
-  assert_int_equal(supine_deform_lit(basis, weights, scales, xyz, lit), SUPINE_OK);
+  assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), xyz, lit), SUPINE_OK);
   supine_normals(basis, xyz, exact);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     double square = 0.0;

@@ -35,7 +35,7 @@ near "$(number rms_mm valid.json)" 0 0.1 || fail "surfaces $(number rms_mm valid
 near "$(number explained_percent valid.json)" 100 0.1 || fail "not explained"
 awk -v a="$(number rms_mm valid.json)" -v b="$(number rms_mm valid.json 5)" \
   'BEGIN { exit !(a < b / 3) }' || fail "no better than an affine map"
-"$supine" deform surface.safetensors --posture left --volume 300 -o left.ply >/dev/null ||
+"$supine" deform surface.safetensors --posture left --volume scan+300 -o left.ply >/dev/null ||
   fail "no other posture"
 
 # A stiff part comes back, goes into the basis, and the basis lies on the state.
@@ -114,9 +114,9 @@ near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
 # Other postures tell the gain: by surfaces, by landmarks, or both; one posture does not.
 "$supine" precompute rest.ply --scanned none --law deep --constants 5,2.2,9,1.1,20,1.4 --base 0.9 \
   --gain 0.4 --box-force 0,-0.2,0 --band 15 -o known.safetensors >/dev/null || fail "a known law"
-"$supine" deform known.safetensors --posture supine --volume 900 -o wide.ply >/dev/null || fail deform
-"$supine" deform known.safetensors --posture prone --volume 600 -o down.ply >/dev/null || fail deform
-"$supine" deform known.safetensors --posture supine --volume 500 -o half.ply >/dev/null || fail deform
+"$supine" deform known.safetensors --posture supine --volume scan+900 -o wide.ply >/dev/null || fail deform
+"$supine" deform known.safetensors --posture prone --volume scan+600 -o down.ply >/dev/null || fail deform
+"$supine" deform known.safetensors --posture supine --volume scan+500 -o half.ply >/dev/null || fail deform
 "$supine" fit rest.ply --state supine:wide.ply --state prone:+600:down.ply -o two.json --json \
   >fit.json || fail "fit two states"
 near "$(number gain fit.json)" 0.4 0.03 || fail "gain $(number gain fit.json)"

@@ -23,6 +23,8 @@
 #include "full_operator.h"
 #include "lungs_helpers.h"
 
+#include "tests/poses.h"
+
 static char folder[] = "/tmp/supine-precompute-XXXXXX";
 static char path[64];
 
@@ -207,17 +209,17 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
     assert_int_equal(supine_physics_solve(lungs, model, g, &solution, NULL), SUPINE_OK);
     assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
     supine_physics_solution_apply(&solution, &lungs->mesh, 1.0, should);
-    supine_deform(basis, weights, scales, is);
+    supine_deform(basis, POSED(basis, weights, scales), is);
     error2[d] = field2[d] = error_mm2[d] = 0.0;
     for (size_t i = 0; i < 3 * n; ++i) {
       error2[d] += pow((double)is[i] - should[i], 2.0) / (double)n;
       field2[d] += pow(should[i] - lungs->mesh.vertices[i], 2.0) / (double)n;
     }
     assert_int_equal(supine_volume_scale(solution.cubic, volume, &scale, NULL), SUPINE_OK);
-    assert_int_equal(supine_basis_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
+    assert_int_equal(posed_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
     scales[1] = scales[0];
     supine_physics_solution_apply(&solution, &lungs->mesh, scale, should);
-    supine_deform(basis, weights, scales, is);
+    supine_deform(basis, POSED(basis, weights, scales), is);
     for (size_t i = 0; i < 3 * n; ++i) {
       error_mm2[d] += pow((double)is[i] - should[i], 2.0) / (double)n;
     }
@@ -244,7 +246,7 @@ static double error_of_first(size_t kept, const supine_lungs *lungs, const supin
     assert_int_equal(supine_basis_weights(basis, directions + 3 * d, weights), SUPINE_OK);
     memset(weights + kept, 0, (SUPINE_MODES_MAX - kept) * sizeof *weights);
     supine_physics_solution_apply(&solution, &lungs->mesh, 1.0, should);
-    supine_deform(basis, weights, scales, is);
+    supine_deform(basis, POSED(basis, weights, scales), is);
     for (size_t i = 0; i < 3 * n; ++i) {
       error2 += pow((double)is[i] - should[i], 2.0);
       field2 += pow(should[i] - lungs->mesh.vertices[i], 2.0);
@@ -414,7 +416,7 @@ static double measured_volume(const supine_basis *basis, const double *weights,
   memcpy(triangles, supine_basis_triangles(basis), 3 * mesh.triangle_count * sizeof *triangles);
   mesh.vertices = vertices;
   mesh.triangles = triangles;
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
   double volume = 0.0;
   for (int rest = 0; rest < 2; ++rest) {
     const float *from = rest ? supine_basis_vertices(basis) : xyz;
@@ -449,7 +451,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
     assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
     for (int out = 0; out < 2; ++out) {
       const double volume = out ? least : 500.0;
-      assert_int_equal(supine_basis_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
+      assert_int_equal(posed_scale(basis, weights, volume, scales, NULL), SUPINE_OK);
       scales[1] = scales[0];
       worst = fmax(worst, fabs(measured_volume(basis, weights, scales) - volume));
     }
@@ -499,8 +501,7 @@ static void test_precompute_open_surface_has_no_volume(void **state) {
   const double g[3] = {0.0, 1.0, 0.0};
   assert_false(supine_basis_get_info(basis)->has_volume);
   assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_scale(basis, weights, 10.0, &scale, NULL),
-                   SUPINE_ERROR_OPEN_SURFACE);
+  assert_int_equal(posed_scale(basis, weights, 10.0, &scale, NULL), SUPINE_ERROR_OPEN_SURFACE);
   supine_basis_close(basis);
   supine_lungs_free(&lungs);
   supine_mesh_free(&lump);
@@ -532,11 +533,11 @@ static double turned_over_at_run_time(double volume) {
     double scale;
     gravity[g % 3] = g < 3 ? 1.0 : -1.0;
     assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-    if (supine_basis_scale(basis, weights, volume, &scale, NULL) != SUPINE_OK) {
+    if (posed_scale(basis, weights, volume, &scale, NULL) != SUPINE_OK) {
       continue;
     }
     const double scales[SUPINE_LUNGS_MAX] = {scale, scale};
-    supine_deform(basis, weights, scales, xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
     size_t turned = 0;
     for (size_t t = 0; t < info->triangle_count; ++t) {
       double before[3];

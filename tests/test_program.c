@@ -136,10 +136,10 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
                                      "--posture upright --tilt -90"};
   static char first[1 << 20];
   static char other[1 << 20];
-  EXPECT(0, "-3180.00 mL from full inflation", "deform lungs.safetensors %s -o way.stl", ways[0]);
+  EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl", ways[0]);
   const size_t length = read_file("way.stl", first, sizeof first);
   for (size_t i = 1; i < sizeof ways / sizeof *ways; ++i) {
-    EXPECT(0, "-3180.00 mL from full inflation", "deform lungs.safetensors %s -o way.stl", ways[i]);
+    EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl", ways[i]);
     assert_int_equal(read_file("way.stl", other, sizeof other), length);
     size_t differing = 0;
     for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
@@ -157,20 +157,22 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
 
 static void test_deform_volumes_and_scale_as_asked(void **state) {
   (void)state;
-  EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume -300 -o a.ply");
+  EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
   EXPECT(0, "+350.00 mL",
-         "deform lungs.safetensors --posture left --volume left=100,right=250 -o a.vtp");
+         "deform lungs.safetensors --posture left --volume left=scan+100,right=scan+250 -o a.vtp");
   EXPECT(0, "displacement 7.000 mm", "deform lungs.safetensors --posture HFS --scale 7 -o a.obj");
   EXPECT(0, "displacement 7.000 mm", "solve lungs.ply --posture HFS --scale 7 -o a.obj");
-  EXPECT(0, "+120.00 mL", "solve lungs.ply --tilt 15 --volume 120 -o a.obj");
-  EXPECT(1, "left,right", "deform lungs.safetensors --posture left --volume middle=3 -o b.ply");
-  EXPECT(1, "not both", "deform lungs.safetensors --posture left --volume 3 --scale 4 -o b.ply");
+  EXPECT(0, "+120.00 mL", "solve lungs.ply --tilt 15 --volume scan+120 -o a.obj");
+  EXPECT(1, "has left and right",
+         "deform lungs.safetensors --posture left --volume middle=rest,right=rest -o b.ply");
+  EXPECT(1, "rest+500", "deform lungs.safetensors --posture left --volume 500 -o b.ply");
+  EXPECT(1, "not both", "deform lungs.safetensors --posture left --volume scan+3 --scale 4 -o b.ply");
   EXPECT(5, "lungs hold 10 to 120 %",
-         "deform lungs.safetensors --posture left --volume -5700 -o b.ply");
+         "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "lungs hold 10 to 120 %",
          "deform lungs.safetensors --posture left --volume full+1300 -o b.ply");
-  EXPECT(1, "every lung", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
-  EXPECT(1, "takes rest, full",
+  EXPECT(1, "name them all", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
+  EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL): lungs hold 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
@@ -185,7 +187,7 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(0, "7820 mL are 130 % of",
          "compare lungs.safetensors --postures left --breath 5000 --allow-folds");
   EXPECT(0, "lungs hold 10 to 120 %",
-         "deform lungs.safetensors --posture left --volume -5500 --allow-folds -o a.ply");
+         "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
 /* Volumes as people mean them, of made lungs of 6000 mL: shares of reference.h. */
@@ -196,7 +198,7 @@ static void test_deform_rest_and_full_by_posture(void **state) {
   EXPECT(0, "-2820.00 mL", "deform lungs.safetensors --posture upright -o a.ply");
   EXPECT(0, "-2680.00 mL", "deform lungs.safetensors --posture prone --volume rest+500 -o a.ply");
   EXPECT(0, "-3380.00 mL", "deform lungs.safetensors --posture right --volume rest-200 -o a.ply");
-  EXPECT(0, "displacement 0.000 mm, +0.00 mL",
+  EXPECT(0, "displacement 0.000 mm from the scan, 6000.00 mL (+0.00 mL)",
          "deform lungs.safetensors --posture right --volume full -o a.ply");
   EXPECT(0, "-2880.00 mL",
          "deform lungs.safetensors --posture left --volume left=rest,right=rest+300 -o a.ply");
@@ -239,18 +241,18 @@ static double positions_apart(const char *first, const char *second) {
 /* A scan's own state and frame come back. */
 static void test_scanned_state_and_frame_come_back(void **state) {
   (void)state;
-  EXPECT(0, "-2000.00 mL", "deform lungs.safetensors --posture supine --volume -2000 -o low.ply");
+  EXPECT(0, "-2000.00 mL", "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "2000 mL below full (6000 mL)",
          "precompute low.ply --scanned supine:-2000 --band 7 -o low.safetensors");
   EXPECT(0, "scan 2000 mL below full", "info low.safetensors");
-  EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume 0 -o low.obj");
+  EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
   EXPECT(0, "assumed: RAS axes (as told), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
-  EXPECT(0, "ras.ply", "deform ras.safetensors --posture prone --volume 0 --as-scanned -o ras.ply");
+  EXPECT(0, "ras.ply", "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
   /* That put the left lung first; from here on the order stays. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
-         "deform ras.safetensors --posture left --volume 0 --as-scanned -o again.ply");
+         "deform ras.safetensors --posture left --volume scan --as-scanned -o again.ply");
   assert_true(positions_apart("ras.ply", "again.ply") < 2e-5); /* float32's rounding of 200 mm */
   EXPECT(0, "mm",
          "solve ras.ply --units cm --posture left --volume full --as-scanned -o solved.ply");
@@ -353,9 +355,9 @@ static void test_mesh_open_surface_explains_volume(void **state) {
   (void)state;
   write_text("open.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT(0, "not closed", "precompute open.obj -o open.safetensors --band 2");
-  EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume 5 -o g.ply");
+  EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume scan+5 -o g.ply");
   EXPECT(2, "--scale", "deform open.safetensors --posture prone -o g.ply");
-  EXPECT(2, "close it", "solve open.obj --posture prone --volume 5 -o g.ply");
+  EXPECT(2, "close it", "solve open.obj --posture prone --volume scan+5 -o g.ply");
   assert_int_equal(count_files("g."), 0);
   EXPECT(0, "displacement 5.000 mm", "deform open.safetensors --posture prone --scale 5 -o g.ply");
 }

@@ -22,6 +22,8 @@
 
 #include "lungs_helpers.h"
 
+#include "tests/poses.h"
+
 static const double promised = 0.005; /* mm, of a scan's reproduction */
 
 static char path[] = "/tmp/supine-reference-XXXXXX";
@@ -234,19 +236,17 @@ static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **stat
   assert_true(report.accuracy.volume == 1.0 && report.accuracy.rms_mm < 0.1);
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open(path, &basis, &error), SUPINE_OK);
-  const supine_basis_info *info = supine_basis_get_info(basis);
   double weights[SUPINE_MODES_MAX];
   double scales[SUPINE_LUNGS_MAX];
   float *xyz = malloc(3 * n * sizeof *xyz);
   double *placed = malloc(3 * n * sizeof *placed);
-  assert_true(fabs(info->scan_volume + 2500.0) <
+  assert_true(fabs(posed_scan(basis) + 2500.0) <
               3.0); /* of the anchored surface: half a permille */
   assert_int_equal(supine_basis_weights(basis, tilted, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_scale(basis, weights, info->scan_volume, scales, &error),
-                   SUPINE_OK);
+  assert_int_equal(posed_scale(basis, weights, posed_scan(basis), scales, &error), SUPINE_OK);
   assert_true(scales[0] < 0.0);
   scales[1] = scales[0];
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
   for (size_t i = 0; i < 3 * n; ++i) {
     placed[i] = (double)xyz[i];
   }
@@ -257,12 +257,12 @@ static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **stat
     double g[3] = {0.0, 0.0, 0.0};
     double rest = 0.0;
     g[axis / 2] = axis % 2 == 0 ? 3.0 : -0.2; /* any length */
-    assert_int_equal(supine_basis_resting_volume(basis, g, &rest), SUPINE_OK);
+    assert_int_equal(posed_rest(basis, g, &rest), SUPINE_OK);
     assert_true(fabs(rest - (resting.share[axis] - 1.0) * 6000.0) < 3.0); /* likewise */
   }
   const double none[3] = {0.0, 0.0, 0.0};
   double rest = 0.0;
-  assert_int_equal(supine_basis_resting_volume(basis, none, &rest), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_rest(basis, none, &rest), SUPINE_ERROR_ARGUMENT);
   supine_basis_close(basis);
   free(xyz);
   free(placed);
@@ -292,9 +292,9 @@ static void check_volume(const supine_lungs *lungs, const supine_basis *basis, c
   float *xyz = malloc(3 * lungs->mesh.vertex_count * sizeof *xyz);
   assert_non_null(xyz);
   assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_scale(basis, weights, wanted, scales, NULL), SUPINE_OK);
+  assert_int_equal(posed_scale(basis, weights, wanted, scales, NULL), SUPINE_OK);
   scales[1] = scales[0];
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
   const double is = volume_at(lungs, xyz) - volume_at(lungs, supine_basis_vertices(basis));
   if (fabs(is - wanted) > 0.02) {
     fail_msg("%.4f mL were asked, and %.4f came", wanted, is);
@@ -329,9 +329,9 @@ static void test_scan_at_rest_is_where_its_posture_rests(void **state) {
         supine_basis_open(path, &basis, &error) != SUPINE_OK) {
       fail_msg("%s", error.message);
     }
-    assert_int_equal(supine_basis_resting_volume(basis, g, &rest), SUPINE_OK);
-    printf("scanned at %.4f mL, rests at %.4f\n", supine_basis_get_info(basis)->scan_volume, rest);
-    assert_true(fabs(rest - supine_basis_get_info(basis)->scan_volume) < 0.01);
+    assert_int_equal(posed_rest(basis, g, &rest), SUPINE_OK);
+    printf("scanned at %.4f mL, rests at %.4f\n", posed_scan(basis), rest);
+    assert_true(fabs(rest - posed_scan(basis)) < 0.01);
     /* or nothing was shown: the compressed field's full surface holds otherwise much */
     assert_true(fabs(rest - (share - 1.0) * 6000.0) > 0.1);
     check_volume(&lungs, basis, g, rest);

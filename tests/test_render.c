@@ -16,6 +16,8 @@
 #include "program/render/render.h"
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
   (void)state;
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
@@ -153,8 +155,7 @@ static made make(fixture *f) {
 static void draw(const made *m, supine_view view, const double *weights, double scale,
                  uint32_t *pixels) {
   const double scales[2] = {scale, scale};
-  const supine_scene scene = {.weights = weights,
-                              .scales = scales,
+  const supine_scene scene = {.pose = POSED(m->basis, weights, scales),
                               .value = m->value,
                               .largest = 10,
                               .view = view,
@@ -239,7 +240,7 @@ static void test_project_agrees_with_the_drawing(void **state) {
   const supine_marks marks = {info->vertex_count, mark};
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     const supine_scene scene = {
-        .weights = weights, .scales = scales, .view = view, .width = WIDTH, .height = HEIGHT};
+        .pose = POSED(m.basis, weights, scales), .view = view, .width = WIDTH, .height = HEIGHT};
     double is[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     double drawn[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     draw(&m, view, weights, 1, pixels);
@@ -317,8 +318,7 @@ static void test_draw_one_lung_leaves_the_other_out(void **state) {
   const double scales[2] = {1, 1};
   double both[4] = SUPINE_EXTENT_NONE;
   double one[4] = SUPINE_EXTENT_NONE;
-  supine_scene scene = {.weights = weights,
-                        .scales = scales,
+  supine_scene scene = {.pose = POSED(m.basis, weights, scales),
                         .value = m.value,
                         .largest = 10,
                         .view = SUPINE_VIEW_ANTERIOR,
@@ -341,7 +341,7 @@ static void test_draw_impossible_size_is_refused(void **state) {
   const double weights[3] = {0};
   const double scales[1] = {1};
   supine_scene scene = {
-      .weights = weights, .scales = scales, .value = m.value, .largest = 1, .height = 10};
+      .pose = POSED(m.basis, weights, scales), .value = m.value, .largest = 1, .height = 10};
   supine_error error;
   assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   scene.width = (size_t)1 << 30;
@@ -355,8 +355,7 @@ static void test_png_is_a_png(void **state) {
   made m = make(fixture_create(300, 3, 2, 1, false, false, 1, 66));
   const double weights[3] = {0};
   const double scales[1] = {1};
-  const supine_scene scene = {.weights = weights,
-                              .scales = scales,
+  const supine_scene scene = {.pose = POSED(m.basis, weights, scales),
                               .value = m.value,
                               .largest = 1,
                               .dark = true,

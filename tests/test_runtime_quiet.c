@@ -19,6 +19,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 static size_t calls;    /* of anything wrapped */
 static size_t live;     /* blocks that are allocated and not yet freed */
 static size_t fail_at;  /* which allocation to refuse, from 1; 0: none */
@@ -110,39 +112,52 @@ static void use_all(const supine_basis *basis, float *xyz) {
   double gravity[3];
   double weights[SUPINE_MODES_MAX];
   double scales[SUPINE_LUNGS_MAX];
-  double scale = 0;
   supine_error error;
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   (void)supine_posture_gravity("prone", gravity);
   (void)supine_posture_tilt(gravity, 15, gravity);
   (void)supine_posture_nearest("pron");
   (void)supine_basis_weights(basis, gravity, weights);
-  (void)supine_basis_scale(basis, weights, 3, &scale, NULL);
-  (void)supine_basis_scale(basis, weights, 1e9, &scale, &error);
-  (void)supine_basis_lung_scale(basis, 0, weights, 1, &scale, NULL);
-  (void)supine_basis_lung_volume(basis, 0, weights, 1);
+  supine_state state = supine_basis_scan(basis);
+  supine_pose pose;
+  char text[160];
+  (void)supine_state_parse("left:rest+500", &state, &error);
+  (void)supine_state_parse("500", &state, &error);
+  (void)supine_state_parse("left=scan+3,right=scan", &state, &error);
+  (void)supine_state_print(&state, text, sizeof text);
+  (void)supine_state_describe(&state, text, sizeof text);
+  (void)supine_basis_pose(basis, &state, &pose, &error);
+  state = supine_basis_scan(basis);
+  for (state.volume.ml = 3; state.volume.ml < 1e10;
+       state.volume.ml *= 1e9) { /* the last: out of reach */
+    if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
+        supine_basis_get_info(basis)->has_volume) {
+      supine_basis_volumes(basis, &pose, scales);
+    }
+  }
   for (size_t i = 0; i < SUPINE_LUNGS_MAX; ++i) {
     scales[i] = 0.5;
   }
-  (void)supine_basis_error(basis, weights, scales);
+  (void)supine_basis_error(basis, POSED(basis, weights, scales));
   const supine_pv_breath breath = supine_breath_default();
   (void)supine_breath_evaluate(supine_breath_normal(), &breath, 2, (const double[]){0.4, 3},
                                weights, scales, &error);
   (void)supine_basis_weights(basis, gravity, weights);
   scales[0] = scales[1] = 0.5;
-  supine_deform(basis, weights, scales, xyz);
-  supine_deform_range(basis, weights, scales, 3, n - 1, xyz);
-  supine_deform_separate(basis, weights, scales, 0, n, xyz, xyz + n, xyz + 2 * n);
-  supine_displace_range(basis, weights, scales, 0, n, xyz + 3 * n);
-  supine_deform_batch(basis, 1, weights, scales, 0, n, xyz);
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
+  supine_deform_range(basis, POSED(basis, weights, scales), 3, n - 1, xyz);
+  supine_deform_separate(basis, POSED(basis, weights, scales), 0, n, xyz, xyz + n, xyz + 2 * n);
+  supine_displace_range(basis, POSED(basis, weights, scales), 0, n, xyz + 3 * n);
+  supine_deform_batch(basis, 1, posed_batch(basis, 1, weights, scales), 0, n, xyz);
   supine_step(n, xyz + 3 * n, xyz);
   supine_normals(basis, xyz, xyz + 3 * n);
-  (void)supine_deform_lit(basis, weights, scales, xyz, xyz + 3 * n);
-  (void)supine_deform_lit_batch(basis, 1, weights, scales, 0, n, xyz, xyz + 3 * n);
+  (void)supine_deform_lit(basis, POSED(basis, weights, scales), xyz, xyz + 3 * n);
+  (void)supine_deform_lit_batch(basis, 1, posed_batch(basis, 1, weights, scales), 0, n, xyz,
+                                xyz + 3 * n);
   (void)supine_gl_pack(basis, 0, n, xyz);
-  (void)supine_gl_weights(basis, weights, scales, xyz);
+  (void)supine_gl_weights(basis, POSED(basis, weights, scales), xyz, xyz + n);
   (void)supine_gl_pack_normals(basis, 0, n, (uint32_t *)(void *)xyz);
-  (void)supine_gl_normal_weights(basis, weights, scales, xyz);
+  (void)supine_gl_normal_weights(basis, POSED(basis, weights, scales), xyz);
   (void)supine_basis_metadata(basis, "kind");
   (void)supine_basis_vertices(basis);
   (void)supine_basis_triangles(basis);

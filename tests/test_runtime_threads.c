@@ -14,6 +14,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 enum { THREADS = 4, VERTICES = 1003 };
 
 typedef struct job {
@@ -40,9 +42,11 @@ static void *work(void *context) {
   const size_t begin = VERTICES * j->number / THREADS;
   const size_t end = VERTICES * (j->number + 1) / THREADS;
   for (int i = 0; i < 50; ++i) {
-    supine_deform_range(j->basis, weights[0], scales[0], begin, end, j->shared + 3 * begin);
-    supine_deform(j->basis, weights[1], scales[1], j->own);
-    supine_deform_batch(j->basis, 2, weights[0], scales[0], 0, VERTICES, j->batch);
+    supine_deform_range(j->basis, POSED(j->basis, weights[0], scales[0]), begin, end,
+                        j->shared + 3 * begin);
+    supine_deform(j->basis, POSED(j->basis, weights[1], scales[1]), j->own);
+    supine_deform_batch(j->basis, 2, posed_batch(j->basis, 2, weights[0], scales[0]), 0, VERTICES,
+                        j->batch);
     supine_normals(j->basis, j->own, j->batch);
   }
   return NULL;
@@ -71,11 +75,11 @@ static void test_basis_many_threads_same_bits(void **state) {
   double weights[7];
   double scales[2];
   frame(basis, 0, weights, scales);
-  supine_deform(basis, weights, scales, alone);
+  supine_deform(basis, POSED(basis, weights, scales), alone);
   assert_memory_equal(shared, alone, 3 * VERTICES * sizeof *alone);
   for (size_t i = 0; i < THREADS; ++i) {
     frame(basis, i, weights, scales);
-    supine_deform(basis, weights, scales, alone);
+    supine_deform(basis, POSED(basis, weights, scales), alone);
     assert_memory_equal(jobs[i].own, alone, 3 * VERTICES * sizeof *alone);
   }
   free(shared);

@@ -19,6 +19,8 @@
 
 #include "program/options/command.h"
 
+#include "tests/poses.h"
+
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
 static char lungs[64], csv[64], out[64], other[64], printed[64];
 static char text[16384]; /* what the command said on stderr */
@@ -88,7 +90,7 @@ static int run(const supine_command *command, const char *const *words) {
 }
 
 static int solve(const char *option, const char *value, const char *path) {
-  const char *const words[] = {"solve", lungs, "--posture", "supine", "--volume", "400",
+  const char *const words[] = {"solve", lungs, "--posture", "supine", "--volume", "scan+400",
                                "-o",    path,  option,      value,    NULL};
   return run(&supine_command_solve, words);
 }
@@ -265,7 +267,7 @@ static void write_ply(const char *path, const char *format, bool ras, double spo
 }
 
 static int solve_ply(const char *mesh, const char *value, const char *path) {
-  const char *const words[] = {"solve", mesh, "--posture",       "supine", "--volume", "400",
+  const char *const words[] = {"solve", mesh, "--posture",       "supine", "--volume", "scan+400",
                                "-o",    path, "--expandability", value,    NULL};
   return run(&supine_command_solve, words);
 }
@@ -343,10 +345,10 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
     double weights[SUPINE_MODES_MAX];
     double scales[2];
     assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-    assert_int_equal(supine_basis_scale(basis, weights, 400.0, &scales[0], NULL), SUPINE_OK);
+    assert_int_equal(posed_scale(basis, weights, 400.0, &scales[0], NULL), SUPINE_OK);
     scales[1] = scales[0];
     float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
-    supine_deform(basis, weights, scales, xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
     double whole = 0.0;
     for (size_t lung = 0; lung < 2; ++lung) {
       const float *shapes[] = {supine_basis_vertices(basis), xyz};
@@ -369,7 +371,7 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
                          6000.0;
         }
       }
-      const double said = supine_basis_lung_volume(basis, lung, weights, scales[lung]);
+      const double said = posed_lung_volume(basis, lung, weights, scales[lung]);
       rests[ill][lung] = measured[0];
       volumes[ill][lung] = said;
       whole += measured[1] - measured[0];
@@ -385,7 +387,7 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
     if (ill == 0) {
       healthy = basis;
     } else { /* 0.3 of what it took at this scale when it was healthy */
-      const double was = supine_basis_lung_volume(healthy, 0, weights, scales[0]);
+      const double was = posed_lung_volume(healthy, 0, weights, scales[0]);
       assert_true(fabs(volumes[1][0] - 0.3 * was) < 1e-4);
       supine_basis_close(basis);
     }

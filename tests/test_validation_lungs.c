@@ -16,6 +16,8 @@
 #include "lungs_helpers.h"
 #include "validation.h"
 
+#include "tests/poses.h"
+
 static const double postures[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {-1, 0, 0}};
 static const char *const posture_names[] = {"supine", "prone", "left", "right"};
 
@@ -50,16 +52,16 @@ static void test_displacement_is_linear_in_volume_along_one_direction(void **sta
     double weights[SUPINE_MODES_MAX];
     double scales[2];
     assert_int_equal(supine_basis_weights(basis, postures[p], weights), SUPINE_OK);
-    assert_int_equal(supine_basis_scale(basis, weights, 500.0, &scales[0], NULL), SUPINE_OK);
+    assert_int_equal(posed_scale(basis, weights, 500.0, &scales[0], NULL), SUPINE_OK);
     scales[1] = scales[0];
-    supine_deform(basis, weights, scales, full);
+    supine_deform(basis, POSED(basis, weights, scales), full);
     double bend = 0.0;
     double turn = 0.0;
     for (int step = 1; step < 10; ++step) {
       double at[2];
-      assert_int_equal(supine_basis_scale(basis, weights, 50.0 * step, &at[0], NULL), SUPINE_OK);
+      assert_int_equal(posed_scale(basis, weights, 50.0 * step, &at[0], NULL), SUPINE_OK);
       at[1] = at[0];
-      supine_deform(basis, weights, at, part);
+      supine_deform(basis, POSED(basis, weights, at), part);
       bend = fmax(bend, fabs(at[0] / scales[0] - 0.1 * step));
       for (size_t i = 0; i < n; ++i) {
         double dot = 0.0;

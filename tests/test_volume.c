@@ -17,6 +17,8 @@
 
 #include "runtime_fixture.h"
 
+#include "tests/poses.h"
+
 static supine_basis *open_bytes(const fixture *f, unsigned char **bytes) {
   size_t size = 0;
   *bytes = fixture_bytes(f, &size);
@@ -46,7 +48,7 @@ static void check_lung_volumes(bool vector) {
       const double rest = fixture_volume(f, lung, xyz);
       fixture_deform(f, weights, scales, xyz);
       const double gained = fixture_volume(f, lung, xyz) - rest;
-      const double given = supine_basis_lung_volume(basis, lung, weights, scales[lung]);
+      const double given = posed_lung_volume(basis, lung, weights, scales[lung]);
       assert_true(fabs(given - gained) <= 1000 * DBL_EPSILON * (fabs(rest) + fabs(gained)));
     }
   }
@@ -80,16 +82,16 @@ static void test_scale_random_volumes_reached(void **state) {
     double weights[5];
     double scale = 0;
     assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
-    if (supine_basis_scale(basis, weights, volume, &scale, NULL) == SUPINE_OK) {
+    if (posed_scale(basis, weights, volume, &scale, NULL) == SUPINE_OK) {
       ++reached;
-      const double total = supine_basis_lung_volume(basis, 0, weights, scale) +
-                           supine_basis_lung_volume(basis, 1, weights, scale);
+      const double total =
+          posed_lung_volume(basis, 0, weights, scale) + posed_lung_volume(basis, 1, weights, scale);
       assert_true(fabs(total - volume) <= 1e-10 * fabs(volume));
     }
     for (size_t lung = 0; lung < 2; ++lung) {
-      if (supine_basis_lung_scale(basis, lung, weights, volume, &scale, NULL) == SUPINE_OK) {
+      if (posed_lung_scale(basis, lung, weights, volume, &scale, NULL) == SUPINE_OK) {
         ++reached;
-        assert_true(fabs(supine_basis_lung_volume(basis, lung, weights, scale) - volume) <=
+        assert_true(fabs(posed_lung_volume(basis, lung, weights, scale) - volume) <=
                     1e-10 * fabs(volume));
       }
     }
@@ -147,8 +149,7 @@ static void test_scale_cubics_branch_of_rest_only(void **state) {
     assert_int_equal(supine_basis_weights(basis, g, &weight), SUPINE_OK);
     assert_true(fabs(weight - 1) <= 4 * DBL_EPSILON);
     weight = 1;
-    const supine_status status =
-        supine_basis_scale(basis, &weight, cases[i].volume, &scale, &error);
+    const supine_status status = posed_scale(basis, &weight, cases[i].volume, &scale, &error);
     if (isnan(cases[i].scale)) {
       assert_int_equal(status, SUPINE_ERROR_NUMERICAL);
       assert_true(strlen(error.message) > 0);
@@ -169,27 +170,23 @@ static void test_scale_not_finite_volume_refused(void **state) {
   const double one = 1;
   const double bad = NAN;
   double scale = 0;
-  assert_int_equal(supine_basis_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(supine_basis_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(supine_basis_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(supine_basis_lung_scale(basis, 1, &one, 1, &scale, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(posed_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(posed_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_NUMERICAL);
   supine_basis_close(basis);
   free(bytes);
 }
 
-static void test_scale_open_surface_says_so(void **state) {
-  (void)state;
+static void test_pose_open_surface_says_so(void **unused) {
+  (void)unused;
   fixture *f = fixture_create(9, 3, 1, 1, false, false, 9, 5);
   unsigned char *bytes = NULL;
   supine_basis *basis = open_bytes(f, &bytes);
-  const double weights[3] = {1, 2, 3};
-  double scale = 0;
+  const supine_state state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_SCAN, 10}};
+  supine_pose pose;
   supine_error error;
-  assert_int_equal(supine_basis_scale(basis, weights, 10, &scale, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
-  assert_non_null(strstr(error.message, "scale"));
-  assert_int_equal(supine_basis_lung_scale(basis, 0, weights, 10, &scale, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, &error), SUPINE_ERROR_OPEN_SURFACE);
+  assert_non_null(strstr(error.message, "--scale"));
   supine_basis_close(basis);
   free(bytes);
   fixture_destroy(f);
@@ -202,7 +199,7 @@ int main(void) {
       cmocka_unit_test(test_scale_random_volumes_reached),
       cmocka_unit_test(test_scale_cubics_branch_of_rest_only),
       cmocka_unit_test(test_scale_not_finite_volume_refused),
-      cmocka_unit_test(test_scale_open_surface_says_so),
+      cmocka_unit_test(test_pose_open_surface_says_so),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -92,14 +92,15 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
 }
 
 /* From where the scan had the points [begin, end) to where full inflation has them. */
-static void take_back(embedding *e, size_t begin, size_t end, const double *values) {
+static void take_back(embedding *e, size_t lung, size_t begin, size_t end,
+                      const double *values) {
   const size_t modes = e->columns / 3;
   for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double *row = values + (i - begin) * e->columns + axis * modes;
       double moved = 0.0;
       for (size_t k = 0; k < modes; ++k) {
-        moved += e->shells->scan_scale * e->shells->scan_weights[k] * row[k];
+        moved += e->shells->scan.gains[lung][axis] * e->shells->scan.weights[k] * row[k];
       }
       e->vertices[3 * i + axis] = (float)(e->content->points[3 * e->order[i] + axis] - moved);
     }
@@ -146,7 +147,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
   for (size_t i = 0; i < count * e->columns; ++i) {
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
-  take_back(e, begin, end, values);
+  take_back(e, (size_t)(shell - e->shells->shell), begin, end, values);
 }
 
 /* Adds to sums of squares what the interpolation leaves at the surface's vertices, and their

@@ -73,25 +73,6 @@ static bool separate(const supine_basis_info *info) {
   return true;
 }
 
-/* Weights and scale that lead from the file's surface to the scan. */
-static supine_status find_scan(supine_inside_shells *shells, supine_error *error) {
-  const supine_basis *basis = shells->basis;
-  const double volume = supine_basis_get_info(basis)->scan_volume;
-  const char *text = supine_basis_metadata(basis, "scan_gravity");
-  double g[3];
-  if (volume == 0.0) {
-    return SUPINE_OK;
-  }
-  if (text == NULL || sscanf(text, "%lf,%lf,%lf", &g[0], &g[1], &g[2]) != 3 || /* NOLINT */
-      supine_basis_weights(basis, g, shells->scan_weights) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis was scanned %g mL from full inflation, but does not say in "
-                            "which posture (scan_gravity): make it anew",
-                            volume);
-  }
-  return supine_basis_scale(basis, shells->scan_weights, volume, &shells->scan_scale, error);
-}
-
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -107,22 +88,18 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                             "a triangle of the basis joins two lungs: make the basis anew");
   }
   float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
+  const supine_state scan = supine_basis_scan(basis);
   supine_status status = scanned != NULL
-                             ? find_scan(shells, error)
+                             ? supine_basis_pose(basis, &scan, &shells->scan, error)
                              : supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                 "no memory for %zu vertices", info->vertex_count);
   if (status == SUPINE_OK) {
-    double scales[SUPINE_LUNGS_MAX];
-    for (size_t lung = 0; lung < shells->count; ++lung) {
-      scales[lung] = shells->scan_scale;
-    }
-    supine_deform(basis, shells->scan_weights, scales, scanned);
+    supine_deform(basis, &shells->scan, scanned);
   }
   for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
     if (!isfinite(scanned[i])) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the scan, %g mL from full inflation, is out of reach of the basis",
-                                info->scan_volume);
+                                "the scan's volume is out of reach of the basis");
     }
   }
   for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {

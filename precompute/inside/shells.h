@@ -25,17 +25,13 @@ typedef struct supine_inside_shells {
   const supine_basis *basis; /**< kept by the caller */
   size_t count;              /**< lungs, G */
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
-  /** The scan's own state, in which content is given: a scan below full inflation is at these
-   * weights [K] and this scale of the file's surface; 0: that is the scan. */
-  double scan_weights[SUPINE_MODES_MAX], scan_scale;
+  supine_pose scan; /**< the scan's own state, in which content is given */
 } supine_inside_shells;
 
-/** Takes the lungs' surfaces to where they were scanned: at metadata "scan_gravity" and the
- * scan's volume.
+/** Take the lungs' surfaces to where they were scanned.
  * @param shells  written; supine_inside_shells_free releases it
  * @retval SUPINE_ERROR_MESH    a lung without a triangle
- * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface; or it does
- *         not say in which posture it was scanned
+ * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
  * @retval SUPINE_ERROR_NUMERICAL  its volumes do not reach the scan's
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,

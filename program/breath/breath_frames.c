@@ -2,9 +2,9 @@
 /* The surfaces of a breath, frame after frame. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sh/base/clock.h"
-#include <supine/volume.h>
 
 #include "program/breath/breath_frames.h"
 
@@ -12,20 +12,22 @@ enum { RUN_MAX = 128 };
 
 static const double tolerance = 0.01; /* mL, of the frames of a run */
 
+typedef double lung_gains[SUPINE_LUNGS_MAX][3];
+
 struct breath_frames {
   const supine_basis *basis;
   const breath_course *course;
-  double *scale;   /* [T] */
-  double *volumes; /* [T, G] mL */
-  size_t *run;     /* [T] first frame of each frame's run */
-  float *step;     /* [N, 3] mm, of the present run */
+  lung_gains *gains; /* [T] */
+  double *volumes;   /* [T, G] mL */
+  size_t *run;       /* [T] first frame of each frame's run */
+  float *step;       /* [N, 3] mm, of the present run */
   size_t next;
   size_t stepped;
 };
 
 void supine_breath_frames_destroy(breath_frames *frames) {
   if (frames != NULL) {
-    free(frames->scale);
+    free(frames->gains);
     free(frames->volumes);
     free(frames->run);
     free(frames->step);
@@ -33,74 +35,98 @@ void supine_breath_frames_destroy(breath_frames *frames) {
   }
 }
 
-static supine_status find_scales(breath_frames *frames, supine_error *error) {
+supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {
+  const bool known = supine_basis_get_info(basis)->has_rest;
+  return (supine_state){.gravity = {gravity[0], gravity[1], gravity[2]},
+                        .volume = {known ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml}};
+}
+
+/* The pose of a frame from its orientation and volume. */
+static supine_status pose_frame(const breath_frames *frames, size_t t, supine_pose *pose,
+                                supine_error *error) {
+  const breath_course *course = frames->course;
+  const supine_state state =
+      supine_breath_state(frames->basis, course->gravity + 3 * t, course->volume[t]);
+  return supine_basis_pose(frames->basis, &state, pose, error);
+}
+
+static supine_status find_gains(breath_frames *frames, supine_error *error) {
   const breath_course *course = frames->course;
   for (size_t t = 0; t < course->count; ++t) {
-    double weights[SUPINE_MODES_MAX];
-    supine_error cause = {SUPINE_OK, "gravity has no direction"};
-    supine_status status = supine_basis_weights(frames->basis, course->gravity + 3 * t, weights);
-    if (status == SUPINE_OK) {
-      status =
-          supine_basis_scale(frames->basis, weights, course->volume[t], &frames->scale[t], &cause);
-    }
+    supine_pose pose;
+    supine_error cause;
+    const supine_status status = pose_frame(frames, t, &pose, &cause);
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "at %.3f s: %s", course->time[t], cause.message);
     }
-    for (size_t lung = 0; lung < course->lungs; ++lung) {
-      frames->volumes[t * course->lungs + lung] =
-          supine_basis_lung_volume(frames->basis, lung, weights, frames->scale[t]);
-    }
+    memcpy(frames->gains[t], pose.gains, sizeof pose.gains);
+    supine_basis_volumes(frames->basis, &pose, frames->volumes + t * course->lungs);
   }
   return SUPINE_OK;
 }
 
+/* gains = first + share (last - first) */
+static void mix_gains(const breath_frames *frames, size_t first, size_t last, double share,
+                      lung_gains gains) {
+  for (size_t i = 0; i < 3 * frames->course->lungs; ++i) {
+    const double a = frames->gains[first][i / 3][i % 3];
+    const double b = frames->gains[last][i / 3][i % 3];
+    gains[i / 3][i % 3] = a + share * (b - a);
+  }
+}
+
+/* Volumes of the lungs of frame t where the run takes equal steps from `first` to `last`. */
+static void stepped_volumes(const breath_frames *frames, supine_pose *pose, size_t first,
+                            size_t last, size_t t, double *volumes) {
+  mix_gains(frames, first, last, (double)(t - first) / (double)(last - first), pose->gains);
+  supine_basis_volumes(frames->basis, pose, volumes);
+}
+
 /* Whether equal steps from frame `first` to `last` keep the volumes of those between. */
-static bool run_holds(const breath_frames *frames, const double cubic[3], size_t first,
-                      size_t last) {
-  const double begin = frames->scale[first];
-  const double step = (frames->scale[last] - begin) / (double)(last - first);
+static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t first, size_t last) {
+  const size_t lungs = frames->course->lungs;
   for (size_t t = first + 1; t < last; ++t) {
-    const double volume = supine_volume_at(cubic, begin + step * (double)(t - first));
-    if (fabs(volume - frames->course->volume[t]) > tolerance) {
+    double volumes[SUPINE_LUNGS_MAX];
+    double off = 0.0;
+    stepped_volumes(frames, pose, first, last, t, volumes);
+    for (size_t lung = 0; lung < lungs; ++lung) {
+      off += volumes[lung] - frames->volumes[t * lungs + lung];
+    }
+    if (fabs(off) > tolerance) {
       return false;
     }
   }
   return true;
 }
 
-/* Runs, greedily; within one, scales and volumes become those of the equal steps. */
+/* Runs, greedily; within one, gains and volumes become those of the equal steps. */
 static void find_runs(breath_frames *frames) {
   const breath_course *course = frames->course;
+  supine_pose pose;
   for (size_t t = 0; t < course->count; ++t) {
     frames->run[t] = t;
   }
-  double weights[SUPINE_MODES_MAX];
-  double cubic[3];
   if (!course->fixed ||
-      supine_basis_weights(frames->basis, course->gravity, weights) != SUPINE_OK) {
+      supine_basis_weights(frames->basis, course->gravity, pose.weights) != SUPINE_OK) {
     return;
   }
-  supine_basis_cubic(frames->basis, weights, cubic);
   size_t first = 0;
   while (first < course->count) {
     size_t last = first;
     while (last + 1 < course->count && last - first < RUN_MAX &&
-           run_holds(frames, cubic, first, last + 1)) {
+           run_holds(frames, &pose, first, last + 1)) {
       ++last;
     }
     if (last == first + 1) { /* a step would cost more than placing the frame */
       last = first;
     }
-    const double begin = frames->scale[first];
-    const double step = last > first ? (frames->scale[last] - begin) / (double)(last - first) : 0.0;
     for (size_t t = first + 1; t <= last; ++t) {
       frames->run[t] = first;
-      frames->scale[t] = begin + step * (double)(t - first);
-      for (size_t lung = 0; lung < course->lungs; ++lung) {
-        frames->volumes[t * course->lungs + lung] =
-            supine_basis_lung_volume(frames->basis, lung, weights, frames->scale[t]);
-      }
+      stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * course->lungs);
       ++frames->stepped;
+    }
+    if (last > first) { /* the first frame's gains and the step stay */
+      mix_gains(frames, first, last, 1.0 / (double)(last - first), frames->gains[first + 1]);
     }
     first = last + 1;
   }
@@ -116,15 +142,15 @@ supine_status supine_breath_frames_create(const supine_basis *basis, const breat
   }
   made->basis = basis;
   made->course = course;
-  made->scale = calloc(count, sizeof *made->scale);
+  made->gains = calloc(count, sizeof *made->gains);
   made->volumes = calloc(count * course->lungs, sizeof *made->volumes);
   made->run = calloc(count, sizeof *made->run);
   made->step = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *made->step);
-  if (made->scale == NULL || made->volumes == NULL || made->run == NULL || made->step == NULL) {
+  if (made->gains == NULL || made->volumes == NULL || made->run == NULL || made->step == NULL) {
     supine_breath_frames_destroy(made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
   }
-  const supine_status status = find_scales(made, error);
+  const supine_status status = find_gains(made, error);
   if (status != SUPINE_OK) {
     supine_breath_frames_destroy(made);
     return status;
@@ -134,25 +160,17 @@ supine_status supine_breath_frames_create(const supine_basis *basis, const breat
   return SUPINE_OK;
 }
 
-static void fill(double *scales, size_t lungs, double value) {
-  for (size_t lung = 0; lung < lungs; ++lung) {
-    scales[lung] = value;
-  }
-}
-
 /* A frame from its orientation and volume: what a player that knew nothing in advance would do. */
 static void place(breath_frames *frames, size_t t, float *xyz) {
-  const breath_course *course = frames->course;
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  double scale = frames->scale[t];
-  (void)supine_basis_weights(frames->basis, course->gravity + 3 * t, weights);
-  (void)supine_basis_scale(frames->basis, weights, course->volume[t], &scale, NULL);
-  fill(scales, course->lungs, scale);
-  supine_deform(frames->basis, weights, scales, xyz);
-  if (t + 1 < course->count && frames->run[t + 1] == t) { /* a run begins */
-    fill(scales, course->lungs, frames->scale[t + 1] - frames->scale[t]);
-    supine_displace_range(frames->basis, weights, scales, 0,
+  supine_pose pose;
+  (void)pose_frame(frames, t, &pose, NULL); /* it was found before */
+  supine_deform(frames->basis, &pose, xyz);
+  if (t + 1 < frames->course->count && frames->run[t + 1] == t) { /* a run begins */
+    for (size_t i = 0; i < 3 * frames->course->lungs; ++i) {
+      pose.gains[i / 3][i % 3] =
+          frames->gains[t + 1][i / 3][i % 3] - frames->gains[t][i / 3][i % 3];
+    }
+    supine_displace_range(frames->basis, &pose, 0,
                           supine_basis_get_info(frames->basis)->vertex_count, frames->step);
   }
 }

@@ -13,17 +13,14 @@ supine_status supine_export_breath_set(const export_source *source, double volum
     return SUPINE_OK;
   }
   const size_t n = source->info->vertex_count;
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  for (size_t j = 0; j < SUPINE_LUNGS_MAX; ++j) {
-    scales[j] = 1;
-  }
+  supine_pose pose;
+  supine_pose_fill(&pose, 1);
   float *xyz = malloc(3 * n * sizeof *xyz);
   if (xyz == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  (void)supine_basis_weights(source->basis, supine, weights); /* a direction that is legal */
-  supine_deform(source->basis, weights, scales, xyz);
+  (void)supine_basis_weights(source->basis, supine, pose.weights); /* a direction that is legal */
+  supine_deform(source->basis, &pose, xyz);
   double farthest = 0;
   for (size_t i = 0; i < n; ++i) {
     double square = 0;
@@ -42,14 +39,15 @@ supine_status supine_export_breath_set(const export_source *source, double volum
   return SUPINE_OK;
 }
 
-supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
-                                         const double g[3], const double *weights, double fraction,
-                                         double *scale, supine_error *error) {
+supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
+                                        const double g[3], double fraction, supine_pose *pose,
+                                        supine_error *error) {
   if (!source->info->has_volume) {
-    *scale = fraction * breath->scale;
-    return SUPINE_OK;
+    supine_pose_fill(pose, fraction * breath->scale);
+    return supine_basis_weights(source->basis, g, pose->weights);
   }
-  double rest = 0;
-  (void)supine_basis_resting_volume(source->basis, g, &rest); /* a direction that is legal */
-  return supine_basis_scale(source->basis, weights, rest + fraction * breath->volume, scale, error);
+  const supine_volume_kind from = source->info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
+  const supine_state state = {.gravity = {g[0], g[1], g[2]},
+                              .volume = {from, fraction * breath->volume}};
+  return supine_basis_pose(source->basis, &state, pose, error);
 }

@@ -23,7 +23,8 @@ typedef struct export_source {
   const double *linear;      /**< [G, K], mL; NULL where the surface is open; likewise: */
   const double *quadratic;   /**< [G, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
-  const double *resting;     /**< [9], mL at rest over Y_lm of bands 0 to 2; NULL where unknown */
+  double resting[EXPORT_RESTING_TERMS]; /**< mL at rest beyond the reference, all lungs, over Y_lm
+                                           of bands 0 to 2; where info->has_rest */
 } export_source;
 
 /** Opens a basis file.
@@ -41,7 +42,7 @@ void supine_export_field(const export_source *source, size_t vertex, size_t mode
 typedef struct export_breath {
   double volume;  /**< mL above rest: where the surface is closed */
   double largest; /**< mm, the largest displacement when supine: where it is open */
-  double scale;   /**< the breath scale that gives it */
+  double scale;   /**< the gain that gives it */
 } export_breath;
 
 /** A breath of `volume` mL; on an open surface one whose largest displacement, supine, is
@@ -51,12 +52,11 @@ typedef struct export_breath {
 supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
                                        export_breath *breath, supine_error *error);
 
-/** The breath scale s at a fraction of the breath (0 rest, 1 all of it) for gravity and the basis'
- * weights there.
+/** The pose at a fraction of the breath (0 rest, or the scan where no rest is known; 1 all of it).
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
-supine_status supine_export_breath_scale(const export_source *source, const export_breath *breath,
-                                         const double g[3], const double *weights, double fraction,
-                                         double *scale, supine_error *error);
+supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
+                                        const double g[3], double fraction, supine_pose *pose,
+                                        supine_error *error);
 
 /** Names of what is inside the lungs, as 'supine embed' wrote them. */
 typedef struct export_parts {

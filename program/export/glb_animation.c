@@ -37,12 +37,11 @@ static supine_status make_frame(const export_source *source, const export_glb_op
   const double roll = roll_at(seconds);
   const double g[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
-  double scale = 0;
-  (void)supine_basis_weights(source->basis, g, weights); /* a direction that is legal */
+  supine_pose pose = {.gains = {{0}}};
   const supine_status status =
-      supine_export_breath_scale(source, &options->breath, g, weights, fraction, &scale, error);
+      supine_export_breath_pose(source, &options->breath, g, fraction, &pose, error);
   (void)supine_sh_evaluate(source->info->band, g, y);
-  supine_export_targets_weights(targets, source->terms, y, scale, weights);
+  supine_export_targets_weights(targets, source->terms, y, pose.gains[0][0], weights);
   for (size_t j = 0; j < targets->count; ++j) {
     row[j] = (float)weights[j];
   }

@@ -87,8 +87,7 @@ static const char volume_text[] =
 
 static const char resting_text[] =
     "mL that all lungs hold at rest beyond the vertices as they are, which are full inflation: the "
-    "sum over l <= 2 and m of harmonics[l*l+l+m] * Y[l*l+l+m](g), negative; scan: the same of the "
-    "scan that they were found from.";
+    "sum over l <= 2 and m of harmonics[l*l+l+m] * Y[l*l+l+m](g), negative.";
 
 static json_t *lungs(const export_source *source) {
   json_t *array = json_array();
@@ -135,11 +134,11 @@ json_t *supine_export_glb_extras(const export_source *source, const export_glb_o
   } else {
     (void)json_object_set_new(supine, "breathScale", json_real(options->breath.scale));
   }
-  if (source->info->resting_volume != NULL) {
-    (void)json_object_set_new(supine, "restingVolume",
-                              json_pack("{s:s, s:o, s:f}", "text", resting_text, "harmonics",
-                                        supine_export_glb_numbers(source->info->resting_volume, 9),
-                                        "scan", source->info->scan_volume));
+  if (source->info->has_rest) {
+    (void)json_object_set_new(
+        supine, "restingVolume",
+        json_pack("{s:s, s:o}", "text", resting_text, "harmonics",
+                  supine_export_glb_numbers(source->resting, EXPORT_RESTING_TERMS)));
   }
   if (source->info->has_volume && count <= FORMS_MAX &&
       json_object_set_new(supine, "volume",

@@ -211,7 +211,7 @@ static json_t *describe(const page *p) {
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
       (json_int_t)info->band, "lungBegin", lungs, "hasVolume", (int)info->has_volume, "hasResting",
-      (int)(p->source->resting != NULL), "colours", colours(), "breathVolume", breath->volume,
+      (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
       "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
       title != NULL ? title : json_string("lungs"), "units", numbers(p->unit, info->mode_count),
       "inside", describe_inside(p));
@@ -235,7 +235,7 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   if (s->info->normal_count > 0) {
     write_normals(file, s);
   }
-  if (s->resting != NULL) {
+  if (s->info->has_rest) {
     write_tensor(file, "resting", s->resting, EXPORT_RESTING_TERMS * sizeof *s->resting);
   }
   if (s->info->has_volume) {

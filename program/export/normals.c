@@ -158,7 +158,7 @@ supine_status supine_export_targets_normals(const export_source *source,
     added[i] = 0;
   }
   for (size_t p = 0; p < POSES; ++p) {
-    supine_deform(source->basis, pose[p].basis, pose[p].scale, xyz);
+    supine_deform(source->basis, &pose[p].basis, xyz);
     supine_normals(source->basis, xyz, normals);
     add_pose(targets, a, p, n, base, normals, added);
   }

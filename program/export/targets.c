@@ -54,18 +54,13 @@ supine_status supine_export_targets_at(const export_source *source, const export
                                        const export_targets *targets, const double g[3],
                                        double fraction, export_pose *pose, supine_error *error) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
-  double scale = 0;
-  (void)supine_basis_weights(source->basis, g, pose->basis); /* a direction that is legal */
   const supine_status status =
-      supine_export_breath_scale(source, breath, g, pose->basis, fraction, &scale, error);
+      supine_export_breath_pose(source, breath, g, fraction, &pose->basis, error);
   if (status != SUPINE_OK) {
-    scale = 0;
-  }
-  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-    pose->scale[lung] = scale;
+    supine_pose_fill(&pose->basis, 0);
   }
   (void)supine_sh_evaluate(source->info->band, g, y);
-  supine_export_targets_weights(targets, source->terms, y, scale, pose->weights);
+  supine_export_targets_weights(targets, source->terms, y, pose->basis.gains[0][0], pose->weights);
   return status;
 }
 

@@ -36,8 +36,7 @@ void supine_export_targets_weights(const export_targets *targets, size_t terms, 
 
 /** The lungs at a fraction of the breath. */
 typedef struct export_pose {
-  double basis[SUPINE_MODES_MAX];   /**< the basis' weights */
-  double scale[SUPINE_LUNGS_MAX];   /**< the breath scale, for each lung */
+  supine_pose basis;                /**< the basis' */
   double weights[SUPINE_MODES_MAX]; /**< the targets' */
 } export_pose;
 

@@ -118,7 +118,7 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   }
 }
 
-static void place_node(const supine_image *nodes, size_t i, double place[3]) {
+void supine_field_place(const supine_image *nodes, size_t i, double place[3]) {
   const double at[3] = {(double)(i % nodes->size[0]), (double)(i / nodes->size[0] % nodes->size[1]),
                         (double)(i / nodes->size[0] / nodes->size[1])};
   for (int k = 0; k < 3; ++k) {
@@ -127,9 +127,8 @@ static void place_node(const supine_image *nodes, size_t i, double place[3]) {
   }
 }
 
-supine_status supine_field_create(const supine_basis *basis, const double *weights,
-                                  const double *scales, double fade, supine_field *field,
-                                  supine_error *error) {
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+                                  supine_field *field, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
   supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
@@ -150,10 +149,10 @@ supine_status supine_field_create(const supine_basis *basis, const double *weigh
         supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
     supine_field_free(&made);
   } else {
-    supine_displace_range(basis, weights, scales, 0, n, moved);
+    supine_displace_range(basis, pose, 0, n, moved);
     for (size_t i = 0; i < n; ++i) { /* from the scan's node, which full inflation may have moved */
       double node[3];
-      place_node(&made.nodes, part[i], node);
+      supine_field_place(&made.nodes, part[i], node);
       for (size_t k = 0; k < 3; ++k) {
         u[3 * (size_t)part[i] + k] =
             (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);

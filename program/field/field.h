@@ -16,15 +16,17 @@ typedef struct supine_field {
   unsigned char *inside; /**< of each node: 1 inside a lung at rest, else 0 */
 } supine_field;
 
-/** The field of a basis's grid at some weights and scales. Outside the lungs, beyond the nodes that
+/** The field of a basis's grid in a pose, from the scan. Outside the lungs, beyond the nodes that
  * the basis has, it fades out to 0 over `fade` mm: smooth to look at, but it means nothing there.
  * @param field  written; release with supine_field_free
  * @retval SUPINE_ERROR_FORMAT  the basis is of no grid, or its grid is malformed
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_field_create(const supine_basis *basis, const double *weights,
-                                  const double *scales, double fade, supine_field *field,
-                                  supine_error *error);
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+                                  supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);
+
+/** Where node i of a grid is, mm. */
+void supine_field_place(const supine_image *nodes, size_t i, double place[3]);
 
 /** u at any point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);

@@ -3,26 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include <supine/posture.h>
+#include <supine/state.h>
 
 #include "program/options/orientation.h"
-
-static int unknown_posture(const char *command, const char *name) {
-  enum { NAMES_MAX = 32 };
-  const char *names[NAMES_MAX];
-  const size_t count = supine_posture_count() < NAMES_MAX ? supine_posture_count() : NAMES_MAX;
-  for (size_t i = 0; i < count; ++i) {
-    names[i] = supine_posture_name(i);
-  }
-  const char *nearest = supine_options_suggest(name, names, count);
-  if (nearest != NULL) {
-    return supine_options_usage(command, "no posture '%s'; did you mean '%s'?", name, nearest);
-  }
-  return supine_options_usage(command,
-                              "no posture '%s': there are supine, prone, left, right, upright, "
-                              "inverted and the DICOM patient positions",
-                              name);
-}
 
 /* Makes a direction of a vector of any length, which it returns; 0 where it has none. */
 static double make_unit(double g[3]) {
@@ -38,36 +21,14 @@ static double make_unit(double g[3]) {
   return largest * sqrt(square);
 }
 
-/* "supine+15", "prone-20"; untouched where it is none. */
-static bool parse_tilted(const char *name, double gravity[3]) {
-  const char *sign = name + strcspn(name, "+-");
-  char front[SUPINE_POSTURE_NAME_MAX];
-  double degrees = 0.0;
-  double level[3];
-  (void)snprintf(front, sizeof front, "%.*s", (int)(sign - name), name);
-  return supine_options_parse_number(sign, &degrees) &&
-         supine_posture_gravity(front, level) == SUPINE_OK &&
-         supine_posture_tilt(level, degrees, gravity) == SUPINE_OK;
-}
-
 int supine_options_posture(const char *command, const char *text, double gravity[3]) {
-  if (supine_posture_gravity(text, gravity) == SUPINE_OK || parse_tilted(text, gravity)) {
-    return SUPINE_EXIT_OK;
+  supine_state state;
+  supine_error error;
+  if (supine_state_parse_posture(text, &state, &error) != SUPINE_OK) {
+    return supine_options_usage(command, "%s", error.message);
   }
-  if (strchr(text, ':') == NULL) {
-    return unknown_posture(command, text);
-  }
-  char commas[SUPINE_POSTURE_NAME_MAX];
-  (void)snprintf(commas, sizeof commas, "%s", text);
-  for (char *c = commas; *c != '\0'; ++c) {
-    *c = (char)(*c == ':' ? ',' : *c);
-  }
-  if (!supine_options_parse_numbers(commas, 3, gravity)) {
-    return supine_options_usage(command, "'%s': gravity is three finite numbers, X:Y:Z", text);
-  }
-  return make_unit(gravity) > 0.0
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(command, "gravity 0:0:0 has no direction; supine is 0:1:0");
+  memcpy(gravity, state.gravity, sizeof state.gravity);
+  return SUPINE_EXIT_OK;
 }
 
 static int read_posture(const char *command, const char *value, void *field) {

@@ -27,7 +27,7 @@ static void load_state(supine_renderer *r, const supine_scene *scene) {
   const size_t n = r->info->vertex_count;
   float *xyz = r->scratch;
   float *normals = r->scratch + 3 * n;
-  supine_deform(r->basis, scene->weights, scene->scales, xyz);
+  supine_deform(r->basis, scene->pose, xyz);
   supine_normals(r->basis, xyz, normals);
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[2]);
   glBufferSubData(GL_ARRAY_BUFFER, 0, (GLsizeiptr)(3 * n * sizeof *normals), normals);
@@ -99,7 +99,7 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   size_t first;
   size_t last;
   shown_lungs(r, scene, &first, &last);
-  supine_deform(r->basis, scene->weights, scene->scales, r->scratch);
+  supine_deform(r->basis, scene->pose, r->scratch);
   for (size_t i = r->info->lung_begin[first]; i < r->info->lung_begin[last]; ++i) {
     double p[3] = {0, 0, 0};
     for (size_t row = 0; row < 3; ++row) {
@@ -169,19 +169,20 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 }
 
 static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {
-  float weights[SUPINE_LUNGS_MAX * SUPINE_GL_MODES] = {0};
+  float weights[SUPINE_GL_MODES] = {1};
+  float gains[3 * SUPINE_LUNGS_MAX];
   size_t begin;
   size_t end;
   shown_lungs(r, scene, &begin, &end);
-  if (r->packed) {
-    (void)supine_gl_weights(r->basis, scene->weights, scene->scales, weights);
-  } else {
-    for (size_t lung = 0; lung < r->weight_count; ++lung) {
-      weights[4 * lung] = 1;
-    }
+  for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
+    gains[i] = 1;
   }
-  glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), (GLsizei)r->weight_count,
+  if (r->packed) {
+    (void)supine_gl_weights(r->basis, scene->pose, weights, gains);
+  }
+  glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), (GLsizei)r->vector_count,
                weights);
+  glUniform3fv(glGetUniformLocation(r->program, "supine_gains"), (GLsizei)r->lung_count, gains);
   glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[end] - r->index_begin[begin])),
                  GL_UNSIGNED_INT,
                  (const void *)(uintptr_t)(3 * r->index_begin[begin] * sizeof(uint32_t)));

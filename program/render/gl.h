@@ -31,7 +31,7 @@ enum {
   ATTRIBUTE_COUNT
 };
 
-/* Compiles and links, for `lungs` whose weights are `vectors` vec4s each (supine.glsl); 0 after
+/* Compiles and links, for `lungs` and weights of `vectors` vec4s (supine.glsl); 0 after
  * filling `error`. */
 GLuint supine_render_gl_program(size_t lungs, size_t vectors, supine_error *error);
 
@@ -44,7 +44,8 @@ struct supine_renderer {
   GLuint buffer[4]; /* vertices; displacements, where not packed; normals, values; triangles */
   GLuint colours[SUPINE_COLOURS_COUNT];
   bool packed; /* the basis has at most 16 modes and one direction a vertex: the GPU displaces */
-  size_t weight_count; /* vec4s of supine_weights: of two lungs at least, see load_vertices */
+  size_t vector_count; /* vec4s of supine_weights */
+  size_t lung_count;   /* vec3s of supine_gains: two at least, see load_vertices */
   size_t index_begin[SUPINE_LUNGS_MAX + 1]; /* triangles of each lung */
   float *scratch;                           /* [N, 7]: positions, normals, values */
 };

@@ -19,9 +19,9 @@ void main() {
   vec4 c[4] = vec4[4](c0, c1, c2, c3);
   float amount = 0.0;
   for (int i = 0; i < SUPINE_VECTORS; ++i) {
-    amount += supine_amount(rest, i, c[i]);
+    amount += dot(supine_weights[i], c[i]);
   }
-  vec3 p = view * (rest.xyz + amount * direction - centre);
+  vec3 p = view * (supine_place(rest, direction, amount) - centre);
   float w = depth.x - p.z;
   float near = depth.x - depth.y;
   float far = depth.x + depth.y;

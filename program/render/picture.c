@@ -223,8 +223,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
                            const double *extent, supine_error *error) {
-  const supine_scene scene = {.weights = panel->weights,
-                              .scales = panel->scales,
+  const supine_scene scene = {.pose = panel->pose,
                               .value = panel->value,
                               .largest = bar->largest,
                               .line_step = bar->step,
@@ -355,9 +354,7 @@ static layout make_layout(const supine_picture *picture) {
 static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
                   double extent[4]) {
   for (size_t column = 0; column < picture->panel_count; ++column) {
-    const supine_scene scene = {.weights = picture->panel[column].weights,
-                                .scales = picture->panel[column].scales,
-                                .view = picture->view[row]};
+    const supine_scene scene = {.pose = picture->panel[column].pose, .view = picture->view[row]};
     supine_render_extent(renderer, &scene, extent);
   }
 }

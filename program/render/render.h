@@ -58,11 +58,10 @@ void supine_render_destroy(supine_renderer *renderer);
 
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
-  const double *weights; /**< [K] */
-  const double *scales;  /**< [G] */
-  const float *value;    /**< [N] what colours show, mm */
-  double largest;        /**< value at the end of the colours, > 0 */
-  double line_step;      /**< thin lines at multiples of this; 0: none */
+  const supine_pose *pose;
+  const float *value; /**< [N] what colours show, mm */
+  double largest;     /**< value at the end of the colours, > 0 */
+  double line_step;   /**< thin lines at multiples of this; 0: none */
   supine_colours colours;
   supine_view view;
   bool one_lung; /**< draw `lung` alone */
@@ -115,8 +114,7 @@ typedef struct supine_panel {
   const char *title;
   const char *subtitle;
   double gravity[3];
-  const double *weights;
-  const double *scales;
+  const supine_pose *pose;
   const float *value;
   const supine_marks *marks; /**< drawn over the lungs; or NULL */
 } supine_panel;

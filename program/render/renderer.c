@@ -51,7 +51,7 @@ static void group_triangles(supine_renderer *r, uint32_t *grouped) {
 static supine_status load_vertices(supine_renderer *r, supine_error *error) {
   const size_t n = r->info->vertex_count;
   glBindBuffer(GL_ARRAY_BUFFER, r->buffer[0]);
-  if (!r->packed) { /* without w, which reads 1: one weight serves both lungs */
+  if (!r->packed) { /* without w, which reads 1: one gain serves both lungs */
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof(float)), r->info->vertices,
                  GL_STATIC_DRAW);
     attribute(ATTRIBUTE_REST, 3, 3, 0);
@@ -123,7 +123,8 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
   }
   const size_t lungs = r->info->lung_count < 2 ? 2 : r->info->lung_count;
   const size_t vectors = r->packed ? (r->info->mode_count + 3) / 4 : 1;
-  r->weight_count = lungs * vectors;
+  r->vector_count = vectors;
+  r->lung_count = lungs;
   r->program = supine_render_gl_program(lungs, vectors, error);
   status = r->program != 0 ? load_surface(r, error) : SUPINE_ERROR_UNSUPPORTED;
   if (status == SUPINE_OK) {

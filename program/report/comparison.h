@@ -8,14 +8,14 @@
 #include <supine/compare.h>
 
 #include "program/options/posture_list.h"
+#include "program/options/state.h"
 
 enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
 
-/* One posture at the inflation. */
+/* One posture at the volume. */
 typedef struct supine_compared_posture {
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  supine_distance_statistics displacement;   /* from the file's surface */
+  supine_pose pose;
+  supine_distance_statistics displacement;   /* from the comparison's reference */
   double volume[SUPINE_LUNGS_MAX];           /* mL that each lung holds, tissue included; closed */
   double gain[SUPINE_LUNGS_MAX];             /* mL that each takes of the breath; closed */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
@@ -26,9 +26,12 @@ typedef struct supine_comparison {
   const char *command; /* that compares, for what it says */
   bool allow_folds;
   const supine_basis *basis;
-  supine_inflation inflation;
-  double breath; /* mL, on top of the inflation where rest is known; else it is the breath */
+  supine_state state; /* its volume is that of every posture */
+  double rms;         /* mm, instead of the volume where above 0 */
+  supine_from from;
+  double breath; /* mL, on top of the volume */
   supine_posture_list postures;
+  supine_reference_pose reference; /* what displacements count from */
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
   supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
@@ -40,11 +43,8 @@ typedef struct supine_comparison {
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
 void supine_report_free(supine_comparison *comparison);
 
-/* "rest", "rest +300 mL", "500 mL" or "5 mm RMS displacement". */
-void supine_report_inflation(const supine_comparison *comparison, char *text, size_t size);
-
-/* Whether the basis knows what rest is: then the inflation is a state, and breaths begin there. */
-bool supine_report_knows_rest(const supine_comparison *comparison);
+/* "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
+void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
 /* What all lungs together take of the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);

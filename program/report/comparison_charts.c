@@ -2,6 +2,7 @@
 /* Charts of the HTML report: where their lines and dots go, in page/profile.html and page/map.html.
  */
 #include <math.h>
+#include <string.h>
 
 #include "program/render/render.h"
 #include "program/report/comparison_parts.h"
@@ -79,24 +80,19 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", share));
 }
 
-/* RMS distance from supine in mm, or NaN where the inflation cannot be reached. */
+/* RMS distance from supine in mm, or NaN where the volume cannot be reached. */
 static double from_supine(const supine_comparison *c, const double g[3]) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  double weights[2][SUPINE_MODES_MAX];
-  double scales[2][SUPINE_LUNGS_MAX];
   const double *direction[2] = {supine, g};
+  supine_pose pose[2];
   for (int side = 0; side < 2; ++side) {
-    double scale = 0.0;
-    if (supine_basis_weights(c->basis, direction[side], weights[side]) != SUPINE_OK ||
-        supine_compare_scale(c->compare, &c->inflation, direction[side], weights[side], &scale,
-                             NULL) != SUPINE_OK) {
+    supine_state state = c->state;
+    memcpy(state.gravity, direction[side], sizeof state.gravity);
+    if (supine_compare_pose(c->compare, &state, c->rms, &pose[side], NULL) != SUPINE_OK) {
       return NAN;
     }
-    for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-      scales[side][lung] = scale;
-    }
   }
-  return supine_compare_rms(c->compare, weights[0], scales[0], weights[1], scales[1]);
+  return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
 /* The map of page/map.html. */

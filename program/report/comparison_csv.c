@@ -23,10 +23,8 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   row(file, "gravity", name, "", "left", g[0] + 0.0, "1");
   row(file, "gravity", name, "", "posterior", g[1] + 0.0, "1");
   row(file, "gravity", name, "", "head", g[2] + 0.0, "1");
-  row(file, "scale", name, "", "", posture->scales[0], "1");
-  const char *surface = supine_report_knows_rest(c) ? "full inflation" : "rest";
-  const char *before = supine_report_knows_rest(c) ? "before the breath" : "rest";
-  statistics(file, "displacement", name, surface, &posture->displacement);
+  static const char before[] = "before the breath";
+  statistics(file, "displacement", name, c->reference.name, &posture->displacement);
   if (!supine_basis_get_info(c->basis)->has_volume) {
     return;
   }
@@ -71,12 +69,13 @@ static void vertices_row(const supine_comparison *c, FILE *file) {
 }
 
 void supine_report_csv(const supine_comparison *c, FILE *file) {
-  const char *const kinds[] = {[SUPINE_INFLATION_REST] = "above rest",
-                               [SUPINE_INFLATION_VOLUME] =
-                                   supine_report_knows_rest(c) ? "above full" : "above the surface",
-                               [SUPINE_INFLATION_RMS] = "RMS displacement"};
   const size_t count = c->postures.count;
-  (void)fputs("quantity,posture,other,part,value,unit\n", file);
+  char volume[160];
+  supine_report_volume(c, volume, sizeof volume);
+  (void)fprintf(file,
+                "# postures %s; displacement from %s, mm\n"
+                "quantity,posture,other,part,value,unit\n",
+                volume, c->reference.name);
   for (size_t i = 0; i < count; ++i) {
     posture_rows(c, i, file);
   }
@@ -96,6 +95,7 @@ void supine_report_csv(const supine_comparison *c, FILE *file) {
   row(file, "directions", "all", "", "", (double)e->directions, "1");
   row(file, "area", "rest", "", "", supine_compare_area(c->compare), "mm2");
   vertices_row(c, file);
-  row(file, "inflation", "all", "", kinds[c->inflation.kind], c->inflation.amount,
-      c->inflation.kind == SUPINE_INFLATION_RMS ? "mm" : "mL");
+  if (c->rms > 0.0) {
+    row(file, "rms displacement", "all", "", "", c->rms, "mm");
+  }
 }

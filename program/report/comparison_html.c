@@ -151,17 +151,17 @@ static void write_command(const supine_comparison *c, const char *file, char *co
   if (to == NULL) {
     return;
   }
-  const double amount = c->inflation.amount;
+  char state[160];
+  (void)supine_state_print(&c->state, state, sizeof state);
   (void)fprintf(to, "supine compare %s ", file);
-  if (c->inflation.kind == SUPINE_INFLATION_RMS) {
-    (void)fprintf(to, "--rms %.9g", amount);
-  } else if (c->inflation.kind == SUPINE_INFLATION_REST || supine_report_knows_rest(c)) {
-    (void)fprintf(to, "--volume %s", c->inflation.kind == SUPINE_INFLATION_REST ? "rest" : "full");
-    if (amount != 0.0) {
-      (void)fprintf(to, "%+.9g", amount);
-    }
-  } else {
-    (void)fprintf(to, "--volume %.9g", amount);
+  if (c->rms > 0.0) {
+    (void)fprintf(to, "--rms %.9g", c->rms);
+  } else if (strchr(state, ':') != NULL) { /* after the posture, supine */
+    (void)fprintf(to, "--volume %s", strchr(state, ':') + 1);
+  }
+  if (c->from.given) {
+    (void)supine_state_print(&c->from.state, state, sizeof state);
+    (void)fprintf(to, " --from %s", state);
   }
   (void)fprintf(to, "%s --breath %.9g --postures ", c->allow_folds ? " --allow-folds" : "",
                 c->breath);
@@ -200,28 +200,27 @@ static json_t *facts(const supine_comparison *c) {
   if (file == NULL) { /* it is no UTF-8 */
     file = json_string("a basis");
   }
-  char inflation[64];
-  supine_report_inflation(c, inflation, sizeof inflation);
+  char volume[160];
+  supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);
   return json_pack(
       "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
       "file", file, "provenance", list, "date", date(), "count",
-      json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
-      "inflation", inflation, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
-      "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
-      SUPINE_VERSION, "directions", (json_int_t)e->directions, "most_a",
-      supine_report_direction(e->pair[0]), "most_b", supine_report_direction(e->pair[1]),
-      "most_rms", json_sprintf("%.2f", e->pair_rms), "farthest",
-      supine_report_direction(e->farthest), "farthest_rms", json_sprintf("%.2f", e->farthest_rms),
-      "constant", percent(c->constant), "odd", percent(c->odd), "even", percent(c->even));
+      json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
+      volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
+      json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
+      "directions", (json_int_t)e->directions, "most_a", supine_report_direction(e->pair[0]),
+      "most_b", supine_report_direction(e->pair[1]), "most_rms", json_sprintf("%.2f", e->pair_rms),
+      "farthest", supine_report_direction(e->farthest), "farthest_rms",
+      json_sprintf("%.2f", e->farthest_rms), "constant", percent(c->constant), "odd",
+      percent(c->odd), "even", percent(c->even));
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
   json_t *data = facts(c);
   (void)json_object_set_new(data, "postures", postures(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
-  (void)json_object_set_new(data, "surface",
-                            json_string(supine_report_knows_rest(c) ? "full inflation" : "rest"));
+  (void)json_object_set_new(data, "surface", json_string(c->reference.name));
   (void)json_object_set_new(data, "map", supine_report_map(c));
   (void)json_object_set_new(data, "map_bar",
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,

@@ -44,9 +44,9 @@ static json_t *postures(const supine_comparison *c) {
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_posture_item *item = &c->postures.item[i];
-    json_t *posture = json_pack("{s:s, s:o, s:f, s:o}", "name", item->name, "gravity",
-                                direction(item->gravity), "scale", c->posture[i].scales[0],
-                                "displacement_mm", statistics(&c->posture[i].displacement));
+    json_t *posture =
+        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->gravity),
+                  "displacement_mm", statistics(&c->posture[i].displacement));
     if (supine_basis_get_info(c->basis)->has_volume) {
       (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
       (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
@@ -71,13 +71,12 @@ static json_t *pairs(const supine_comparison *c) {
 
 bool supine_report_json(const supine_comparison *c, FILE *file) {
   const supine_extremes *e = &c->extremes;
-  const char *kind = c->inflation.kind == SUPINE_INFLATION_REST     ? "rest_plus_ml"
-                     : c->inflation.kind == SUPINE_INFLATION_VOLUME ? "volume_ml"
-                                                                    : "rms_mm";
+  char volume[160];
+  supine_report_volume(c, volume, sizeof volume);
   json_t *root =
-      json_pack("{s:s, s:{s:s, s:f}, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
+      json_pack("{s:s, s:s, s:s, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
                 "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
-                "file", c->path, "inflation", "kind", kind, "amount", c->inflation.amount,
+                "file", c->path, "volume", volume, "displacement_from", c->reference.name,
                 "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                 supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
                 "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",

@@ -36,8 +36,7 @@ static size_t choose_looks(const supine_comparison *c, look *looks) {
 }
 
 static supine_scene make_scene(const supine_comparison *c, const look *from, size_t posture) {
-  return (supine_scene){.weights = c->posture[posture].weights,
-                        .scales = c->posture[posture].scales,
+  return (supine_scene){.pose = &c->posture[posture].pose,
                         .view = from->view,
                         .one_lung = from->one_lung,
                         .lung = from->lung,
@@ -103,7 +102,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, co
   unsigned char *png = NULL;
   size_t size = 0;
   supine_scene scene = make_scene(c, from, posture);
-  supine_compare_distances(c->compare, shown->weights, shown->scales, NULL, NULL, value);
+  supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
   scene.value = value;
   scene.largest = largest;
   scene.line_step = supine_render_bar_step(largest);
@@ -161,9 +160,9 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
       goto cleanup;
     }
   }
-  char words[128];
+  char words[192];
   (void)snprintf(words, sizeof words, "displacement from %s, mm; lines at the ticks%s",
-                 supine_report_knows_rest(c) ? "full inflation" : "rest",
+                 c->reference.name,
                  most > largest ? "; the last colour also shows what lies beyond" : "");
   pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));

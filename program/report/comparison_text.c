@@ -21,8 +21,7 @@ static void print_statistics(const supine_distance_statistics *d, FILE *file) {
 
 static void print_postures(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
-  (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s",
-                supine_report_knows_rest(c) ? "full inflation" : "rest",
+  (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s", c->reference.name,
                 info->has_volume ? ", and what each lung holds, mL" : "", width, "posture", "mean",
                 "RMS", "95 %", "largest");
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
@@ -108,9 +107,9 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   const supine_extremes *e = &c->extremes;
   const int width = widest_name(c);
-  char inflation[64];
-  supine_report_inflation(c, inflation, sizeof inflation);
-  (void)fprintf(file, "%s at %s: %zu vertices, %.0f cm2\n", c->path, inflation, info->vertex_count,
+  char volume[160];
+  supine_report_volume(c, volume, sizeof volume);
+  (void)fprintf(file, "%s, %s: %zu vertices, %.0f cm2\n", c->path, volume, info->vertex_count,
                 supine_compare_area(c->compare) / 100.0);
   print_postures(c, width, file);
   if (c->postures.count > 1) {

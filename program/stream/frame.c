@@ -107,7 +107,7 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   for (size_t begin = 0; begin < count && !frame->placed; begin += PIECE) {
     const size_t end = begin + PIECE < count ? begin + PIECE : count;
     unsigned char *bytes = frame->points + 12 * begin;
-    supine_deform_range(f->basis, frame->moment.weights, frame->moment.scales, begin, end, xyz);
+    supine_deform_range(f->basis, &frame->moment.pose, begin, end, xyz);
     supine_stream_put_points(end - begin, xyz, f->ras, bytes);
     crc = supine_stream_crc64(crc, bytes, 12 * (end - begin));
   }
@@ -118,14 +118,15 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   return true;
 }
 
-/* Weights and scales, as floats of the wire; returns their bytes. */
+/* Put weights and gains as floats of the wire; returns their bytes. */
 static size_t put_weights(const supine_stream_frames *f, const supine_stream_moment *moment,
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;
-  const size_t count = modes + f->info->lung_count;
+  const size_t count = modes + 3 * f->info->lung_count;
   const size_t head = supine_stream_ndarray_head(count, bytes);
   for (size_t i = 0; i < count; ++i) {
-    const float value = (float)(i < modes ? moment->weights[i] : moment->scales[i - modes]);
+    const float value = (float)(i < modes ? moment->pose.weights[i]
+                                          : moment->pose.gains[(i - modes) / 3][(i - modes) % 3]);
     uint32_t word;
     memcpy(&word, &value, sizeof word);
     supine_stream_put32(bytes + head + 4 * i, word);

@@ -2,8 +2,8 @@
 /** @file
  * Frames: a moment of the lungs as messages, made once and sent to any number of peers.
  *
- * A weights frame is an NDARRAY of K + G floats: the K weights and the breath scale of each lung. A
- * surface frame is a POLYDATA. Its triangles never change: they are made into strips once, their
+ * A weights frame is an NDARRAY of K + 3 G floats: the K weights and the gains x, y, z of each
+ * lung. A surface frame is a POLYDATA. Its triangles never change: they are made into strips once, their
  * checksum is known, and every frame's checksum is joined from the points' and theirs. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
@@ -29,12 +29,11 @@ const char *supine_stream_what_name(supine_stream_what what);
 /** A moment. */
 typedef struct supine_stream_moment {
   double gravity[3]; /**< unit */
-  double volume;     /**< mL relative to the reference */
-  double above;      /**< mL above the posture's rest */
+  double volume;     /**< mL of all lungs together, gas and tissue */
+  double above;      /**< mL above the posture's rest, or the scan where no rest is known */
   uint64_t stamp;    /**< of the pose, as in headers */
   double received;   /**< when the pose came, s of supine_clock_seconds; < 0: no pose did */
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
+  supine_pose pose;
 } supine_stream_moment;
 
 /** A frame that peers share. */
@@ -69,7 +68,7 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
 enum {
   SUPINE_STREAM_PIECES = 4,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + SUPINE_STREAM_EXTENSION + 40 +
-                        4 * (SUPINE_MODES_MAX + SUPINE_LUNGS_MAX) + SUPINE_STREAM_METADATA
+                        4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX) + SUPINE_STREAM_METADATA
 };
 
 /** A message on its way: pieces, the first of them in `front`. */

@@ -99,7 +99,8 @@ void supine_stream_patient_hear(supine_stream_patient *patient,
     break;
   case SUPINE_STREAM_VOLUME:
     if (isfinite(message->number[0])) {
-      *volume = (supine_stream_volume){.fixed = message->number[0]};
+      *volume =
+          (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, message->number[0]}}};
       patient->fresh = true;
     } else {
       supine_stream_patient_warn(patient, received, "a volume is refused: it is not finite");
@@ -137,37 +138,51 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
+static double held(const supine_basis *basis, const supine_pose *pose) {
+  double volumes[SUPINE_LUNGS_MAX];
+  double sum = 0.0;
+  supine_basis_volumes(basis, pose, volumes);
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    sum += volumes[lung];
+  }
+  return sum;
+}
+
+/* The gains of the moment's state, or the last that could be had; volumes follow from them. */
+static void find_gains(supine_stream_patient *patient, double now, supine_stream_moment *moment) {
+  const supine_basis *basis = patient->basis;
+  const supine_state state = supine_stream_volume_at(patient->options->volume, basis,
+                                                     moment->gravity, now - patient->begun);
+  const supine_state rest = supine_breath_state(basis, moment->gravity, 0.0);
+  supine_error error;
+  if (supine_basis_gains(basis, &rest, &moment->pose, NULL) == SUPINE_OK) {
+    moment->above = -held(basis, &moment->pose);
+  }
+  if (supine_basis_gains(basis, &state, &moment->pose, &error) == SUPINE_OK) {
+    memcpy(patient->gains, moment->pose.gains, sizeof patient->gains);
+  } else {
+    char text[96];
+    ++patient->counts->unreachable;
+    (void)supine_state_describe(&state, text, sizeof text);
+    supine_stream_patient_warn(patient, now, "%s cannot be shown: %s", text, error.message);
+  }
+  memcpy(moment->pose.gains, patient->gains, sizeof patient->gains);
+  moment->volume = held(basis, &moment->pose);
+  moment->above += moment->volume;
+}
+
 void supine_stream_patient_moment(supine_stream_patient *patient, double now,
                                   supine_stream_moment *moment) {
-  const supine_basis *basis = patient->basis;
-  const supine_basis_info *info = supine_basis_get_info(basis);
   const double left =
       supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed),
                                    patient->options->smooth, patient->smooth);
+  *moment = (supine_stream_moment){0};
   patient->smoothed = now;
   patient->turning = left > 1e-6; /* a thousandth of a millimetre where a metre turns */
   memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
-  moment->volume = supine_stream_volume_at(patient->options->volume, basis, moment->gravity,
-                                           now - patient->begun);
-  double resting = 0.0;
-  (void)supine_basis_resting_volume(basis, moment->gravity,
-                                    &resting); /* a unit direction has one */
-  moment->above = moment->volume - resting;
   moment->received = patient->fresh ? patient->received : -1.0;
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
-  (void)supine_basis_weights(basis, moment->gravity, moment->weights);
-  double scale = 0.0;
-  if (info->has_volume &&
-      supine_basis_scale(basis, moment->weights, moment->volume, &scale, NULL) == SUPINE_OK) {
-    for (size_t j = 0; j < info->lung_count; ++j) {
-      patient->scales[j] = scale;
-    }
-  } else {
-    ++patient->counts->unreachable;
-    supine_stream_patient_warn(patient, now,
-                               "no breath of %.0f mL in this posture: the surface would fold",
-                               moment->volume);
-  }
-  memcpy(moment->scales, patient->scales, sizeof moment->scales);
+  (void)supine_basis_weights(patient->basis, moment->gravity, moment->pose.weights);
+  find_gains(patient, now, moment);
   patient->fresh = false;
 }

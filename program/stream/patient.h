@@ -11,19 +11,19 @@ typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
-  double begun;                    /* s of the clock */
-  bool posed;                      /* some pose has come */
-  bool fresh;                      /* and was not shown yet */
-  double first;                    /* s of the clock, of the first pose: where a record begins */
-  double received;                 /* s of the clock, of the newest */
-  uint64_t stamp;                  /* the newest's; 0: none */
-  double gravity[3];               /* the newest's */
-  double smooth[3];                /* as shown */
-  double smoothed;                 /* s of the clock, when `smooth` was worked out */
-  bool turning;                    /* `smooth` is not there yet */
-  double warned;                   /* s of the clock, of the last warning */
-  uint64_t unsaid;                 /* warnings since then */
-  double scales[SUPINE_LUNGS_MAX]; /* the last that a volume gave */
+  double begun;                      /* s of the clock */
+  bool posed;                        /* some pose has come */
+  bool fresh;                        /* and was not shown yet */
+  double first;                      /* s of the clock, of the first pose: where a record begins */
+  double received;                   /* s of the clock, of the newest */
+  uint64_t stamp;                    /* the newest's; 0: none */
+  double gravity[3];                 /* the newest's */
+  double smooth[3];                  /* as shown */
+  double smoothed;                   /* s of the clock, when `smooth` was worked out */
+  bool turning;                      /* `smooth` is not there yet */
+  double warned;                     /* s of the clock, of the last warning */
+  uint64_t unsaid;                   /* warnings since then */
+  double gains[SUPINE_LUNGS_MAX][3]; /* the last that a volume gave */
 } supine_stream_patient;
 
 /* Supine until a pose comes. */

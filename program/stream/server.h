@@ -21,7 +21,7 @@ typedef struct supine_stream_counts {
   uint64_t malformed; /**< messages with a wrong checksum or contradicting lengths */
   uint64_t skipped;   /**< messages of other types */
   uint64_t
-      unreachable; /**< frames whose volume would fold the surface: the last one's scale stayed */
+      unreachable; /**< frames whose volume would fold the surface: the last one's gains stayed */
   uint64_t frames;
   uint64_t sent;        /**< frames, over all peers */
   uint64_t peers;       /**< that came, in all */

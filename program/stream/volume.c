@@ -26,37 +26,26 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
 
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error) {
-  const bool rest = strncmp(text, "rest", 4) == 0;
-  const bool full = strcmp(text, "full") == 0;
-  const char *number = rest ? text + 4 : text;
-  double value = 0.0;
-  bool good = full || (rest && *number == '\0');
-  if (!good && *number != '\0' && (!rest || *number == '+' || *number == '-')) {
-    char *end = NULL;
-    value = strtod(number, &end);
-    good = end != number && *end == '\0' && isfinite(value);
+  supine_state state = {.gravity = {0.0, 1.0, 0.0}};
+  const supine_status status = supine_state_parse_volume(text, &state, error);
+  if (status == SUPINE_OK) {
+    volume->breathes = false;
+    volume->fixed = state;
   }
-  if (!good) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a volume is rest, full, rest+ML, or mL from the reference, not '%s'",
-                            text);
-  }
-  volume->breathes = false;
-  volume->absolute = !rest;
-  volume->fixed = value;
-  return SUPINE_OK;
+  return status;
 }
 
-double supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
-                               const double gravity[3], double time) {
-  double rest = 0.0;
-  (void)supine_basis_resting_volume(basis, gravity, &rest); /* fails for no unit direction */
+supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
+                                     const double gravity[3], double time) {
   if (!volume->breathes) {
-    return volume->absolute ? volume->fixed : rest + volume->fixed;
+    supine_state state = volume->fixed;
+    memcpy(state.gravity, gravity, sizeof state.gravity);
+    return state;
   }
   const double turns = time / volume->period;
   const double at = (turns - floor(turns)) * SUPINE_STREAM_BREATH_SAMPLES;
   const size_t i = (size_t)fmin(at, SUPINE_STREAM_BREATH_SAMPLES - 1);
   const double t = at - (double)i;
-  return rest + (1.0 - t) * volume->breath[i] + t * volume->breath[i + 1];
+  return supine_breath_state(basis, gravity,
+                             (1.0 - t) * volume->breath[i] + t * volume->breath[i + 1]);
 }

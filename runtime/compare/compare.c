@@ -70,21 +70,17 @@ static void add_row(const float *c, double weight, size_t count, double *gram) {
   }
 }
 
-static void find_gram(supine_compare *compare, size_t lung) {
+static void find_gram(supine_compare *compare, size_t lung, size_t axis) {
   const supine_basis *basis = compare->basis;
   const size_t count = basis->info.mode_count;
-  double *gram = compare->gram + lung * count * count;
+  double *gram = compare->gram + (3 * lung + axis) * count * count;
   for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
     const double share = (double)compare->share[i];
     if (basis->info.vector) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        add_row(basis->info.coefficients + (3 * i + axis) * count, share, count, gram);
-      }
+      add_row(basis->info.coefficients + (3 * i + axis) * count, share, count, gram);
     } else {
-      const float *d = basis->info.direction + 3 * i;
-      const double square =
-          (double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2];
-      add_row(basis->info.coefficients + i * count, share * square, count, gram);
+      const double d = (double)basis->info.direction[3 * i + axis];
+      add_row(basis->info.coefficients + i * count, share * d * d, count, gram);
     }
   }
   for (size_t k = 0; k < count; ++k) {
@@ -108,7 +104,7 @@ supine_status supine_compare_create(const supine_basis *basis, supine_compare **
   }
   made->basis = basis;
   made->share = calloc(info->vertex_count, sizeof *made->share);
-  made->gram = calloc(info->lung_count * square, sizeof *made->gram);
+  made->gram = calloc(3 * info->lung_count * square, sizeof *made->gram);
   made->sum = calloc(square, sizeof *made->sum);
   if (made->share == NULL || made->gram == NULL || made->sum == NULL) {
     (void)supine_error_set(error, status, "out of memory");
@@ -118,8 +114,8 @@ supine_status supine_compare_create(const supine_basis *basis, supine_compare **
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    find_gram(made, lung);
+  for (size_t i = 0; i < 3 * info->lung_count; ++i) {
+    find_gram(made, i / 3, i % 3);
   }
   *compare = made;
   made = NULL;
@@ -153,47 +149,49 @@ double supine_compare_product(const double *gram, const double *q, const double 
   return sum;
 }
 
-supine_status supine_compare_scale(const supine_compare *compare, const supine_inflation *inflation,
-                                   const double gravity[3], const double *weights, double *scale,
-                                   supine_error *error) {
-  double rest = 0;
-  switch (inflation->kind) {
-  case SUPINE_INFLATION_REST:
-    if (supine_basis_resting_volume(compare->basis, gravity, &rest) != SUPINE_OK) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
-    } /* fall through */
-  case SUPINE_INFLATION_VOLUME:
-    return supine_basis_scale(compare->basis, weights, rest + inflation->amount, scale, error);
-  case SUPINE_INFLATION_SCALE:
-    *scale = inflation->amount;
-    return SUPINE_OK;
-  case SUPINE_INFLATION_RMS:
-    break;
+void supine_compare_state(const supine_compare *compare, const supine_pose *pose,
+                          const supine_pose *from, double *q) {
+  for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
+    for (size_t k = 0; k < compare->basis->info.mode_count; ++k) {
+      *q++ = pose->gains[i / 3][i % 3] * pose->weights[k] -
+             (from == NULL ? 0 : from->gains[i / 3][i % 3] * from->weights[k]);
+    }
   }
-  const double square =
-      supine_compare_product(compare->sum, weights, weights, compare->basis->info.mode_count);
-  if (!(square > 0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "nothing moves in this direction: no scale gives %g mm",
-                            inflation->amount);
-  }
-  *scale = inflation->amount / sqrt(square);
-  return SUPINE_OK;
 }
 
-double supine_compare_rms(const supine_compare *compare, const double *weights_a,
-                          const double *scales_a, const double *weights_b, const double *scales_b) {
+double supine_compare_square(const supine_compare *compare, const double *q) {
   const size_t count = compare->basis->info.mode_count;
   double square = 0;
-  for (size_t lung = 0; lung < compare->basis->info.lung_count; ++lung) {
-    double q[SUPINE_MODES_MAX];
-    for (size_t k = 0; k < count; ++k) {
-      q[k] =
-          scales_a[lung] * weights_a[k] - (weights_b == NULL ? 0 : scales_b[lung] * weights_b[k]);
-    }
-    square += supine_compare_product(compare->gram + lung * count * count, q, q, count);
+  for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
+    square += supine_compare_product(compare->gram + i * count * count, q + i * count,
+                                     q + i * count, count);
   }
-  return sqrt(fmax(square, 0));
+  return square;
+}
+
+double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
+                          const supine_pose *from) {
+  double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
+  supine_compare_state(compare, pose, from, q);
+  return sqrt(fmax(supine_compare_square(compare, q), 0));
+}
+
+supine_status supine_compare_pose(const supine_compare *compare, const supine_state *state,
+                                  double rms, supine_pose *pose, supine_error *error) {
+  if (!(rms > 0)) {
+    return supine_basis_pose(compare->basis, state, pose, error);
+  }
+  if (supine_basis_weights(compare->basis, state->gravity, pose->weights) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+  }
+  supine_pose_fill(pose, 1);
+  const double one = supine_compare_rms(compare, pose, NULL);
+  if (!(one > 0)) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "nothing moves in this direction: no gain gives %g mm", rms);
+  }
+  supine_pose_fill(pose, rms / one);
+  return SUPINE_OK;
 }
 
 void supine_compare_energy(const supine_compare *compare, double *energy) {

@@ -16,34 +16,31 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* |u_i| of the field with weights q. */
+/* |u_i| of the field with weights q [3, K]. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
   if (basis->info.vector) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      u[axis] = dot(q, basis->info.coefficients + (3 * i + axis) * count, count);
+      u[axis] = dot(q + axis * count, basis->info.coefficients + (3 * i + axis) * count, count);
     }
     return supine_length(u);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = (double)basis->info.direction[3 * i + axis];
+    u[axis] = dot(q + axis * count, basis->info.coefficients + i * count, count) *
+              (double)basis->info.direction[3 * i + axis];
   }
-  return fabs(dot(q, basis->info.coefficients + i * count, count)) * supine_length(u);
+  return supine_length(u);
 }
 
-void supine_compare_distances(const supine_compare *compare, const double *weights_a,
-                              const double *scales_a, const double *weights_b,
-                              const double *scales_b, float *distance) {
+void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
+                              const supine_pose *from, float *distance) {
   const supine_basis *basis = compare->basis;
+  double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
+  supine_compare_state(compare, pose, from, q);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    double q[SUPINE_MODES_MAX];
-    for (size_t k = 0; k < basis->info.mode_count; ++k) {
-      q[k] =
-          scales_a[lung] * weights_a[k] - (weights_b == NULL ? 0 : scales_b[lung] * weights_b[k]);
-    }
     for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
-      distance[i] = (float)displacement(basis, q, i);
+      distance[i] = (float)displacement(basis, q + 3 * lung * basis->info.mode_count, i);
     }
   }
 }

@@ -12,9 +12,16 @@ struct supine_compare {
   const supine_basis *basis;
   double area;  /**< mm^2 */
   float *share; /**< [N] a_i: each vertex's share of the area */
-  double *gram; /**< [G, K, K], mm^2 */
-  double *sum;  /**< [K, K] the lungs' Gram matrices together */
+  double *gram; /**< [G, 3, K, K] of each axis, mm^2 */
+  double *sum;  /**< [K, K] all of them together */
 };
+
+/** Squared RMS distance of the displacement q [G, 3, K] = gains x weights from 0, mm^2. */
+double supine_compare_square(const supine_compare *compare, const double *q);
+
+/** q [G, 3, K] of a pose; less that of `from` where it is not NULL. */
+void supine_compare_state(const supine_compare *compare, const supine_pose *pose,
+                          const supine_pose *from, double *q);
 
 /** q^T G p of K weights each. */
 double supine_compare_product(const double *gram, const double *q, const double *p, size_t count);

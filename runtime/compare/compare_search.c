@@ -10,17 +10,22 @@
 
 static const double last_step = 1e-6; /* rad */
 
-enum { DIRECTIONS_MAX = 16384, MOVES_MAX = 4096 };
+enum {
+  DIRECTIONS_MAX = 16384,
+  MOVES_MAX = 4096,
+  STATE_MAX = 3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX
+};
 
 typedef struct search {
   const supine_compare *compare;
-  const supine_inflation *inflation;
-  size_t count;           /* K */
-  size_t reached;         /* directions that reach the inflation */
-  double (*direction)[3]; /* [reached] */
-  double *state;          /* [reached, K] q = s w */
-  double *product;        /* [reached, K] G q */
-  double *square;         /* [reached] q^T G q */
+  const supine_state *from; /* its volume */
+  double rms;                /* mm, or 0 */
+  size_t count;              /* 3 G K */
+  size_t reached;            /* directions that reach the volume */
+  double (*direction)[3];    /* [reached] */
+  double *state;             /* [reached, 3 G K] q = gains x weights */
+  double *product;           /* [reached, 3 G K] G q */
+  double *square;            /* [reached] q^T G q */
 } search;
 
 static void normalise(double v[3]) {
@@ -34,28 +39,38 @@ static void normalise(double v[3]) {
   v[2] = z / length;
 }
 
-/* q = s w of a direction. */
+/* q of a direction. */
 static supine_status state_of(const search *s, const double direction[3], double *q,
                               supine_error *error) {
-  double scale = 0;
-  supine_status status = supine_basis_weights(s->compare->basis, direction, q);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "gravity has no direction");
-  }
-  status = supine_compare_scale(s->compare, s->inflation, direction, q, &scale, error);
-  for (size_t k = 0; k < s->count; ++k) {
-    q[k] *= scale;
+  supine_pose pose;
+  supine_state state = *s->from;
+  memcpy(state.gravity, direction, sizeof state.gravity);
+  const supine_status status = supine_compare_pose(s->compare, &state, s->rms, &pose, error);
+  if (status == SUPINE_OK) {
+    supine_compare_state(s->compare, &pose, NULL, q);
   }
   return status;
 }
 
 /* Squared distance between two states, by their difference: exact where they are near. */
 static double apart(const search *s, const double *a, const double *b) {
-  double q[SUPINE_MODES_MAX];
+  double q[STATE_MAX];
   for (size_t k = 0; k < s->count; ++k) {
     q[k] = a[k] - b[k];
   }
-  return supine_compare_product(s->compare->sum, q, q, s->count);
+  return supine_compare_square(s->compare, q);
+}
+
+/* product = G q, matrix by matrix. */
+static void multiply(const search *s, const double *q, double *product) {
+  const size_t modes = s->compare->basis->info.mode_count;
+  for (size_t row = 0; row < s->count; ++row) {
+    const size_t begin = row / modes * modes;
+    product[row] = 0;
+    for (size_t l = 0; l < modes; ++l) {
+      product[row] += s->compare->gram[row * modes + l] * q[begin + l];
+    }
+  }
 }
 
 /* States of the spiral's directions, and of `from` last. */
@@ -78,18 +93,15 @@ static supine_status sample(search *s, const double from[3], size_t directions,
     }
     double *product = s->product + s->reached * s->count;
     double square = 0;
+    multiply(s, q, product);
     for (size_t k = 0; k < s->count; ++k) {
-      product[k] = 0;
-      for (size_t l = 0; l < s->count; ++l) {
-        product[k] += s->compare->sum[k * s->count + l] * q[l];
-      }
       square += q[k] * product[k];
     }
     s->square[s->reached++] = square;
   }
   return s->reached >= 2 ? SUPINE_OK
                          : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                            "no other direction reaches this inflation");
+                                            "no other direction reaches this volume");
 }
 
 /* |q_i - q_j|^2 in the Gram metric. */
@@ -125,8 +137,8 @@ static void turned(const double direction[3], int move, double step, double resu
 
 /* Moves `movable` of two directions (the first, or both) while that takes their states apart. */
 static double refine(const search *s, double direction[2][3], int movable, double step) {
-  double q[2][SUPINE_MODES_MAX];
-  (void)state_of(s, direction[0], q[0], NULL); /* both reached the inflation before */
+  double q[2][STATE_MAX];
+  (void)state_of(s, direction[0], q[0], NULL); /* both reached the volume before */
   (void)state_of(s, direction[1], q[1], NULL);
   double best = apart(s, q[0], q[1]);
   for (int moves = 0; moves < MOVES_MAX && step > last_step;) {
@@ -134,7 +146,7 @@ static double refine(const search *s, double direction[2][3], int movable, doubl
     for (int which = 0; which < movable; ++which) {
       for (int move = 0; move < 4; ++move, ++moves) {
         double tried[3];
-        double state[SUPINE_MODES_MAX];
+        double state[STATE_MAX];
         turned(direction[which], move, step, tried);
         if (state_of(s, tried, state, NULL) != SUPINE_OK) {
           continue;
@@ -186,21 +198,23 @@ static void find(const search *s, size_t directions, supine_extremes *extremes) 
   extremes->directions = s->reached - 1;
 }
 
-supine_status supine_compare_search(const supine_compare *compare,
-                                    const supine_inflation *inflation, const double from[3],
-                                    size_t directions, supine_extremes *extremes,
+supine_status supine_compare_search(const supine_compare *compare, const supine_state *from,
+                                    double rms, size_t directions, supine_extremes *extremes,
                                     supine_error *error) {
   if (directions < 2 || directions > DIRECTIONS_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu directions: 2 to %d", directions,
                             (int)DIRECTIONS_MAX);
   }
-  double start[3] = {from[0], from[1], from[2]};
+  double start[3] = {from->gravity[0], from->gravity[1], from->gravity[2]};
   if (!isfinite(start[0]) || !isfinite(start[1]) || !isfinite(start[2]) ||
       (start[0] == 0 && start[1] == 0 && start[2] == 0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
   }
   normalise(start);
-  search s = {.compare = compare, .inflation = inflation, .count = compare->basis->info.mode_count};
+  search s = {.compare = compare,
+              .from = from,
+              .rms = rms,
+              .count = 3 * compare->basis->info.lung_count * compare->basis->info.mode_count};
   const size_t n = directions + 1;
   s.direction = calloc(n, sizeof *s.direction);
   s.state = calloc(n * s.count, sizeof *s.state);

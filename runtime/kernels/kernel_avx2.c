@@ -165,8 +165,21 @@ INLINE void normalise(__m256 *x, __m256 *y, __m256 *z) {
   *z = _mm256_mul_ps(*z, inverse);
 }
 
+/* The gains x y z x y z ... of eight numbers at a time. */
+INLINE triples spread_gains(const float *g) {
+  triples t;
+  for (size_t j = 0; j < 6; ++j) {
+    const float *a = g + 2 * j % 3; /* 8 j mod 3 */
+    const float *b = g + (2 * j + 1) % 3;
+    const float *c = g + (2 * j + 2) % 3;
+    t.v[j] = _mm256_setr_ps(*a, *b, *c, *a, *b, *c, *a, *b);
+  }
+  return t;
+}
+
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
-                           bool with_rest, supine_storage storage, bool vector) {
+                           const triples *gain, bool with_rest, supine_storage storage,
+                           bool vector) {
   const bool compact = supine_tiles_compact(storage);
   triples result;
   if (vector) {
@@ -178,13 +191,20 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
     if (with_rest) {
       const triples rest = rest_positions(tiles, tile, compact);
       for (size_t j = 0; j < 6; ++j) {
-        result.v[j] = _mm256_add_ps(result.v[j], rest.v[j]);
+        result.v[j] = _mm256_fmadd_ps(result.v[j], gain->v[j], rest.v[j]);
       }
+      return result;
+    }
+    for (size_t j = 0; j < 6; ++j) {
+      result.v[j] = _mm256_mul_ps(result.v[j], gain->v[j]);
     }
     return result;
   }
   const triples amount = spread_amount(dot(tile, w, tiles->modes, storage));
-  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  triples direction = numbers(tile + tiles->direction_begin, compact);
+  for (size_t j = 0; j < 6; ++j) {
+    direction.v[j] = _mm256_mul_ps(direction.v[j], gain->v[j]);
+  }
   if (with_rest) {
     const triples rest = rest_positions(tiles, tile, compact);
     for (size_t j = 0; j < 6; ++j) {
@@ -214,9 +234,10 @@ INLINE void put_separate(const triples *t, const supine_target *target, size_t a
 INLINE void deform_kind(const supine_tiles *tiles, const float *weights, size_t first, size_t count,
                         const supine_target *target, supine_storage storage, bool vector) {
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  const triples gain = spread_gains(weights + tiles->modes);
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    const triples xyz = deform_tile(tiles, tile, weights, target->rest, storage, vector);
+    const triples xyz = deform_tile(tiles, tile, weights, &gain, target->rest, storage, vector);
     if (target->y != NULL) {
       put_separate(&xyz, target, t * TILE);
       continue;

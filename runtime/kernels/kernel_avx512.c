@@ -201,8 +201,20 @@ INLINE void normalise(__m512 *x, __m512 *y, __m512 *z) {
   *z = _mm512_mul_ps(*z, inverse);
 }
 
+/* The gains x y z x y z ... of 16 numbers at a time. */
+INLINE triples spread_gains(const float *g) {
+  const __m512i lane = _mm512_setr_epi32(0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0);
+  const __m512 x = _mm512_setr_ps(g[0], g[1], g[2], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+  const __m512 y = _mm512_setr_ps(g[1], g[2], g[0], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+  const __m512 z = _mm512_setr_ps(g[2], g[0], g[1], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+  return (triples){{_mm512_permutexvar_ps(lane, x), _mm512_permutexvar_ps(lane, y),
+                    _mm512_permutexvar_ps(lane, z)}};
+}
+
+/* Eight parameters: constants of the instance and what stays in registers. */
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights16 *w,
-                           bool with_rest, size_t known, supine_storage storage, bool vector) {
+                           const triples *gain, bool with_rest, size_t known,
+                           supine_storage storage, bool vector) {
   const size_t modes = known > 0 ? known : tiles->modes;
   const bool common = known > 0;
   const bool compact = supine_tiles_compact(storage);
@@ -214,13 +226,20 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
     if (with_rest) {
       const triples rest = rest_positions(tiles, tile, compact);
       for (size_t j = 0; j < 3; ++j) {
-        result.v[j] = _mm512_add_ps(result.v[j], rest.v[j]);
+        result.v[j] = _mm512_fmadd_ps(result.v[j], gain->v[j], rest.v[j]);
       }
+      return result;
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      result.v[j] = _mm512_mul_ps(result.v[j], gain->v[j]);
     }
     return result;
   }
   const triples amount = spread_amount(dot(tile, w, modes, common, storage));
-  const triples direction = numbers(tile + tiles->direction_begin, compact);
+  triples direction = numbers(tile + tiles->direction_begin, compact);
+  for (size_t j = 0; j < 3; ++j) {
+    direction.v[j] = _mm512_mul_ps(direction.v[j], gain->v[j]);
+  }
   if (with_rest) {
     const triples rest = rest_positions(tiles, tile, compact);
     for (size_t j = 0; j < 3; ++j) {
@@ -251,6 +270,7 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
   const unsigned char *tile = tiles->bytes + first * tiles->stride;
   writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
                    writer_open(target->z, target)}; /* joined: the first alone */
+  const triples gain = spread_gains(weights + tiles->modes);
   weights16 w = {.at = weights};
   if (f.modes > 0) {
     UNROLL for (size_t k = 0; k < f.modes; ++k) {
@@ -259,7 +279,7 @@ INLINE void deform_all(const supine_tiles *any, const float *weights, size_t fir
   }
   for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
     supine_prefetch_tile(tile, tiles->stride, target->prefetch);
-    triples xyz = deform_tile(tiles, tile, &w, f.rest, f.modes, f.storage, f.vector);
+    triples xyz = deform_tile(tiles, tile, &w, &gain, f.rest, f.modes, f.storage, f.vector);
     if (f.joined) {
       writer_put(&out[0], xyz.v[0]);
       writer_put(&out[0], xyz.v[1]);

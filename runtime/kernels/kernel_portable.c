@@ -76,6 +76,7 @@ static void normalise(float v[3][TILE]) {
 
 static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, const float *w,
                         bool rest, float *xyz) {
+  const float *gain = w + tiles->modes;
   float amount[3][TILE] = {{0}};
   float p[TILE_NUMBERS] = {0};
   for (size_t axis = 0; axis < tiles->axes; ++axis) {
@@ -87,7 +88,7 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
   if (tiles->axes == 3) {
     for (size_t v = 0; v < TILE; ++v) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        xyz[3 * v + axis] = p[3 * v + axis] + amount[axis][v];
+        xyz[3 * v + axis] = p[3 * v + axis] + gain[axis] * amount[axis][v];
       }
     }
   } else {
@@ -95,7 +96,7 @@ static void deform_tile(const supine_tiles *tiles, const unsigned char *tile, co
     widen_numbers(tile + tiles->direction_begin, supine_tiles_compact(tiles->storage), d);
     for (size_t v = 0; v < TILE; ++v) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        xyz[3 * v + axis] = p[3 * v + axis] + amount[0][v] * d[3 * v + axis];
+        xyz[3 * v + axis] = p[3 * v + axis] + amount[0][v] * (gain[axis] * d[3 * v + axis]);
       }
     }
   }

@@ -125,8 +125,8 @@ typedef struct supine_target {
   bool continued; /**< leave such numbers for a run after this one */
 } supine_target;
 
-/** Evaluates whole tiles first <= t < first + count, of one lung, from folded weights (see
- * supine_fold), into the first 16 count vertices of the target. */
+/** Evaluates whole tiles first <= t < first + count, of one lung, from folded weights and gains
+ * (see supine_fold), into the first 16 count vertices of the target. */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 

@@ -23,8 +23,7 @@ static double random_number(uint64_t *state) {
 /* Ten thousand pairs of the same 200 directions: by the Gram matrix, and a few by the vertices. */
 static int time_pairs(const supine_basis *basis, const supine_compare *compare, double *gram,
                       double *direct) {
-  static double weights[DIRECTIONS][SUPINE_MODES_MAX];
-  static double scales[DIRECTIONS][SUPINE_LUNGS_MAX];
+  static supine_pose poses[DIRECTIONS];
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   uint64_t state = 2008;
   float *distance = malloc(n * sizeof *distance);
@@ -34,25 +33,20 @@ static int time_pairs(const supine_basis *basis, const supine_compare *compare, 
   const double start = supine_clock_seconds();
   for (int i = 0; i < DIRECTIONS; ++i) {
     const double g[3] = {random_number(&state), random_number(&state), 0.1 + random_number(&state)};
-    const supine_inflation inflation = {SUPINE_INFLATION_RMS, 5};
-    (void)supine_basis_weights(basis, g, weights[i]);
-    (void)supine_compare_scale(compare, &inflation, g, weights[i], &scales[i][0], NULL);
-    for (int lung = 1; lung < SUPINE_LUNGS_MAX; ++lung) {
-      scales[i][lung] = scales[i][0];
-    }
+    const supine_state posture = {.gravity = {g[0], g[1], g[2]}};
+    (void)supine_compare_pose(compare, &posture, 5, &poses[i], NULL);
   }
   double sum = 0;
   for (int pair = 0; pair < PAIRS; ++pair) {
     const int a = pair % DIRECTIONS;
     const int b = (7 * pair + pair / DIRECTIONS + 1) % DIRECTIONS;
-    sum += supine_compare_rms(compare, weights[a], scales[a], weights[b], scales[b]);
+    sum += supine_compare_rms(compare, &poses[a], &poses[b]);
   }
   *gram = supine_clock_seconds() - start;
   const double middle = supine_clock_seconds();
   for (int pair = 0; pair < PASSES; ++pair) {
     supine_distance_statistics statistics;
-    supine_compare_distances(compare, weights[pair], scales[pair], weights[pair + 1],
-                             scales[pair + 1], distance);
+    supine_compare_distances(compare, &poses[pair], &poses[pair + 1], distance);
     supine_compare_statistics(compare, distance, &statistics);
     sum += statistics.rms;
   }
@@ -72,7 +66,7 @@ int main(int argc, char **argv) {
     return 1;
   }
   for (int repeat = 0; repeat < REPEATS; ++repeat) {
-    supine_comparison comparison = {.path = argv[1], .inflation = {SUPINE_INFLATION_VOLUME, 500}};
+    supine_comparison comparison = {.path = argv[1], .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_SCAN, 500}}};
     supine_basis *basis = NULL;
     const double start = supine_clock_seconds();
     if (supine_basis_open(argv[1], &basis, &error) != SUPINE_OK) {

@@ -13,6 +13,8 @@
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 
+#include "tests/poses.h"
+
 enum {
   TILE = 16,
   TILE_NUMBERS = 48, /* vertices that the evaluator takes at once */
@@ -73,22 +75,22 @@ static void task_run(void *context) {
 static void range_deform(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   (void)thread;
-  supine_deform_range(t->basis, t->work->weights, t->work->scales, begin, end,
+  supine_deform_range(t->basis, POSED(t->basis, t->work->weights, t->work->scales), begin, end,
                       t->work->xyz + 3 * begin);
 }
 
 static void range_normals(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   (void)thread;
-  (void)supine_deform_lit_range(t->basis, t->work->weights, t->work->scales, begin, end, NULL,
-                                t->work->c + 3 * begin);
+  (void)supine_deform_lit_range(t->basis, POSED(t->basis, t->work->weights, t->work->scales), begin,
+                                end, NULL, t->work->c + 3 * begin);
 }
 
 static void range_lit(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   (void)thread;
-  (void)supine_deform_lit_range(t->basis, t->work->weights, t->work->scales, begin, end,
-                                t->work->xyz + 3 * begin, t->work->c + 3 * begin);
+  (void)supine_deform_lit_range(t->basis, POSED(t->basis, t->work->weights, t->work->scales), begin,
+                                end, t->work->xyz + 3 * begin, t->work->c + 3 * begin);
 }
 
 /* Of one thread: it knows no ranges. */
@@ -104,7 +106,7 @@ static void range_separate(void *context, size_t begin, size_t end, size_t threa
   const task *t = context;
   const size_t n = t->work->image.vertices;
   (void)thread;
-  supine_deform_separate(t->basis, t->work->weights, t->work->scales, begin, end,
+  supine_deform_separate(t->basis, POSED(t->basis, t->work->weights, t->work->scales), begin, end,
                          t->work->xyz + begin, t->work->xyz + n + begin,
                          t->work->xyz + 2 * n + begin);
 }
@@ -118,7 +120,8 @@ static void range_step(void *context, size_t begin, size_t end, size_t thread) {
 static void range_batch(void *context, size_t begin, size_t end, size_t thread) {
   const task *t = context;
   (void)thread;
-  supine_deform_batch(t->basis, BATCH, t->work->weights, t->work->scales, begin, end,
+  supine_deform_batch(t->basis, BATCH,
+                      posed_batch(t->basis, BATCH, t->work->weights, t->work->scales), begin, end,
                       t->work->batch + 3 * BATCH * begin); /* a part of its own each thread */
 }
 
@@ -356,7 +359,8 @@ static supine_status check_same(bench *work, supine_error *error) {
     double apart = 0.0;
     double moved = 0.0;
     if (work->bases[storage] != NULL) {
-      supine_deform(work->bases[storage], work->weights, work->scales, work->xyz);
+      supine_deform(work->bases[storage], POSED(work->bases[storage], work->weights, work->scales),
+                    work->xyz);
       for (size_t i = 0; i < numbers; ++i) {
         apart = fmax(apart, fabs((double)work->xyz[i] - (double)work->a[i]));
         moved = fmax(moved, fabs((double)work->a[i] - (double)m->rest[i]));

@@ -7,6 +7,8 @@
 
 #include <supine/runtime.h>
 
+#include "tests/poses.h"
+
 static bool write_positions(const supine_basis *basis, const double gravity[3], double depth,
                             float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -14,13 +16,13 @@ static bool write_positions(const supine_basis *basis, const double gravity[3], 
   double scales[SUPINE_LUNGS_MAX];
   double scale = depth;
   if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK ||
-      (info->has_volume && supine_basis_scale(basis, weights, depth, &scale, NULL) != SUPINE_OK)) {
+      (info->has_volume && posed_scale(basis, weights, depth, &scale, NULL) != SUPINE_OK)) {
     return false;
   }
   for (size_t j = 0; j < info->lung_count; ++j) {
     scales[j] = scale;
   }
-  supine_deform(basis, weights, scales, xyz);
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
   return fwrite(&scale, sizeof scale, 1, stdout) == 1 &&
          fwrite(xyz, 3 * sizeof *xyz, info->vertex_count, stdout) == info->vertex_count;
 }

@@ -13,6 +13,8 @@
 
 #include "fuzz.h"
 
+#include "tests/poses.h"
+
 /* Most numbers that an input is evaluated for: a small file may promise many modes. */
 enum { VERTICES_MOST = 4096 };
 
@@ -29,14 +31,14 @@ static void evaluate(const supine_basis *basis) {
   for (size_t k = 0; k < info->mode_count; ++k) {
     supine_fuzz_expect(isfinite(weights[k]), "a finite weight");
   }
-  if (info->has_volume && supine_basis_scale(basis, weights, 500.0, &scale, NULL) == SUPINE_OK) {
+  if (info->has_volume && posed_scale(basis, weights, 500.0, &scale, NULL) == SUPINE_OK) {
     supine_fuzz_expect(isfinite(scale), "a finite scale");
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     scales[lung] = 1.0;
   }
   const size_t count = info->vertex_count < VERTICES_MOST ? info->vertex_count : VERTICES_MOST;
-  supine_deform_range(basis, weights, scales, 0, count, xyz);
+  supine_deform_range(basis, POSED(basis, weights, scales), 0, count, xyz);
   for (size_t i = 0; i < 3 * count; ++i) {
     supine_fuzz_expect(!isnan(xyz[i]), "a position that is a number");
   }

@@ -13,6 +13,8 @@
 #include <supine/posture.h>
 #include <supine/runtime.h>
 
+#include "tests/poses.h"
+
 static int write_out(const supine_basis *basis, const double *weights, const double *scales,
                      const char *path, float *xyz, float *normals) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -25,8 +27,9 @@ static int write_out(const supine_basis *basis, const double *weights, const dou
   if (out == NULL) {
     return 2;
   }
-  const bool lit = supine_deform_lit(basis, weights, scales, xyz, normals) == SUPINE_OK;
-  supine_deform(basis, weights, scales, xyz);
+  const bool lit =
+      supine_deform_lit(basis, POSED(basis, weights, scales), xyz, normals) == SUPINE_OK;
+  supine_deform(basis, POSED(basis, weights, scales), xyz);
   (void)fwrite(xyz, sizeof *xyz, n, out);
   (void)fwrite(normals, sizeof *xyz, lit ? n : 0, out);
   supine_normals(basis, xyz, normals);
@@ -37,7 +40,7 @@ static int write_out(const supine_basis *basis, const double *weights, const dou
       many_scales[i * lungs + lung] = i == 0 ? scales[lung] : -0.5 * scales[lung];
     }
   }
-  supine_deform_batch(basis, 2, many, many_scales, 0, n / 3, xyz);
+  supine_deform_batch(basis, 2, posed_batch(basis, 2, many, many_scales), 0, n / 3, xyz);
   (void)fwrite(xyz, sizeof *xyz, 2 * n, out);
   return fclose(out) == 0 ? 0 : 2;
 }
@@ -69,7 +72,7 @@ int main(int argc, char **argv) {
   } else if (result == 0) {
     const clock_t begin = clock();
     for (int i = 0; i < CALLS; ++i) {
-      supine_deform(basis, weights, scales, xyz);
+      supine_deform(basis, POSED(basis, weights, scales), xyz);
     }
     (void)printf("%.9f\n", (double)(clock() - begin) / CLOCKS_PER_SEC / CALLS);
   }

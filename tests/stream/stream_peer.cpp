@@ -68,39 +68,30 @@ template <class Pointer> static void receive(Pointer message, const char *type) 
   expect(false, "the answer comes");
 }
 
-struct State {
-  std::vector<double> weights;
-  std::vector<double> scales;
-};
-
-static State state_of(const supine_basis *basis, const double gravity[3], double above) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  State state{std::vector<double>(info->mode_count), std::vector<double>(info->lung_count)};
-  double scale = 0.0;
-  double resting = 0.0;
-  expect(supine_basis_resting_volume(basis, gravity, &resting) == SUPINE_OK, "a resting volume");
-  expect(supine_basis_weights(basis, gravity, state.weights.data()) == SUPINE_OK, "weights");
-  expect(supine_basis_scale(basis, state.weights.data(), resting + above, &scale, nullptr) ==
-             SUPINE_OK,
-         "a scale");
-  for (double &s : state.scales) {
-    s = scale;
-  }
-  return state;
+static supine_pose pose_of(const supine_basis *basis, const double gravity[3], double above) {
+  supine_state state = {};
+  supine_pose pose;
+  supine_error error;
+  std::copy_n(gravity, 3, state.gravity);
+  state.volume = {SUPINE_VOLUME_REST, above};
+  expect(supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK, "a pose");
+  return pose;
 }
 
-static void expect_weights(const State &state) {
+static void expect_weights(const supine_basis *basis, const supine_pose &pose) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   igtl::NDArrayMessage::Pointer message = igtl::NDArrayMessage::New();
   receive(message, "NDARRAY");
   expect(message->GetType() == igtl::NDArrayMessage::TYPE_FLOAT32, "32-bit floats");
-  const size_t modes = state.weights.size();
-  expect(message->GetArray()->GetSize().size() == 1 &&
-             message->GetArray()->GetSize()[0] == modes + state.scales.size(),
-         "K + G numbers");
+  const size_t modes = info->mode_count;
+  const size_t count = modes + 3 * info->lung_count;
+  expect(message->GetArray()->GetSize().size() == 1 && message->GetArray()->GetSize()[0] == count,
+         "K + 3 G numbers");
   const float *value = static_cast<const float *>(message->GetArray()->GetRawArray());
-  for (size_t i = 0; i < modes + state.scales.size(); ++i) {
-    const double wanted = i < modes ? state.weights[i] : state.scales[i - modes];
-    expect(std::fabs(value[i] - wanted) <= 1e-6 * std::fabs(wanted) + 1e-6, "weights and scales");
+  for (size_t i = 0; i < count; ++i) {
+    const double wanted =
+        i < modes ? pose.weights[i] : pose.gains[(i - modes) / 3][(i - modes) % 3];
+    expect(std::fabs(value[i] - wanted) <= 1e-6 * std::fabs(wanted) + 1e-6, "weights and gains");
   }
 }
 
@@ -113,14 +104,14 @@ static Triangle face(uint32_t a, uint32_t b, uint32_t c) {
   return t;
 }
 
-static void expect_surface(const supine_basis *basis, const State &state) {
+static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   igtl::PolyDataMessage::Pointer message = igtl::PolyDataMessage::New();
   receive(message, "POLYDATA");
   expect(message->GetPoints()->GetNumberOfPoints() == static_cast<int>(info->vertex_count),
          "every vertex");
   std::vector<float> xyz(3 * info->vertex_count);
-  supine_deform(basis, state.weights.data(), state.scales.data(), xyz.data());
+  supine_deform(basis, &pose, xyz.data());
   float moved = 0.0f;
   for (unsigned i = 0; i < info->vertex_count; ++i) {
     float point[3];
@@ -190,7 +181,7 @@ int main(int count, char **word) {
   for (const Lie &lie : lies) {
     send_transform(lie);
     expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
-    expect_weights(state_of(basis, gravity, 400.0));
+    expect_weights(basis, pose_of(basis, gravity, 400.0));
   }
   // Quaternions: a body that stands, laid back by 90 degrees about its left-right axis: supine.
   const double supine[3] = {0, 1, 0};
@@ -200,7 +191,7 @@ int main(int count, char **word) {
   position->SetPosition(1, 2, 3);
   position->SetQuaternion(-half, 0, 0, half);
   send(position, "Patient");
-  expect_weights(state_of(basis, supine, 400.0));
+  expect_weights(basis, pose_of(basis, supine, 400.0));
   igtl::QuaternionTrackingDataMessage::Pointer tracked = igtl::QuaternionTrackingDataMessage::New();
   for (int i = 0; i < 2; ++i) { // the probe, then the patient: prone
     igtl::QuaternionTrackingDataElement::Pointer element =
@@ -213,7 +204,7 @@ int main(int count, char **word) {
   }
   send(tracked, "Tracker");
   const double prone[3] = {0, -1, 0};
-  expect_weights(state_of(basis, prone, 400.0));
+  expect_weights(basis, pose_of(basis, prone, 400.0));
   // An accelerometer at rest shows upwards.
   igtl::SensorMessage::Pointer sensor = igtl::SensorMessage::New();
   igtlFloat64 up[3] = {-9.81, 0, 0};
@@ -221,14 +212,20 @@ int main(int count, char **word) {
   sensor->SetValue(up);
   send(sensor, "Patient");
   const double left[3] = {1, 0, 0};
-  expect_weights(state_of(basis, left, 400.0));
-  // Another volume, then surfaces.
+  expect_weights(basis, pose_of(basis, left, 400.0));
+  // Other volumes; what a number alone counts from is not said, and it changes nothing.
+  for (const char *text : {"rest+500", "500"}) {
+    say("VOLUME", text);
+    send_transform(lies[1]);
+    expect_weights(basis, pose_of(basis, prone, 500.0));
+  }
+  // Surfaces.
   say("VOLUME", "rest+250");
   say("SEND", "surface");
   for (const Lie &lie : lies) {
     send_transform(lie);
     expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
-    expect_surface(basis, state_of(basis, gravity, 250.0));
+    expect_surface(basis, pose_of(basis, gravity, 250.0));
   }
   peer->CloseSocket();
   supine_basis_close(basis);

@@ -27,7 +27,16 @@
 #include "sh/base/clock.h"
 #include "tests/runtime_fixture.h"
 
-enum { VERTICES = 6000, MODES = 6, LUNGS = 2 };
+#include "tests/poses.h"
+
+enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
+
+/* Rest is 20 mL above the reference surface, and 8 more for gravity along y: harmonics by hand. */
+static const double resting[9] = {20.0 / 0.2820947917738781, 8.0 / 0.4886025119029199};
+
+static double resting_in(const double gravity[3]) {
+  return 20.0 + 8.0 * gravity[1];
+}
 
 /* A server in a thread of its own. */
 typedef struct stage {
@@ -74,9 +83,10 @@ static stage *stage_create(void) {
     }
     mode[0] = s->made->linear[k] + s->made->linear[MODES + k] > 0.0 ? 3.0 : -3.0;
   }
+  s->made->resting = resting;
   s->bytes = fixture_bytes(s->made, &size);
   assert_int_equal(supine_basis_open_memory(s->bytes, size, &s->basis, &error), SUPINE_OK);
-  s->volume = (supine_stream_volume){.fixed = 30.0};
+  s->volume = (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, 30.0}}};
   s->options = (supine_stream_options){.listen = "0",
                                        .name = "SUPINE",
                                        .setup = supine_stream_setup_default(),
@@ -254,19 +264,32 @@ static float float_at(const unsigned char *bytes) {
   return value;
 }
 
-/* Weights and scales of a direction and a volume, as they must come. */
-static void expect_weights(const stage *s, const double gravity[3], double volume,
-                           const unsigned char *content) {
-  double weights[MODES];
-  double scale = 0.0;
-  assert_int_equal(supine_basis_weights(s->basis, gravity, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_scale(s->basis, weights, volume, &scale, NULL), SUPINE_OK);
-  const unsigned char head[4] = {10, 1, 0, MODES + LUNGS};
+static void expect_pose(const supine_pose *pose, const unsigned char *content) {
+  const unsigned char head[4] = {10, 1, 0, FLOATS};
   assert_memory_equal(content, head, 4);
-  for (int i = 0; i < MODES + LUNGS; ++i) {
-    const double wanted = i < MODES ? weights[i] : scale;
+  for (int i = 0; i < FLOATS; ++i) {
+    const double wanted =
+        i < MODES ? pose->weights[i] : pose->gains[(i - MODES) / 3][(i - MODES) % 3];
     assert_true(fabs((double)float_at(content + 4 + 4 * i) - wanted) <= 1e-6 * fabs(wanted) + 1e-9);
   }
+}
+
+/* The pose of a direction and a volume, mL above rest: one gain for all lungs. */
+static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
+  supine_pose pose = {.weights = {0}};
+  double gain = 0.0;
+  assert_int_equal(supine_basis_weights(s->basis, gravity, pose.weights), SUPINE_OK);
+  assert_int_equal(posed_scale(s->basis, pose.weights, resting_in(gravity) + above, &gain, NULL),
+                   SUPINE_OK);
+  supine_pose_fill(&pose, gain);
+  return pose;
+}
+
+/* Weights and gains of a direction and a volume, as they must come. */
+static void expect_weights(const stage *s, const double gravity[3], double above,
+                           const unsigned char *content) {
+  const supine_pose pose = pose_of(s, gravity, above);
+  expect_pose(&pose, content);
 }
 
 static const double poses[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.6, 0, -0.8}};
@@ -308,6 +331,53 @@ static void test_weights_answer_each_pose(void **state) {
   stage_destroy(s);
 }
 
+static void test_a_bare_number_as_volume_is_refused(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  const int peer = dial(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  assert_true(say(peer, "VOLUME", "500")); /* what it counts from is not said */
+  assert_true(send_pose(peer, poses[1], 1));
+  (void)hear_stamp(peer, 1, &header, body);
+  expect_weights(s, poses[1], 30.0, body); /* as before */
+  (void)close(peer);
+  (void)stage_end(s);
+  assert_int_equal(atomic_load(&s->warnings), 1);
+  stage_destroy(s);
+}
+
+static void test_volume_above_rest_sends_what_basis_pose_gives(void **state) {
+  (void)state;
+  stage *s = stage_create();
+  const int peer = dial(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  assert_true(say(peer, "VOLUME", "rest+50"));
+  for (uint64_t i = 0; i < 4; ++i) {
+    supine_state asked = {.volume = {SUPINE_VOLUME_REST, 50.0}};
+    supine_pose pose;
+    supine_error error;
+    memcpy(asked.gravity, poses[i], sizeof asked.gravity);
+    assert_int_equal(supine_basis_pose(s->basis, &asked, &pose, &error), SUPINE_OK);
+    assert_true(send_pose(peer, poses[i], 1 + i));
+    (void)hear_stamp(peer, 1 + i, &header, body);
+    expect_pose(&pose, body);
+  }
+  /* The same in an array: 50.0 as a 64-bit float, big-endian. */
+  const unsigned char array[12] = {11, 1, 0, 1, 0x40, 0x49};
+  unsigned char bytes[128];
+  assert_true(say(peer, "VOLUME", "rest"));
+  assert_true(put(peer, bytes, make_message("NDARRAY", "VOLUME", 0, array, sizeof array, bytes)));
+  assert_true(send_pose(peer, poses[1], 10));
+  (void)hear_stamp(peer, 10, &header, body);
+  expect_weights(s, poses[1], 50.0, body);
+  (void)close(peer);
+  (void)stage_end(s);
+  assert_int_equal(atomic_load(&s->warnings), 0);
+  stage_destroy(s);
+}
+
 /* Points of a surface frame, as they must come: triangles with the first, or with all. */
 static void test_surfaces_and_wishes(void **state) {
   (void)state;
@@ -338,13 +408,9 @@ static void test_surfaces_and_wishes(void **state) {
         assert_string_equal(header.type, "POLYDATA");
         first = false;
       } while (header.stamp != stamp);
-      double weights[MODES];
-      double scales[LUNGS];
+      const supine_pose pose = pose_of(s, poses[i], 30.0);
       float xyz[300];
-      assert_int_equal(supine_basis_weights(s->basis, poses[i], weights), SUPINE_OK);
-      assert_int_equal(supine_basis_scale(s->basis, weights, 30.0, &scales[0], NULL), SUPINE_OK);
-      scales[1] = scales[0];
-      supine_deform_range(s->basis, weights, scales, 0, 100, xyz);
+      supine_deform_range(s->basis, &pose, 0, 100, xyz);
       for (int k = 0; k < 300; ++k) { /* the same numbers, on the same code */
         assert_true(fabsf(float_at(body + 40 + 4 * k) - xyz[k]) < 1e-4f);
       }
@@ -691,17 +757,14 @@ static void test_frames_come_while_the_lungs_move(void **state) {
   float high = -INFINITY;
   for (int i = 0; i < 100; ++i) { /* 1.5 breaths */
     assert_true(hear(other, &header, body));
-    const float scale = float_at(body + 4 + 4 * MODES);
-    low = fminf(low, scale);
-    high = fmaxf(high, scale);
+    const float gain = float_at(body + 4 + 4 * MODES);
+    low = fminf(low, gain);
+    high = fmaxf(high, gain);
   }
-  double weights[MODES];
-  double deepest = 0.0;
   const double supine[3] = {0, 1, 0};
-  assert_int_equal(supine_basis_weights(s->basis, supine, weights), SUPINE_OK);
-  assert_int_equal(supine_basis_scale(s->basis, weights, 60.0, &deepest, NULL), SUPINE_OK);
+  const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
   /* From rest to the peak, as far as frames of 15 ms meet them. */
-  assert_true(fabs((double)(high - low) - fabs(deepest)) < 0.05 * fabs(deepest));
+  assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);
 }
@@ -810,6 +873,8 @@ static void test_a_frame_in_parts_arrives_whole(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_weights_answer_each_pose),
+      cmocka_unit_test(test_a_bare_number_as_volume_is_refused),
+      cmocka_unit_test(test_volume_above_rest_sends_what_basis_pose_gives),
       cmocka_unit_test(test_surfaces_and_wishes),
       cmocka_unit_test(test_newest_pose_wins),
       cmocka_unit_test(test_a_frame_in_parts_arrives_whole),

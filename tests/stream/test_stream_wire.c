@@ -349,16 +349,23 @@ typedef struct sample {
   supine_stream_moment moment;
 } sample;
 
-static sample sample_create(void) {
-  sample s = {.made = fixture_create(2311, 6, 3, 2, false, true, 20.0, 17)};
+static sample sample_open(fixture *made) {
+  sample s = {.made = made};
   size_t size = 0;
   supine_error error;
   s.bytes = fixture_bytes(s.made, &size);
   assert_int_equal(supine_basis_open_memory(s.bytes, size, &s.basis, &error), SUPINE_OK);
-  s.moment = (supine_stream_moment){
-      .gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu, .scales = {0.7, -0.3}};
-  assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.weights), SUPINE_OK);
+  s.moment = (supine_stream_moment){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
+  assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.pose.weights),
+                   SUPINE_OK);
+  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* every axis of every lung has its own gain */
+    s.moment.pose.gains[i / 3][i % 3] = 0.7 - 0.17 * (double)i;
+  }
   return s;
+}
+
+static sample sample_create(void) {
+  return sample_open(fixture_create(2311, 6, 3, 2, false, true, 20.0, 17));
 }
 
 static void sample_destroy(sample *s) {
@@ -395,17 +402,18 @@ static const unsigned char *unwrapped(const unsigned char *bytes, size_t size, u
   return bytes + sizeof header + 12;
 }
 
-static void test_weights_are_the_librarys_ndarray(void **state) {
-  (void)state;
-  sample s = sample_create();
+/* K weights, then the gains x, y, z of each lung; releases the sample. */
+static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;
   supine_stream_parcel parcel;
-  double values[8];
-  unsigned char body[64];
-  memcpy(values, s.moment.weights, 6 * sizeof *values);
-  memcpy(values + 6, s.moment.scales, 2 * sizeof *values);
-  const size_t size = make_array(IGTL_NDARRAY_STYPE_TYPE_FLOAT32, 8, values, body);
+  const size_t modes = s.made->modes;
+  const size_t count = modes + 3 * s.made->lungs;
+  double values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
+  unsigned char body[4 + sizeof values / 2];
+  memcpy(values, s.moment.pose.weights, modes * sizeof *values);
+  memcpy(values + modes, s.moment.pose.gains, 3 * s.made->lungs * sizeof *values);
+  const size_t size = make_array(IGTL_NDARRAY_STYPE_TYPE_FLOAT32, count, values, body);
   assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", false, &frames, &error),
                    SUPINE_OK);
   supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
@@ -423,6 +431,18 @@ static void test_weights_are_the_librarys_ndarray(void **state) {
   sample_destroy(&s);
 }
 
+static void test_weights_are_the_librarys_ndarray(void **state) {
+  (void)state;
+  expect_weights_frame(sample_create());
+}
+
+/* The most modes and lungs that a basis may have. */
+static void test_weights_of_the_largest_basis_are_whole(void **state) {
+  (void)state;
+  expect_weights_frame(sample_open(fixture_create(16 * SUPINE_LUNGS_MAX, SUPINE_MODES_MAX, 15,
+                                                  SUPINE_LUNGS_MAX, false, false, 20.0, 23)));
+}
+
 /* The surface as the library packs it; `size` is written. */
 static unsigned char *make_polydata(const sample *s, bool triangles, double sign, size_t *size) {
   const supine_basis_info *info = supine_basis_get_info(s->basis);
@@ -436,7 +456,7 @@ static unsigned char *make_polydata(const sample *s, bool triangles, double sign
   surface.header.ntriangle_strips = triangles ? (igtl_uint32)strips.count : 0;
   surface.header.size_triangle_strips = triangles ? (igtl_uint32)strips.size : 0;
   assert_int_equal(igtl_polydata_alloc_info(&surface), 1);
-  supine_deform(s->basis, s->moment.weights, s->moment.scales, surface.points);
+  supine_deform(s->basis, &s->moment.pose, surface.points);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     surface.points[3 * i] *= (float)sign;
     surface.points[3 * i + 1] *= (float)sign;
@@ -483,13 +503,13 @@ static void test_surface_is_the_librarys_polydata(void **state) {
     supine_stream_frame_leave(frames, frame);
     /* A frame that is used again holds the new moment's points. */
     supine_stream_moment other = s.moment;
-    other.scales[0] = -0.1;
+    other.pose.gains[0][1] = -0.1;
     supine_stream_frame *again = supine_stream_frame_take(frames, &other);
     supine_stream_parcel parcel;
     assert_ptr_equal(again, frame);
     assert_true(supine_stream_frame_wrap(frames, again, SUPINE_STREAM_POINTS, false, 1, &parcel));
     float first[3];
-    supine_deform_range(s.basis, other.weights, other.scales, 0, 1, first);
+    supine_deform_range(s.basis, &other.pose, 0, 1, first);
     unsigned char wanted[12];
     supine_stream_put_points(1, first, ras, wanted);
     assert_memory_equal(again->points, wanted, sizeof wanted);
@@ -601,6 +621,7 @@ int main(void) {
       cmocka_unit_test(test_every_truncation_is_refused),
       cmocka_unit_test(test_headers_that_are_none_are_refused),
       cmocka_unit_test(test_weights_are_the_librarys_ndarray),
+      cmocka_unit_test(test_weights_of_the_largest_basis_are_whole),
       cmocka_unit_test(test_strips_hold_each_triangle_once),
       cmocka_unit_test(test_surface_is_the_librarys_polydata),
   };

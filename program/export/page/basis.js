@@ -232,11 +232,12 @@ function momentFor(basis, gravity, depth) {
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const room = 4 * Math.ceil(k / 4);
-  const weights = new Float32Array(room * lungs);
+  const weights = new Float32Array(room);
+  const gains = new Float32Array(3 * lungs).fill(1); // the weights have the gain in them
   const turns = new Float32Array(3 * words * lungs);
   const q = [1, ...moment.weights];
+  weights.set(moment.weights);
   for (let lung = 0, at = 0; lung < lungs; ++lung) {
-    weights.set(moment.weights, lung * room);
     for (let j = 0; j < normalModes; ++j) {
       let sum = 0;
       for (let a = 0; a <= k; ++a) {
@@ -247,7 +248,7 @@ function uniformsOf(basis, moment) {
       turns[3 * (lung * words + (j % words)) + Math.floor(j / words)] = sum;
     }
   }
-  return { weights, turns };
+  return { weights, gains, turns };
 }
 
 /** Where a vertex is. */

@@ -259,8 +259,9 @@ class Picture {
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
     gl.useProgram(moving.program);
-    const { weights, turns } = this.uniforms(moment);
+    const { weights, gains, turns } = this.uniforms(moment);
     gl.uniform4fv(moving.at.supine_weights, weights);
+    if (moving.at.supine_gains) gl.uniform3fv(moving.at.supine_gains, gains);
     if (moving.at.supine_normal_weights) gl.uniform3fv(moving.at.supine_normal_weights, turns);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);

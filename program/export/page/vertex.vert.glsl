@@ -15,8 +15,8 @@ vec3 turned_by_words();
 void main() {
   vec4 c[4] = vec4[4](c0, c1, c2, c3);
   float amount = 0.0;
-  for (int i = 0; i < SUPINE_VECTORS; ++i) amount += supine_amount(rest, i, c[i]);
-  moved = vec4(rest.xyz + amount * direction, 1.0);
+  for (int i = 0; i < SUPINE_VECTORS; ++i) amount += dot(supine_weights[i], c[i]);
+  moved = vec4(supine_place(rest, direction, amount), 1.0);
   vec3 sum = turned_by_words();
   float size = length(sum);
   turned = vec4(size > 0.0 ? sum / size : vec3(0.0), size);

@@ -3,8 +3,7 @@
  * Comparing orientations: distances between deformed lungs, and who ventilates where.
  *
  * Averages are over the rest surface's area: vertex i counts with a_i, a third of its triangles'
- * area, over the sum of all. A deformed state is K weights (supine_basis_weights) and a breath
- * scale for each lung [G]. */
+ * area, over the sum of all. A deformed state is a supine_pose. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 
@@ -21,12 +20,12 @@ extern "C" {
  * number of threads may use one. */
 typedef struct supine_compare supine_compare;
 
-/** Makes it: the Gram matrix of each lung, by one pass over the vertices,
+/** Makes it: the Gram matrix of each lung and axis j, by one pass over the vertices,
  *
- *     G_kl = sum over i of a_i |d_i|^2 c_ik c_il       (vector fields: the sum of three components)
+ *     G_j,kl = sum over i of a_i d_ij^2 c_ik c_il       (vector fields: a_i c_ijk c_ijl)
  *
  * @param basis  must outlive the comparison
- * Cost: N K^2 / 2 multiplications.
+ * Cost: 3 N K^2 / 2 multiplications.
  * @retval SUPINE_ERROR_MESH    the surface has no area
  * @retval SUPINE_ERROR_MEMORY */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
@@ -37,46 +36,28 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Area of the rest surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** How far the lungs breathe, whichever way gravity points. */
-typedef enum supine_inflation_kind {
-  SUPINE_INFLATION_VOLUME = 0, /**< mL that the lungs together hold beyond the file's surface */
-  SUPINE_INFLATION_RMS,        /**< RMS displacement, mm: for open surfaces */
-  SUPINE_INFLATION_SCALE,      /**< one breath scale */
-  SUPINE_INFLATION_REST        /**< mL beyond the posture's resting volume */
-} supine_inflation_kind;
+/** supine_basis_pose or, where `rms` is above 0, the gain at which the RMS displacement is that,
+ * mm: for open surfaces.
+ * @retval as supine_basis_pose; SUPINE_ERROR_NUMERICAL also where nothing moves */
+SUPINE_API supine_status supine_compare_pose(const supine_compare *compare,
+                                             const supine_state *state, double rms,
+                                             supine_pose *pose, supine_error *error);
 
-typedef struct supine_inflation {
-  supine_inflation_kind kind;
-  double amount;
-} supine_inflation;
-
-/** The breath scale, one for all lungs, that inflates by that much. No pass over the vertices.
- * @param gravity  [3] that the weights are of
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, where rest depends on it
- * @retval SUPINE_ERROR_OPEN_SURFACE  a volume of an open surface
- * @retval SUPINE_ERROR_NUMERICAL     no scale reaches it, or nothing moves */
-SUPINE_API supine_status supine_compare_scale(const supine_compare *compare,
-                                              const supine_inflation *inflation,
-                                              const double gravity[3], const double *weights,
-                                              double *scale, supine_error *error);
-
-/** RMS distance between two states, mm, from the Gram matrices alone:
+/** RMS distance between two poses, mm, from the Gram matrices alone:
  *
- *     d^2 = sum over lungs of q^T G q,     q = s_a w_a - s_b w_b
+ *     d^2 = sum over lungs and axes of q^T G q,     q = A w - A' w'
  *
- * @param weights_b, scales_b  NULL: the rest surface
- * Cost: G K^2 multiplications, no pass over the vertices. */
-SUPINE_API double supine_compare_rms(const supine_compare *compare, const double *weights_a,
-                                     const double *scales_a, const double *weights_b,
-                                     const double *scales_b);
+ * @param from  NULL: the reference surface
+ * Cost: 3 G K^2 multiplications, no pass over the vertices. */
+SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
+                                     const supine_pose *from);
 
-/** Distance of every vertex between two states, mm.
- * @param weights_b, scales_b  NULL: the rest surface
+/** Distance of every vertex between two poses, mm.
+ * @param from      NULL: the reference surface
  * @param distance  [N], written
- * Cost: one pass, K + 1 multiplications per vertex (vector fields: 3 K + 3). */
-SUPINE_API void supine_compare_distances(const supine_compare *compare, const double *weights_a,
-                                         const double *scales_a, const double *weights_b,
-                                         const double *scales_b, float *distance);
+ * Cost: one pass, 3 K + 6 multiplications per vertex. */
+SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
+                                         const supine_pose *from, float *distance);
 
 /** How distances are spread over the surface, mm. */
 typedef struct supine_distance_statistics {
@@ -90,7 +71,7 @@ typedef struct supine_distance_statistics {
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Squared displacement at breath scale 1, averaged over area and over all directions of gravity,
+/** Squared displacement at gain 1, averaged over area and over all directions of gravity,
  * that the harmonics of each band carry, mm^2:
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm       M_lm: column lm of `modes`
@@ -99,9 +80,9 @@ SUPINE_API void supine_compare_statistics(const supine_compare *compare, const f
  * @param energy  [L + 1], written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
-/** Directions that differ most, at one inflation. */
+/** Directions that differ most, at one volume. */
 typedef struct supine_extremes {
-  size_t directions;  /**< sampled that reach the inflation */
+  size_t directions;  /**< sampled in which the lungs reach the volume */
   double pair[2][3];  /**< the two directions of gravity that differ most, unit */
   double pair_rms;    /**< RMS distance between them, mm */
   double farthest[3]; /**< the direction that differs most from the given one, unit */
@@ -112,18 +93,19 @@ typedef struct supine_extremes {
  * `from`, each to each, then moves the best ones along the sphere, by steps that halve from the
  * spiral's spacing to 1e-6 rad, while that raises the distance. A maximum whose whole summit is
  * narrower than the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the
- * lungs cannot reach the inflation do not take part.
+ * lungs cannot reach the volume do not take part.
  *
- * @param from        [3], any length but 0
+ * @param from        posture and volume; the volume is that of every direction
+ * @param rms         mm, see supine_compare_pose
  * @param directions  of the spiral, 2 to 16384; 2048 are 4.5 degrees apart
- * Cost: K directions^2 / 2 multiplications; allocates 2 K directions numbers meanwhile.
+ * Cost: 3 G K directions^2 / 2 multiplications; allocates 6 G K directions numbers meanwhile.
  * @retval SUPINE_ERROR_ARGUMENT   directions out of range, or `from` is zero or not finite
- * @retval SUPINE_ERROR_NUMERICAL  `from`, or all but one, cannot reach the inflation
+ * @retval SUPINE_ERROR_NUMERICAL  `from`, or all but one, cannot reach the volume
  * @retval SUPINE_ERROR_OPEN_SURFACE, SUPINE_ERROR_MEMORY */
 SUPINE_API supine_status supine_compare_search(const supine_compare *compare,
-                                               const supine_inflation *inflation,
-                                               const double from[3], size_t directions,
-                                               supine_extremes *extremes, supine_error *error);
+                                               const supine_state *from, double rms,
+                                               size_t directions, supine_extremes *extremes,
+                                               supine_error *error);
 
 /** The tissue of one lung between two heights. */
 typedef struct supine_slab {

@@ -3,7 +3,12 @@
  * The run-time library: open a basis file, then deform its lungs for any direction of gravity and
  * any volume.
  *
- *     u_i = s (sum over k of w_k(g) c_ik) d_i        w_k(g) = sum over lm of modes[k, lm] Y_lm(g)
+ *     x_ij = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij      w_k(g) = sum over lm of modes[k, lm]
+ * Y_lm(g)
+ *
+ * for axis j = x, y, z; the gains A_j of each lung follow from its volume. A program parses or
+ * fills a supine_state (posture and volume), asks supine_basis_pose for its weights and gains, and
+ * supine_deform for the positions.
  *
  * Nothing allocates, reads files or locks after opening; any number of threads may use one basis.
  * Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0),
@@ -20,6 +25,7 @@
 #include <stdint.h>
 
 #include <supine/safetensors.h>
+#include <supine/state.h>
 #include <supine/status.h>
 #include <supine/version.h>
 
@@ -96,15 +102,22 @@ typedef struct supine_basis_info {
   /** What an evaluation reads, bytes_per_vertex for each vertex in whole runs of 16 vertices: for
    * measuring what its traffic costs. What it means changes between versions. */
   const void *packed;
-  const double
-      *resting_volume; /**< [9] see supine_basis_resting_volume; NULL where none is known */
-  double scan_volume;  /**< mL that the scan held beyond the file's surface, negative where it held
-                            less; 0 where they are one */
   /** Q, modes of the normals (supine_deform_lit); 0 where the file has none. */
   size_t normal_count;
-  const int16_t *normals;       /**< [N, 3, Q] n */
-  const double *normal_weights; /**< [G, Q, (K + 1)(K + 2) / 2] V */
+  const int16_t *normals;         /**< [N, 3, Q] n */
+  const double *normal_weights;   /**< [G, Q, (K + 1)(K + 2) / 2] V */
+  const double *reference_volume; /**< [G] mL that each lung of the reference surface holds, gas and
+                                       tissue; 0 where has_volume is false */
+  bool has_rest;                  /**< the volume at rest is known in every posture */
+  bool has_full;                  /**< the reference surface is full inflation */
+  bool is_fields; /**< made from another simulator's fields: gain 1 gives them back */
 } supine_basis_info;
+
+/** Weights and gains of one state. */
+typedef struct supine_pose {
+  double weights[SUPINE_MODES_MAX];  /**< w_k */
+  double gains[SUPINE_LUNGS_MAX][3]; /**< A_j of each lung, x, y, z; 0: the reference surface */
+} supine_pose;
 
 /** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
  * packs it for evaluation. `options` may be NULL.
@@ -148,106 +161,99 @@ SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
-/** Volume in mL that lung `lung` gains over rest at breath scale `scale`: a cubic in the scale,
- * with no pass over the vertices. Requires has_volume. */
-SUPINE_API double supine_basis_lung_volume(const supine_basis *basis, size_t lung,
-                                           const double *weights, double scale);
-
-/** The cubic in the breath scale by which the volume of one lung grows, or of all together, mL (see
- * supine/volume.h). Requires has_volume.
- * @param cubic  [3], written */
-SUPINE_API void supine_basis_lung_cubic(const supine_basis *basis, size_t lung,
-                                        const double *weights, double cubic[3]);
-SUPINE_API void supine_basis_cubic(const supine_basis *basis, const double *weights,
-                                   double cubic[3]);
-
-/** The scale at which the lungs together hold `volume` mL beyond the file's surface (negative:
- * less).
- * @param scale  one number for all lungs
- * @retval SUPINE_ERROR_OPEN_SURFACE  the file has no volume forms
- * @retval SUPINE_ERROR_NUMERICAL     the volume turns back before it gets there. Triangles may turn
- *                                    over earlier: that takes a look at the positions */
-SUPINE_API supine_status supine_basis_scale(const supine_basis *basis, const double *weights,
-                                            double volume, double *scale, supine_error *error);
-
-/** The same for one lung. */
-SUPINE_API supine_status supine_basis_lung_scale(const supine_basis *basis, size_t lung,
-                                                 const double *weights, double volume,
-                                                 double *scale, supine_error *error);
-
-/** The volume at the end of a quiet expiration for gravity along `gravity` (any length but 0), mL
- * beyond the file's surface, negative below it:
+/** Weights and gains of a state.
  *
- *     sum over l <= 2 and m of resting_volume[l*l + l + m] Y_lm(g)
+ * A total volume is shared out among the lungs: each fills on the straight line between its rest
+ * and its full volume [MilicEmili1966], all at the same part of the way; below rest all shrink in
+ * proportion. Files of versions 1 and 2 have one gain for all lungs instead. Volumes are met
+ * exactly, without a pass over the vertices.
  *
- * 0 where the file knows of no rest (info's resting_volume is NULL): its surface is the rest.
- * @param volume  mL, all lungs together; as supine_basis_scale takes it
- * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
-SUPINE_API supine_status supine_basis_resting_volume(const supine_basis *basis,
-                                                     const double gravity[3], double *volume);
+ * SUPINE_VOLUME_DEFAULT is rest where it is known; the fields as given (gain 1) where the basis was
+ * made from fields; else 500 mL above the scan.
+ * @param state  gravity of any length but 0
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite; rest or full where the basis
+ * knows none; a lung that it does not have
+ * @retval SUPINE_ERROR_OPEN_SURFACE  a volume of an open surface
+ * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume. Triangles may
+ * turn over earlier: that takes a look at the positions Cost: K (L+1)^2 multiplications for the
+ * weights, G K^3 for the gains, once a frame. */
+SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
+                                           supine_pose *pose, supine_error *error);
+
+/** The gains alone, for weights that `pose` already has: a breath in one posture. */
+SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
+                                            supine_pose *pose, supine_error *error);
+
+/** The volume that SUPINE_VOLUME_DEFAULT stands for; itself where that is the fields as given. */
+SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
+
+/** Set every gain to one number, which is free of volumes: for open surfaces and fields. */
+SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
+
+/** The state of the scan: its posture, SUPINE_VOLUME_SCAN. */
+SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
+
+/** Volumes of the lungs in a pose, gas and tissue, mL. Requires has_volume.
+ * @param volumes  [G], written */
+SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
+                                     double *volumes);
 
 /** Bound, in mm, on the distance of any deformed vertex from exact arithmetic on the numbers of the
- * file: what storage and rounding may cost at these weights and scales. */
-SUPINE_API double supine_basis_error(const supine_basis *basis, const double *weights,
-                                     const double *scales);
+ * file: what storage and rounding may cost in this pose. */
+SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Deformed positions of every vertex, in the caller's thread.
  *
- *     x_i = p_i + s (w . c_i) d_i         s: the scale of the lung of i
+ *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of i
  *
- * @param weights  [K] of supine_basis_weights
- * @param scales   [G] breath scale of each lung
- * @param xyz      [N, 3], written, mm, LPS; any alignment of a float
- * Cost per vertex: K + 3 multiplications and K + 2 additions (16 modes: 19 and 18). Where positions
+ * @param xyz  [N, 3], written, mm, LPS; any alignment of a float
+ * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). Where positions
  * outgrow the cache they are stored past it, fastest where `xyz` is aligned to 64 bytes. */
-SUPINE_API void supine_deform(const supine_basis *basis, const double *weights,
-                              const double *scales, float *xyz);
+SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
 /** supine_deform of vertices begin <= i < end into xyz [end - begin, 3]: a thread's share. Shares
  * that begin at multiples of 16 are fastest. */
-SUPINE_API void supine_deform_range(const supine_basis *basis, const double *weights,
-                                    const double *scales, size_t begin, size_t end, float *xyz);
+SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose *pose,
+                                    size_t begin, size_t end, float *xyz);
 
 /** supine_deform_range into three arrays [end - begin]. */
-SUPINE_API void supine_deform_separate(const supine_basis *basis, const double *weights,
-                                       const double *scales, size_t begin, size_t end, float *x,
-                                       float *y, float *z);
+SUPINE_API void supine_deform_separate(const supine_basis *basis, const supine_pose *pose,
+                                       size_t begin, size_t end, float *x, float *y, float *z);
 
-/** supine_deform_range for many orientations or volumes at once, at about the speed of a matrix
- * product: each vertex is read once.
+/** supine_deform_range for many poses at once, at about the speed of a matrix product: each vertex
+ * is read once.
  *
- * @param count    orientations
- * @param weights  [count, K]
- * @param scales   [count, G]
- * @param xyz      [count, end - begin, 3], written */
-SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count, const double *weights,
-                                    const double *scales, size_t begin, size_t end, float *xyz);
+ * @param poses  [count]
+ * @param xyz    [count, end - begin, 3], written */
+SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
+                                    const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
-/** Displacements s (w . c_i) d_i of vertices begin <= i < end, mm, without the rest positions: what
- * supine_step adds. Every vertex's displacement is linear in the scales. */
-SUPINE_API void supine_displace_range(const supine_basis *basis, const double *weights,
-                                      const double *scales, size_t begin, size_t end, float *xyz);
+/** Displacements A_j (w . c_i) d_ij of vertices begin <= i < end, mm, without the reference
+ * positions: what supine_step adds. Every vertex's displacement is linear in the gains. */
+SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
+                                      size_t begin, size_t end, float *xyz);
 
 /** One step of a breath at a frozen orientation, three additions a vertex [Santhanam2008] (III-B):
  *
  *     xyz += step
  *
  * @param count  vertices
- * @param step   [count, 3] displacement of one step, of supine_displace_range with the scales of
+ * @param step   [count, 3] displacement of one step, of supine_displace_range with the gains of
  * one step; subtract a step by displacing with its negative
  * @param xyz    [count, 3], positions before and after; must not overlap `step`
  * Rounding accumulates: at most 2^-24 of the coordinate a step. Begin each breath from
  * supine_deform. */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Weights v [G, Q] of the normals' modes, a quadratic form in q = scale x weights, for each lung:
+/** Weights v [G, Q] of the normals' modes, a quadratic form in q = gain x weights, for each lung
+ * (of the gains, which are equal, the first):
  *
  *     v_j = sum over 0 <= k <= l <= K of V_j,kl q_k q_l        q_0 = 1, k l = 00, 01, ... 0K, 11,
  * ...
  *
  * Cost: G Q K^2 / 2 multiplications, once a frame. */
-SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const double *weights,
-                                            const double *scales, double *normal_weights);
+SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
+                                            double *normal_weights);
 
 /** Deformed positions, as supine_deform gives them, and unit normals, without a look at triangles:
  *
@@ -261,20 +267,19 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const dou
  * @param normals  [N, 3], written; 0 where a vertex has no triangle
  * Cost per vertex beside the position's: 3 Q + 8 multiplications, and as many additions.
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
-SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const double *weights,
-                                           const double *scales, float *xyz, float *normals);
+SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
+                                           float *xyz, float *normals);
 
 /** supine_deform_lit of vertices begin <= i < end into arrays [end - begin, 3]: a thread's share.
  */
-SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, const double *weights,
-                                                 const double *scales, size_t begin, size_t end,
-                                                 float *xyz, float *normals);
+SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, const supine_pose *pose,
+                                                 size_t begin, size_t end, float *xyz,
+                                                 float *normals);
 
 /** supine_deform_batch with normals [count, end - begin, 3]. */
 SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
-                                                 const double *weights, const double *scales,
-                                                 size_t begin, size_t end, float *xyz,
-                                                 float *normals);
+                                                 const supine_pose *pose, size_t begin, size_t end,
+                                                 float *xyz, float *normals);
 
 /** Unit normals of a deformed surface at its vertices, exactly: the mean of the triangles' normals,
  * weighted by their areas.
@@ -298,12 +303,13 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
-/** The uniform supine_weights of supine.glsl, whose SUPINE_VECTORS is V = (K + 3) / 4.
- * @param scales    [G] breath scale of each lung
- * @param uniforms  [G, 4 V], written, for glUniform4fv(location, G V, uniforms)
- * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
-SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const double *weights,
-                                           const double *scales, float *uniforms);
+/** The uniforms supine_weights and supine_gains of supine.glsl, whose SUPINE_VECTORS is
+ * V = (K + 3) / 4.
+ * @param weights  [4 V], written
+ * @param gains    [G, 3], written
+ * @retval SUPINE_ERROR_UNSUPPORTED  a vector field, or more than SUPINE_GL_MODES modes */
+SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
+                                           float *weights, float *gains);
 
 /** The normals' modes of vertices begin <= i < end for supine.glsl, three to a word, in
  * SUPINE_WORDS W = (Q + 2) / 3 attributes uvec3.
@@ -315,8 +321,8 @@ SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_
 /** The uniform supine_normal_weights of supine.glsl.
  * @param uniforms  [G, W, 3], written, for glUniform3fv(location, G W, uniforms)
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
-SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis, const double *weights,
-                                                  const double *scales, float *uniforms);
+SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,
+                                                  const supine_pose *pose, float *uniforms);
 
 #ifdef __cplusplus
 }

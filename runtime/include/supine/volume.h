@@ -31,6 +31,22 @@ SUPINE_API double supine_volume_at(const double cubic[3], double scale);
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
+/** What a lung gains beyond its reference, as a polynomial of the three gains (x, y, z) at given
+ * weights, mL:
+ *
+ *     of . (x, y, z, yz, xz, xy, xyz) */
+typedef struct supine_volume_form {
+  double of[7];
+} supine_volume_form;
+
+/** The volume gained at three gains. */
+SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
+
+/** The one gain, on all three axes, at which the volume is gained. Statuses as supine_volume_scale.
+ */
+SUPINE_API supine_status supine_volume_form_scale(const supine_volume_form *form, double volume,
+                                                  double *scale, supine_error *error);
+
 #ifdef __cplusplus
 }
 #endif

@@ -3,7 +3,7 @@
 
     link = Link("localhost", 18944)
     link.send_pose(rotation)               # 3 x 3, rows
-    stamp, frame = link.newest(timeout=1)  # weights and scales, or points
+    stamp, frame = link.newest(timeout=1)  # weights and gains, or points
 """
 import json
 import select
@@ -127,7 +127,7 @@ class Link:
         self.send("STRING", "SEND", string(what))
 
     def set_volume(self, text):
-        """rest, full, rest+500 or mL from the reference."""
+        """rest, full or scan, with +ML or -ML (rest+500), or an absolute volume: 2600mL."""
         self.send("STRING", "VOLUME", string(text))
 
     def message(self):
@@ -171,7 +171,7 @@ class Link:
 
 
 class Basis:
-    """A scalar basis file, for peers that are sent weights: x = p + scale (w . c) d."""
+    """A scalar basis file, for peers that are sent weights: x_j = p_j + A_j (w . c) d_j."""
 
     def __init__(self, path):
         with open(path, "rb") as file:
@@ -194,12 +194,13 @@ class Basis:
         return memoryview(self._data[begin:end]).cast(kind)
 
     def deform(self, frame):
-        """Positions, flat, of an NDARRAY frame: K weights, then each lung's scale."""
-        weights, scales = frame[:self.modes], frame[self.modes:]
+        """Positions, flat, of an NDARRAY frame: K weights, then the gains A of each lung along x, y, z."""
+        weights, gains = frame[:self.modes], frame[self.modes:]
         positions = []
         for i, lung in enumerate(self.lung):
             row = self.coefficients[i * self.modes:(i + 1) * self.modes]
-            amount = scales[lung] * sum(w * c for w, c in zip(weights, row))
-            positions += [self.vertices[3 * i + j] + amount * self.direction[3 * i + j]
+            amount = sum(w * c for w, c in zip(weights, row))
+            positions += [self.vertices[3 * i + j]
+                          + gains[3 * lung + j] * amount * self.direction[3 * i + j]
                           for j in range(3)]
         return positions

@@ -36,8 +36,8 @@ namespace Supine
         /// <summary>Why reading has ended; null while it goes on.</summary>
         public Exception Failure { get; private set; }
 
-        /// <summary>The K weights and the scale of each lung of the newest frame, once; null where
-        /// none has come since the last call.</summary>
+        /// <summary>The K weights of the newest frame and the gains x, y, z of each lung, once; null
+        /// where none has come since the last call.</summary>
         public float[] TakeNewest(out ulong poseStamp)
         {
             lock (turn)
@@ -60,7 +60,8 @@ namespace Supine
             Send("TRANSFORM", device, body, poseStamp);
         }
 
-        /// <summary>Sets the volume: rest, full, rest+500 or mL from the reference.</summary>
+        /// <summary>Sets the volume: rest, full or scan, with +ML or -ML (rest+500), or an absolute
+        /// volume, 2600mL.</summary>
         public void SetVolume(string volume)
         {
             byte[] text = Encoding.ASCII.GetBytes(volume);
@@ -192,10 +193,9 @@ namespace Supine
         [DllImport(Library)] static extern IntPtr supine_basis_get_info(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_vertices(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
-        [DllImport(Library)] static extern int supine_basis_weights(IntPtr basis, double[] gravity, double[] weights);
-        [DllImport(Library)] static extern int supine_basis_resting_volume(IntPtr basis, double[] gravity, out double volume);
-        [DllImport(Library)] static extern int supine_basis_scale(IntPtr basis, double[] weights, double volume, out double scale, IntPtr error);
-        [DllImport(Library)] static extern void supine_deform(IntPtr basis, double[] weights, double[] scales, float[] xyz);
+        [DllImport(Library)] static extern int supine_state_parse(string text, byte[] state, IntPtr error);
+        [DllImport(Library)] static extern int supine_basis_pose(IntPtr basis, byte[] state, double[] pose, IntPtr error);
+        [DllImport(Library)] static extern void supine_deform(IntPtr basis, double[] pose, float[] xyz);
 
         [StructLayout(LayoutKind.Sequential)]
         struct Info // the beginning of supine_basis_info
@@ -203,8 +203,11 @@ namespace Supine
             public UIntPtr Vertices, Triangles, Modes, Band, Lungs;
         }
 
+        const int StateSize = 112; // sizeof(supine_state)
+        const int ModesMax = 256, LungsMax = 16;
         IntPtr handle;
-        readonly double[] weights, scales;
+        readonly int modes, lungs;
+        readonly double[] pose = new double[ModesMax + 3 * LungsMax]; // supine_pose: weights, gains
 
         public Basis(string path)
         {
@@ -213,8 +216,8 @@ namespace Supine
             Info info = (Info)Marshal.PtrToStructure(supine_basis_get_info(handle), typeof(Info));
             VertexCount = (int)info.Vertices;
             TriangleCount = (int)info.Triangles;
-            weights = new double[(int)info.Modes];
-            scales = new double[(int)info.Lungs];
+            modes = (int)info.Modes;
+            lungs = (int)info.Lungs;
         }
 
         public int VertexCount { get; private set; }
@@ -223,26 +226,29 @@ namespace Supine
         /// <summary>Positions [3 N] of a frame, mm, LPS: left, back, head.</summary>
         public void Deform(float[] frame, float[] xyz)
         {
-            if (frame.Length != weights.Length + scales.Length || xyz.Length != 3 * VertexCount)
+            if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
                 throw new ArgumentException("a frame of another basis");
-            for (int i = 0; i < weights.Length; ++i) weights[i] = frame[i];
-            for (int i = 0; i < scales.Length; ++i) scales[i] = frame[weights.Length + i];
-            supine_deform(handle, weights, scales, xyz);
+            for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
+            supine_deform(handle, pose, xyz);
         }
 
-        /// <summary>The frame of a direction of gravity and a volume, mL above the posture's rest, as
-        /// the server makes it.</summary>
-        public float[] Frame(double[] gravity, double above)
+        /// <summary>The frame of a state, "left:rest+500", as the server makes it: for a lung without
+        /// a server.</summary>
+        public float[] Frame(string text)
         {
-            double rest, scale;
-            if (supine_basis_resting_volume(handle, gravity, out rest) != 0 ||
-                supine_basis_weights(handle, gravity, weights) != 0 ||
-                supine_basis_scale(handle, weights, rest + above, out scale, IntPtr.Zero) != 0)
-                throw new ArgumentException("no such state");
-            float[] frame = new float[weights.Length + scales.Length];
-            for (int i = 0; i < frame.Length; ++i)
-                frame[i] = (float)(i < weights.Length ? weights[i] : scale);
+            byte[] state = new byte[StateSize];
+            if (supine_state_parse(text, state, IntPtr.Zero) != 0 ||
+                supine_basis_pose(handle, state, pose, IntPtr.Zero) != 0)
+                throw new ArgumentException(text + ": no state of this basis");
+            float[] frame = new float[modes + 3 * lungs];
+            for (int i = 0; i < frame.Length; ++i) frame[i] = (float)pose[PoseIndex(i)];
             return frame;
+        }
+
+        // Where a number of a frame is in supine_pose.
+        int PoseIndex(int i)
+        {
+            return i < modes ? i : ModesMax + i - modes;
         }
 
         public float[] Vertices()

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* States on the command line. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/options/basis_input.h"
+#include "program/options/state.h"
+
+static const double least_of_full = 0.1; /* tissue alone: nothing is emptier */
+static const double most_of_full = 1.2;
+static const double folded_limit = 0.01; /* of the triangles: the surface is no lung's any more */
+
+int supine_options_read_volume(const char *command, const char *text, void *field) {
+  supine_error error;
+  return supine_state_parse_volume(text, field, &error) == SUPINE_OK
+             ? SUPINE_EXIT_OK
+             : supine_options_usage(command, "--volume: %s", error.message);
+}
+
+static int read_from(const char *command, const char *text, void *field) {
+  supine_state *state = field;
+  supine_error error;
+  *state = (supine_state){.gravity = {0.0, 1.0, 0.0}};
+  return supine_state_parse(text, state, &error) == SUPINE_OK
+             ? SUPINE_EXIT_OK
+             : supine_options_usage(command, "--from: %s", error.message);
+}
+
+const supine_option supine_options_folds[] = {
+    {"allow-folds", 0, NULL,
+     "also volumes below a tenth or above 1.2 of full inflation, and surfaces of which more than 1 "
+     "% of the triangles turn over",
+     .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
+    {.name = NULL}};
+
+const supine_option supine_options_volume[] = {
+    {"volume", 0, "VOLUME",
+     SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: lung by lung, all named",
+     SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume, .rivals = "breath"},
+    {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
+    {.name = NULL}};
+
+const supine_option supine_options_from[] = {
+    {"from", 0, "STATE",
+     "what displacements count from: POSTURE, VOLUME or POSTURE:VOLUME, as supine:rest or scan; "
+     "default: the scan as it was given, or supine at rest where postures are compared",
+     SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from},
+    {.name = NULL}};
+
+supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
+                                       bool compares, supine_reference_pose *reference,
+                                       supine_error *error) {
+  static const supine_state supine_at_rest = {.gravity = {0.0, 1.0, 0.0},
+                                              .volume = {SUPINE_VOLUME_REST, 0.0}};
+  const bool scan = !from->given && !(compares && supine_basis_get_info(basis)->has_rest);
+  const supine_state state = from->given ? from->state
+                             : scan      ? supine_basis_scan(basis)
+                                         : supine_at_rest;
+  supine_error inner;
+  const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
+  }
+  if (scan) {
+    (void)snprintf(reference->name, sizeof reference->name, "the scan");
+  } else {
+    (void)supine_state_describe(&state, reference->name, sizeof reference->name);
+  }
+  return SUPINE_OK;
+}
+
+/* Fail with what is wrong where that is `strict`; else say it. */
+static supine_status say_or_fail(const supine_error *wrong, const char *command, bool strict,
+                                 supine_error *error) {
+  if (strict) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds does it all the same",
+                            wrong->message);
+  }
+  supine_options_say(command, "%s", wrong->message);
+  return SUPINE_OK;
+}
+
+static supine_status check_folds(const supine_basis *basis, const char *command, bool strict,
+                                 const supine_pose *pose, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_mesh mesh = {0};
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  double *moved = malloc(3 * info->vertex_count * sizeof *moved);
+  supine_status status = SUPINE_OK;
+  if (xyz == NULL || moved == NULL || supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  } else {
+    supine_deform(basis, pose, xyz);
+    for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+      moved[i] = (double)xyz[i];
+    }
+    const double turned = supine_mesh_turned_over(&mesh, moved);
+    if (turned > folded_limit) {
+      supine_error wrong;
+      (void)supine_error_set(&wrong, SUPINE_ERROR_NUMERICAL,
+                             "the surface folds: %.3g %% of its triangles turn over",
+                             100.0 * turned);
+      status = say_or_fail(&wrong, command, strict, error);
+    }
+  }
+  supine_mesh_free(&mesh);
+  free(xyz);
+  free(moved);
+  return status;
+}
+
+supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
+                                        bool allow_folds, const supine_pose *pose,
+                                        supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const bool strict = info->has_rest && !allow_folds;
+  double held[SUPINE_LUNGS_MAX];
+  double full = 0.0;
+  double volume = 0.0;
+  supine_basis_volumes(basis, pose, held);
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    full += info->reference_volume[lung];
+    volume += held[lung];
+  }
+  const double share = volume / full;
+  supine_status status = SUPINE_OK;
+  if (info->has_rest && !(share >= least_of_full && share <= most_of_full)) {
+    supine_error wrong;
+    (void)supine_error_set(
+        &wrong, SUPINE_ERROR_NUMERICAL,
+        "%.0f mL are %.0f %% of full inflation (%.0f mL): lungs hold %.0f to %.0f %%", volume,
+        100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+    status = say_or_fail(&wrong, command, strict, error);
+  }
+  return status != SUPINE_OK ? status : check_folds(basis, command, strict, pose, error);
+}
+
+int supine_options_pose(const supine_basis *basis, const char *command,
+                        const supine_volume_options *wanted, const double gravity[3],
+                        supine_pose *pose) {
+  supine_state state = wanted->state;
+  supine_error error;
+  memcpy(state.gravity, gravity, sizeof state.gravity);
+  supine_status status = supine_basis_pose(basis, &state, pose, &error);
+  if (status == SUPINE_OK && supine_basis_get_info(basis)->has_volume) {
+    status = supine_options_pose_check(basis, command, wanted->allow_folds, pose, &error);
+  }
+  return status != SUPINE_OK ? supine_options_fail(command, &error) : SUPINE_EXIT_OK;
+}

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* States on the command line: --volume, --from, and the pose that follows. */
+#ifndef SUPINE_OPTIONS_STATE_H
+#define SUPINE_OPTIONS_STATE_H
+
+#include <supine/runtime.h>
+
+#include "program/options/command.h"
+
+/* A table of options that fills a supine_volume_options: --volume and --allow-folds. */
+extern const supine_option supine_options_volume[];
+
+/* The reader of --volume, into a supine_state. */
+int supine_options_read_volume(const char *command, const char *text, void *field);
+
+/* --allow-folds alone, into a bool. */
+extern const supine_option supine_options_folds[];
+
+typedef struct supine_volume_options {
+  supine_state state; /* its volume; the default where none was given */
+  bool allow_folds;
+} supine_volume_options;
+
+#define SUPINE_VOLUME_HELP                                                                         \
+  "rest (the end of a quiet expiration in that posture; default where the basis knows it), full "  \
+  "(full inflation) or scan (what the scan held), each with +ML or -ML, as rest+500; or an "       \
+  "absolute volume of all lungs, gas and tissue, as a CT shows it: 2600mL"
+
+/* --from, into a supine_from. */
+extern const supine_option supine_options_from[];
+
+typedef struct supine_from {
+  bool given;
+  supine_state state;
+} supine_from;
+
+/* What displacements count from: a pose, and its name for people. */
+typedef struct supine_reference_pose {
+  supine_pose pose;
+  char name[96]; /* "the scan", "supine at rest" */
+} supine_reference_pose;
+
+/* The state that displacements count from: --from where it is given; else supine at rest where
+ * postures are compared and rest is known; else the scan. Statuses as supine_basis_pose. */
+supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
+                                       bool compares, supine_reference_pose *reference,
+                                       supine_error *error);
+
+/* Whether lungs can look like this: where rest is known, volumes below tissue alone or a fifth
+ * above full, and surfaces that fold, are SUPINE_ERROR_NUMERICAL unless folds are allowed;
+ * elsewhere, and then, it is said. */
+supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
+                                        bool allow_folds, const supine_pose *pose,
+                                        supine_error *error);
+
+/* The pose of a posture at the volume asked for, checked; an exit code after a message. */
+int supine_options_pose(const supine_basis *basis, const char *command,
+                        const supine_volume_options *wanted, const double gravity[3],
+                        supine_pose *pose);
+
+#endif

@@ -1,0 +1,290 @@
+/* SPDX-License-Identifier: MIT */
+/* From a state to weights and gains. */
+#include <math.h>
+#include <string.h>
+
+#include <supine/sh.h>
+#include <supine/volume.h>
+
+#include "runtime/internal.h"
+
+static const double unknown_rest_breath = 500; /* mL above a scan of which nothing is known */
+
+/* Contract a lung's volume forms with the weights: V - F = form . (x, y, z, yz, xz, xy, xyz) of the
+ * gains. A file whose forms are not by axis has them for equal gains: their cubic then stands in
+ * the places of x, yz and xyz. */
+static void contract(const supine_basis *basis, size_t lung, const double *weights,
+                     supine_volume_form *form) {
+  const size_t k = basis->info.mode_count;
+  double cubic[3] = {0, 0, 0};
+  supine_volume_add(k, basis->info.volume_linear + lung * k,
+                    basis->info.volume_quadratic + lung * k * k,
+                    basis->info.volume_cubic + lung * k * k * k, weights, cubic);
+  *form = (supine_volume_form){{cubic[0], 0, 0, cubic[1], 0, 0, cubic[2]}};
+}
+
+/* mL beyond the reference surface that each lung holds at rest, where the file has that by lung. */
+static double resting(const supine_basis *basis, size_t row, const double *y) {
+  double volume = 0;
+  for (size_t t = 0; t < RESTING_TERMS; ++t) {
+    volume += basis->resting[row * RESTING_TERMS + t] * y[t];
+  }
+  return volume;
+}
+
+static double sum_of(const double *values, size_t count) {
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += values[i];
+  }
+  return sum;
+}
+
+/* What the lungs hold in one posture, mL beyond the reference surface. */
+typedef struct volumes {
+  size_t lungs;
+  supine_volume_form form[SUPINE_LUNGS_MAX];
+  double rest[SUPINE_LUNGS_MAX]; /* by lung, where the file has that */
+  double full[SUPINE_LUNGS_MAX];
+  double rest_total;
+} volumes;
+
+static supine_status find_volumes(const supine_basis *basis, const double gravity[3],
+                                  const double *weights, volumes *v, supine_error *error) {
+  double y[RESTING_TERMS];
+  *v = (volumes){.lungs = basis->info.lung_count};
+  if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+  }
+  const double length =
+      sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
+  const double up = fmax(0, -gravity[2] / length);
+  for (size_t lung = 0; lung < v->lungs; ++lung) {
+    contract(basis, lung, weights, &v->form[lung]);
+    v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];
+    if (basis->rest_by_lung) {
+      v->rest[lung] = resting(basis, lung, y);
+    }
+  }
+  if (basis->info.has_rest) {
+    v->rest_total = basis->rest_by_lung ? sum_of(v->rest, v->lungs) : resting(basis, 0, y);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status refuse(const char *what, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "this basis does not know what %s is: its scan was taken as it is "
+                          "(--scanned none, --law paper or --fields). Give scan+ML or an absolute "
+                          "volume, as 2600mL",
+                          what);
+}
+
+/* mL beyond the reference that all lungs together hold. */
+static supine_status total_of(const supine_basis *basis, const volumes *v,
+                              const supine_volume *volume, double *total, supine_error *error) {
+  switch (volume->kind) {
+  case SUPINE_VOLUME_REST:
+    *total = v->rest_total + volume->ml;
+    return basis->info.has_rest ? SUPINE_OK : refuse("rest", error);
+  case SUPINE_VOLUME_FULL:
+    *total = sum_of(v->full, v->lungs) + volume->ml;
+    return basis->info.has_full ? SUPINE_OK : refuse("full inflation", error);
+  case SUPINE_VOLUME_ABSOLUTE:
+    *total = volume->ml - sum_of(basis->info.reference_volume, v->lungs);
+    return SUPINE_OK;
+  case SUPINE_VOLUME_SCAN:
+    *total = basis->scan_volume + volume->ml;
+    return SUPINE_OK;
+  default:
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no such kind of volume: %d",
+                            (int)volume->kind);
+  }
+}
+
+/* Share a total out among the lungs: each fills on the straight line between its rest and its full
+ * volume, all at the same part of the way; below rest all shrink in proportion. */
+static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
+  const double *reference = basis->info.reference_volume;
+  const double whole = sum_of(reference, v->lungs);
+  const double part = (total - v->rest_total) / (sum_of(v->full, v->lungs) - v->rest_total);
+  const double shrunk = (whole + total) / (whole + v->rest_total);
+  for (size_t lung = 0; lung < v->lungs; ++lung) {
+    lung_ml[lung] = total >= v->rest_total
+                        ? v->rest[lung] + part * (v->full[lung] - v->rest[lung])
+                        : (reference[lung] + v->rest[lung]) * shrunk - reference[lung];
+  }
+}
+
+static void fill(supine_pose *pose, size_t lung, double gain) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    pose->gains[lung][axis] = gain;
+  }
+}
+
+/* Gains of one lung that holds `ml` beyond the reference. */
+static supine_status lung_gains(const volumes *v, size_t lung, double ml, supine_pose *pose,
+                                supine_error *error) {
+  double scale = 0;
+  const supine_status status = supine_volume_form_scale(&v->form[lung], ml, &scale, error);
+  fill(pose, lung, scale);
+  return status;
+}
+
+/* Gains where all lungs share one scale. */
+static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
+                                  supine_error *error) {
+  supine_volume_form sum = {{0}};
+  double scale = 0;
+  for (size_t lung = 0; lung < v->lungs; ++lung) {
+    for (size_t i = 0; i < 7; ++i) {
+      sum.of[i] += v->form[lung].of[i];
+    }
+  }
+  const supine_status status = supine_volume_form_scale(&sum, total, &scale, error);
+  for (size_t lung = 0; lung < v->lungs; ++lung) {
+    fill(pose, lung, scale);
+  }
+  return status;
+}
+
+static supine_status total_gains(const supine_basis *basis, const volumes *v, double total,
+                                 supine_pose *pose, supine_error *error) {
+  if (!basis->rest_by_lung) {
+    return common_gains(v, total, pose, error);
+  }
+  double lung_ml[SUPINE_LUNGS_MAX];
+  supine_status status = SUPINE_OK;
+  share_out(basis, v, total, lung_ml);
+  for (size_t lung = 0; lung < v->lungs && status == SUPINE_OK; ++lung) {
+    status = lung_gains(v, lung, lung_ml[lung], pose, error);
+  }
+  return status;
+}
+
+/* Gains lung by lung. What one lung holds at rest, when full or in the scan is what it holds when
+ * all are in that state. */
+static supine_status named_gains(const supine_basis *basis, const volumes *v,
+                                 const supine_state *state, supine_pose *pose,
+                                 supine_error *error) {
+  if (state->lung_count != v->lungs) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%zu of the %zu lungs of the basis have a volume: name them all",
+                            state->lung_count, v->lungs);
+  }
+  for (size_t i = 0; i < state->lung_count; ++i) {
+    const supine_volume *volume = &state->lungs[i].volume;
+    size_t lung = 0;
+    while (lung < v->lungs && strcmp(state->lungs[i].name, basis->info.lung_names[lung]) != 0) {
+      ++lung;
+    }
+    if (lung == v->lungs || (i > 0 && strcmp(state->lungs[0].name, state->lungs[i].name) == 0)) {
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT, "no lung '%s' or named twice; this basis has %s%s%s",
+          state->lungs[i].name, basis->info.lung_names[0], v->lungs > 1 ? " and " : "",
+          v->lungs > 1 ? basis->info.lung_names[1] : "");
+    }
+    double ml = volume->ml - basis->info.reference_volume[lung];
+    if (volume->kind != SUPINE_VOLUME_ABSOLUTE) {
+      double total = 0;
+      supine_pose together;
+      supine_status status = total_of(basis, v, &(supine_volume){volume->kind, 0}, &total, error);
+      if (status == SUPINE_OK) {
+        status = total_gains(basis, v, total, &together, error);
+      }
+      if (status != SUPINE_OK) {
+        return status;
+      }
+      ml = supine_volume_form_at(&v->form[lung], together.gains[lung]) + volume->ml;
+    }
+    const supine_status status = lung_gains(v, lung, ml, pose, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* A surface without volumes shows its reference and, of fields, what was given. */
+static supine_status open_gains(const supine_basis *basis, const supine_state *state,
+                                supine_pose *pose, supine_error *error) {
+  const supine_volume *volume = &state->volume;
+  const bool reference = (volume->kind == SUPINE_VOLUME_SCAN ||
+                          (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
+                         volume->ml == 0 && state->lung_count == 0;
+  if (!reference) {
+    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                            "the surface is open and encloses no volume: give --scale, or close "
+                            "the mesh before 'supine precompute'");
+  }
+  supine_pose_fill(pose, 0);
+  return SUPINE_OK;
+}
+
+supine_volume supine_basis_default_volume(const supine_basis *basis) {
+  return basis->info.has_rest    ? (supine_volume){SUPINE_VOLUME_REST, 0}
+         : basis->info.is_fields ? (supine_volume){SUPINE_VOLUME_DEFAULT, 0}
+                                 : (supine_volume){SUPINE_VOLUME_SCAN, unknown_rest_breath};
+}
+
+supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
+                                 supine_pose *pose, supine_error *error) {
+  supine_state asked = *state;
+  if (asked.lung_count == 0 && asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    asked.volume = supine_basis_default_volume(basis);
+    if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
+      supine_pose_fill(pose, 1);
+      return SUPINE_OK;
+    }
+  }
+  if (!basis->info.has_volume) {
+    return open_gains(basis, &asked, pose, error);
+  }
+  volumes v;
+  double total = 0;
+  supine_status status = find_volumes(basis, asked.gravity, pose->weights, &v, error);
+  if (status == SUPINE_OK && asked.lung_count > 0) {
+    return named_gains(basis, &v, &asked, pose, error);
+  }
+  if (status == SUPINE_OK) {
+    status = total_of(basis, &v, &asked.volume, &total, error);
+  }
+  return status == SUPINE_OK ? total_gains(basis, &v, total, pose, error) : status;
+}
+
+supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
+                                supine_pose *pose, supine_error *error) {
+  if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+  }
+  return supine_basis_gains(basis, state, pose, error);
+}
+
+void supine_pose_fill(supine_pose *pose, double gain) {
+  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+    fill(pose, lung, gain);
+  }
+}
+
+supine_state supine_basis_scan(const supine_basis *basis) {
+  return (supine_state){
+      .gravity = {basis->scan_gravity[0], basis->scan_gravity[1], basis->scan_gravity[2]},
+      .volume = {SUPINE_VOLUME_SCAN, 0}};
+}
+
+void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose, double *volumes_ml) {
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    supine_volume_form form;
+    contract(basis, lung, pose->weights, &form);
+    volumes_ml[lung] =
+        basis->info.reference_volume[lung] + supine_volume_form_at(&form, pose->gains[lung]);
+  }
+}
+
+supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose) {
+  volumes v = {.lungs = basis->info.lung_count};
+  for (size_t lung = 0; lung < v.lungs; ++lung) {
+    contract(basis, lung, pose->weights, &v.form[lung]);
+  }
+  return common_gains(&v, volume, pose, NULL);
+}

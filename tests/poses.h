@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Poses of tests that choose gains themselves: one scale a lung. */
+#ifndef SUPINE_TESTS_POSES_H
+#define SUPINE_TESTS_POSES_H
+
+#include <string.h>
+
+#include <supine/runtime.h>
+#include <supine/volume.h>
+
+/* A pose of weights [K] and one gain for each lung [G], in the caller's scope. */
+#define POSED(of, by, at) posed(of, by, at, &(supine_pose){.weights = {0}})
+
+static inline supine_pose *posed(const supine_basis *basis, const double *weights,
+                                 const double *scales, supine_pose *pose) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  memcpy(pose->weights, weights, info->mode_count * sizeof *weights);
+  for (size_t i = 0; i < 3 * info->lung_count; ++i) {
+    pose->gains[i / 3][i % 3] = scales[i / 3];
+  }
+  return pose;
+}
+
+/* `count` poses, at most 512, of weights [count, K] and scales [count, G]; until the thread's next
+ * call. */
+static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
+                                       const double *weights, const double *scales) {
+  static _Thread_local supine_pose poses[512];
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  for (size_t j = 0; j < count; ++j) {
+    (void)posed(basis, weights + j * info->mode_count, scales + j * info->lung_count, &poses[j]);
+  }
+  return poses;
+}
+
+/* Adds the cubic by which a lung's volume grows with its scale, mL beyond the reference. */
+static inline void posed_cubic(const supine_basis *basis, size_t lung, const double *weights,
+                               double cubic[3]) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t k = info->mode_count;
+  supine_volume_add(k, info->volume_linear + lung * k, info->volume_quadratic + lung * k * k,
+                    info->volume_cubic + lung * k * k * k, weights, cubic);
+}
+
+static inline double posed_lung_volume(const supine_basis *basis, size_t lung,
+                                       const double *weights, double scale) {
+  double cubic[3] = {0.0, 0.0, 0.0};
+  posed_cubic(basis, lung, weights, cubic);
+  return supine_volume_at(cubic, scale);
+}
+
+static inline supine_status posed_lung_scale(const supine_basis *basis, size_t lung,
+                                             const double *weights, double volume, double *scale,
+                                             supine_error *error) {
+  double cubic[3] = {0.0, 0.0, 0.0};
+  posed_cubic(basis, lung, weights, cubic);
+  return supine_volume_scale(cubic, volume, scale, error);
+}
+
+/* The one scale at which all lungs together hold so much beyond the reference. */
+static inline supine_status posed_scale(const supine_basis *basis, const double *weights,
+                                        double volume, double *scale, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double cubic[3] = {0.0, 0.0, 0.0};
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    posed_cubic(basis, lung, weights, cubic);
+  }
+  return supine_volume_scale(cubic, volume, scale, error);
+}
+
+/* What the lungs together hold in a state, mL beyond the reference; the status of its pose. */
+static inline supine_status posed_volume(const supine_basis *basis, const double gravity[3],
+                                         supine_volume volume, double *beyond) {
+  supine_pose pose;
+  double held[SUPINE_LUNGS_MAX];
+  const supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]}, .volume = volume};
+  const supine_status status = supine_basis_pose(basis, &state, &pose, NULL);
+  *beyond = 0.0;
+  if (status == SUPINE_OK) {
+    supine_basis_volumes(basis, &pose, held);
+    for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+      *beyond += held[lung] - supine_basis_get_info(basis)->reference_volume[lung];
+    }
+  }
+  return status;
+}
+
+static inline supine_status posed_rest(const supine_basis *basis, const double gravity[3],
+                                       double *beyond) {
+  return posed_volume(basis, gravity, (supine_volume){SUPINE_VOLUME_REST, 0.0}, beyond);
+}
+
+
+/* What the scan held beyond the reference, mL. */
+static inline double posed_scan(const supine_basis *basis) {
+  const supine_state scan = supine_basis_scan(basis);
+  double beyond;
+  (void)posed_volume(basis, scan.gravity, scan.volume, &beyond);
+  return beyond;
+}
+
+#endif
