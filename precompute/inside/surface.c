@@ -204,11 +204,27 @@ static void nearest_in_triangle(const double *const p[3], const double x[3], dou
   }
 }
 
+/* Square of the distance of two intervals, the point x and [low, high]. */
+static inline double gap_square(double low, double high, double x) {
+  const double apart = low > x ? low - x : x > high ? x - high : 0.0;
+  return apart * apart;
+}
+
 static double box_square(const node *n, const double x[3]) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
-    const double apart = fmax(0.0, fmax(n->low[k] - x[k], x[k] - n->high[k]));
-    square += apart * apart;
+    square += gap_square(n->low[k], n->high[k], x[k]);
+  }
+  return square;
+}
+
+/* That of a triangle's box. */
+static double triangle_box_square(const double *const p[3], const double x[3]) {
+  double square = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double low = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
+    const double high = p[0][k] < p[1][k] ? p[1][k] : p[0][k];
+    square += gap_square(p[2][k] < low ? p[2][k] : low, p[2][k] > high ? p[2][k] : high, x[k]);
   }
   return square;
 }
@@ -244,6 +260,9 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
     double q[3];
     double apart[3];
     corners(s, s->order[i], p);
+    if (triangle_box_square(p, x) >= *best) {
+      continue;
+    }
     nearest_in_triangle(p, x, b);
     for (int k = 0; k < 3; ++k) {
       q[k] = b[0] * p[0][k] + b[1] * p[1][k] + b[2] * p[2][k];
@@ -297,26 +316,30 @@ static double angle(const supine_inside_surface *s, size_t at, const double x[3]
   return sum;
 }
 
+supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
+                                                  const double point[3],
+                                                  const supine_inside_place *near) {
+  supine_inside_place place = {.point = {point[0], point[1], point[2]}};
+  double best = INFINITY;
+  if (near != NULL) { /* the surface is no farther than from there, and the way */
+    const double limit =
+        (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
+    best = limit * limit;
+  }
+  search(surface, 0, point, &best, &place);
+  place.depth = sqrt(best);
+  return place;
+}
+
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],
                                                const supine_inside_place *near) {
   static const double half = 6.283185307179586; /* of 4 pi */
-  supine_inside_place place = {.point = {point[0], point[1], point[2]}};
-  double best = INFINITY;
-  double moved = INFINITY;
-  if (near != NULL) { /* the surface is no farther than from there, and the way */
-    double way[3];
-    subtract(point, near->point, way);
-    moved = sqrt(supine_dot(way, way));
-    const double limit = (fabs(near->depth) + moved) * (1.0 + 1e-9) + 1e-9;
-    best = limit * limit;
-  }
-  search(surface, 0, point, &best, &place);
-  const double distance = sqrt(best);
-  const bool inside =
-      distance <= on_surface ||
-      (near != NULL && moved < fabs(near->depth) ? near->depth > 0.0 /* no surface lies between */
-                                                 : angle(surface, 0, point) > half);
-  place.depth = inside ? distance : -distance;
+  supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
+  const bool inside = place.depth <= on_surface ||
+                      (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
+                           ? near->depth > 0.0 /* no surface lies between */
+                           : angle(surface, 0, point) > half);
+  place.depth = inside ? place.depth : -place.depth;
   return place;
 }

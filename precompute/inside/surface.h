@@ -30,13 +30,20 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
+/** Finds the nearest point; depth is positive on both sides. Thread-safe.
+ * @param near  the place of a point near by, which saves most of the work; NULL where none is known
+ */
+supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
+                                                  const double point[3],
+                                                  const supine_inside_place *near);
+
 /** Finds the nearest point, and which side by the generalised winding number, 1 inside and 0
  * outside, so that small holes do no harm: inside where
  *
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
  * Boxes farther than twice their radius count as one dipole. Thread-safe.
- * @param near  the place of a point near by, which saves most of the work; NULL where none is known
+ * @param near  as above, from this function
  * Source: [Jacobson2013]; dipoles [Barill2018]. */
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],

@@ -87,7 +87,7 @@ static void catch_range(void *context, size_t begin, size_t end, size_t thread) 
     for (size_t k = 0; k < 3; ++k) {
       at[k] += p[k] + motion[k];
     }
-    place = supine_inside_surface_find(m->tree, at, v > begin ? &place : NULL);
+    place = supine_inside_surface_nearest(m->tree, at, v > begin ? &place : NULL);
     const uint32_t *corner = m->state->triangles + 3 * place.triangle;
     for (size_t k = 0; k < 9; ++k) {
       normal[k % 3] +=

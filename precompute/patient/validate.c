@@ -156,8 +156,8 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
   const search *s = context;
   supine_inside_place place;
   for (size_t i = begin; i < end; ++i) {
-    place = supine_inside_surface_find(s->tree, s->points + 3 * i, i > begin ? &place : NULL);
-    s->distance[i] = fabs(place.depth);
+    place = supine_inside_surface_nearest(s->tree, s->points + 3 * i, i > begin ? &place : NULL);
+    s->distance[i] = place.depth;
     if (s->nearest != NULL) {
       memcpy(s->nearest + 3 * i, place.nearest, 3 * sizeof(double));
     }
