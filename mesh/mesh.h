@@ -190,7 +190,16 @@ supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error
 /** Releases; what was not committed is gone. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
 
-/** True where `path` has an ending that supine_mesh_save writes. */
+/** The formats that supine_mesh_save writes, by their endings; each is supine_mesh_save_NAME in
+ * mesh/io. This is the only list of them. */
+#define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)
+
+/** Their endings in words. */
+#define SUPINE_MESH_ENDINGS SUPINE_MESH_FORMATS(SUPINE_MESH_ENDING, SUPINE_MESH_NEXT_ENDING)
+#define SUPINE_MESH_ENDING(name) "." #name
+#define SUPINE_MESH_NEXT_ENDING(name) ", ." #name
+
+/** True where `path` has one of those endings. */
 bool supine_mesh_save_supports(const char *path);
 
 #endif

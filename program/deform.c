@@ -26,10 +26,10 @@ typedef struct request {
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement; what is inside also goes into "
-     ".csv, images into .nrrd, .nii or .nii.gz",
+     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement; what is inside also goes into "
+                         ".csv, images into .nrrd, .nii or .nii.gz",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
-     .endings = ".ply, .obj, .stl, .vtp, .csv, .nrrd, .nii or .nii.gz"},
+     .endings = SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii or .nii.gz"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",

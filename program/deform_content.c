@@ -8,6 +8,7 @@
 #include "sh/base/output.h"
 #include "sh/base/vec3.h"
 
+#include "mesh/mesh.h"
 #include "program/deform_content.h"
 #include "program/field/field.h"
 #include "program/names.h"
@@ -41,7 +42,7 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
   const bool image = wanted->image != NULL || wanted->labels != NULL;
   if (wanted->path == NULL && (image || wanted->field == NULL)) {
     return supine_options_usage(command, "-o FILE is missing; its name must end in %s",
-                                image ? ".nrrd, .nii or .nii.gz" : ".ply, .obj, .stl or .vtp");
+                                image ? ".nrrd, .nii or .nii.gz" : SUPINE_MESH_ENDINGS);
   }
   if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
     return supine_options_usage(command,

@@ -23,8 +23,8 @@ const supine_option supine_command_label_options[] = {
     {"close", 0, "MM",
      "first close gaps and channels narrower than twice this, as vessels leave them; default 0",
      FILLS(close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
-    {"surfaces-out", 0, "FILE", "keep the surfaces: .ply, .obj, .stl or .vtp", FILLS(surfaces),
-     .file = SUPINE_FILE_OUT, .endings = ".ply, .obj, .stl or .vtp"},
+    {"surfaces-out", 0, "FILE", "keep the surfaces: " SUPINE_MESH_ENDINGS, FILLS(surfaces),
+     .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
     {.name = NULL}};
 
 int supine_command_labels_check(const supine_label_options *options, const char *command,

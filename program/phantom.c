@@ -13,8 +13,8 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp", SUPINE_FILLS(request, path),
-     .required = true, .file = SUPINE_FILE_OUT, .endings = ".ply, .obj, .stl or .vtp"},
+    {"output", 'o', "FILE", SUPINE_MESH_ENDINGS, SUPINE_FILLS(request, path), .required = true,
+     .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
     {"vertices", 0, "N", "about so many in all, up to 20 million", SUPINE_FILLS(request, vertices),
      .standard = "20000"},
     {"volume", 0, "ML", "volume of both lungs together, an adult's at full inflation",

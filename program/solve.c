@@ -26,7 +26,7 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", ".ply, .obj, .stl or .vtp; PLY and VTP carry the displacement",
+    {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM",
@@ -208,7 +208,7 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_lungs lungs = {0};
   int result = SUPINE_EXIT_OK;
   if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
-    return supine_options_usage(name, "%s: the name must end in .ply, .obj, .stl or .vtp",
+    return supine_options_usage(name, "%s: the name must end in " SUPINE_MESH_ENDINGS,
                                 wanted->path);
   }
   if (!wanted->has_vertex) {

@@ -43,7 +43,7 @@ expect() {
 expect "deform" def
 expect "--posture" deform lungs.safetensors --pos
 expect "prone" deform lungs.safetensors --posture pr
-expect "linear" precompute --route l
+expect "paper" precompute --law p
 expect "" precompute --band 3
 cd "$(mktemp -d)" && : >lungs.ply
 expect "lungs.ply" precompute lu

@@ -7,29 +7,13 @@
 
 #include "mesh/io/save.h"
 
-typedef supine_status save_function(const mesh_writer *writer);
-
-static supine_status save_ply(const mesh_writer *writer) {
-  supine_mesh_save_ply(writer);
-  return SUPINE_OK;
-}
-
-static supine_status save_obj(const mesh_writer *writer) {
-  supine_mesh_save_obj(writer);
-  return SUPINE_OK;
-}
-
-static supine_status save_stl(const mesh_writer *writer) {
-  supine_mesh_save_stl(writer);
-  return SUPINE_OK;
-}
-
 static save_function *find_function(const char *path) {
+#define ROW(name) {SUPINE_MESH_ENDING(name), supine_mesh_save_##name},
   static const struct {
     const char *ending;
     save_function *function;
-  } known[] = {
-      {".ply", save_ply}, {".obj", save_obj}, {".stl", save_stl}, {".vtp", supine_mesh_save_vtp}};
+  } known[] = {SUPINE_MESH_FORMATS(ROW, ROW)};
+#undef ROW
   const size_t length = strlen(path);
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const size_t ending = strlen(known[i].ending);
@@ -49,7 +33,7 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   save_function *function = find_function(path);
   if (function == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: unknown ending; end the name in .ply, .obj, .stl or .vtp", path);
+                            "%s: unknown ending; end the name in " SUPINE_MESH_ENDINGS, path);
   }
   supine_output output;
   supine_status status = supine_mesh_writer_check(path, mesh, error);

@@ -42,10 +42,11 @@ supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
 void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
 
-/* Write errors stay in the stream, for the caller to find; VTP wants memory. */
-void supine_mesh_save_ply(const mesh_writer *writer);
-void supine_mesh_save_obj(const mesh_writer *writer);
-void supine_mesh_save_stl(const mesh_writer *writer);
-supine_status supine_mesh_save_vtp(const mesh_writer *writer);
+/** Write a surface in one format. Write errors stay in the stream, for the caller to find.
+ * @retval SUPINE_ERROR_MEMORY */
+typedef supine_status save_function(const mesh_writer *writer);
+#define SUPINE_MESH_SAVE(name) save_function supine_mesh_save_##name;
+SUPINE_MESH_FORMATS(SUPINE_MESH_SAVE, SUPINE_MESH_SAVE)
+#undef SUPINE_MESH_SAVE
 
 #endif

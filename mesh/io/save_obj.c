@@ -2,7 +2,7 @@
 /* OBJ text. */
 #include "mesh/io/save.h"
 
-void supine_mesh_save_obj(const mesh_writer *writer) {
+supine_status supine_mesh_save_obj(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "# SPACE=%s mm\n", writer->space);
   if (writer->comment[0] != '\0') {
@@ -19,4 +19,5 @@ void supine_mesh_save_obj(const mesh_writer *writer) {
     (void)fprintf(writer->out, "f %lu %lu %lu\n", corner[0] + 1UL, corner[1] + 1UL,
                   corner[2] + 1UL);
   }
+  return SUPINE_OK;
 }

@@ -2,7 +2,7 @@
 /* Binary little-endian PLY. */
 #include "mesh/io/save.h"
 
-void supine_mesh_save_ply(const mesh_writer *writer) {
+supine_status supine_mesh_save_ply(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s mm\n",
                 writer->space);
@@ -45,4 +45,5 @@ void supine_mesh_save_ply(const mesh_writer *writer) {
     supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
     (void)fwrite(bytes, 1, sizeof bytes, writer->out);
   }
+  return SUPINE_OK;
 }

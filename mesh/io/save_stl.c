@@ -29,7 +29,7 @@ static void facet_normal(float corners[3][3], float normal[3]) {
   }
 }
 
-void supine_mesh_save_stl(const mesh_writer *writer) {
+supine_status supine_mesh_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   /* The header must not begin with "solid", by which readers know STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
@@ -55,4 +55,5 @@ void supine_mesh_save_stl(const mesh_writer *writer) {
     }
     (void)fwrite(bytes, 1, sizeof bytes, writer->out);
   }
+  return SUPINE_OK;
 }
