@@ -137,15 +137,21 @@ fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs
     f->mode[i] = fixture_random(&state);
   }
   if (volume) {
-    f->linear = calloc(lungs * modes + 1, sizeof *f->linear);
-    f->quadratic = calloc(lungs * modes * modes + 1, sizeof *f->quadratic);
-    f->cubic = calloc(lungs * modes * modes * modes + 1, sizeof *f->cubic);
-    assert_true(f->linear && f->quadratic && f->cubic);
-    for (size_t t = 0; t < f->triangles; ++t) {
-      add_forms(f, f->triangle + 3 * t, f->lung[f->triangle[3 * t]]);
-    }
+    fixture_add_forms(f);
   }
   return f;
+}
+
+void fixture_add_forms(fixture *f) {
+  const size_t k = f->modes;
+  f->volume = true;
+  f->linear = calloc(f->lungs * k + 1, sizeof *f->linear);
+  f->quadratic = calloc(f->lungs * k * k + 1, sizeof *f->quadratic);
+  f->cubic = calloc(f->lungs * k * k * k + 1, sizeof *f->cubic);
+  assert_true(f->linear && f->quadratic && f->cubic);
+  for (size_t t = 0; t < f->triangles; ++t) {
+    add_forms(f, f->triangle + 3 * t, f->lung[f->triangle[3 * t]]);
+  }
 }
 
 void fixture_destroy(fixture *f) {

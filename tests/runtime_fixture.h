@@ -38,6 +38,9 @@ fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
 
+/* Gives it the volume forms of its field, where it was made without. */
+void fixture_add_forms(fixture *f);
+
 /* Gives it normals of random modes: no surface's, but numbers to compare with. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 

@@ -9,8 +9,9 @@
  * to 5.7), from full breaths of 15 people in one posture; for turns it is an extrapolation. The
  * second term is there where the resting volume is assumed and not known.
  *
- * With observed points the law's positions are corrected by kriging; expected errors shrink near
- * the points and never exceed those above. */
+ * With observed points the law's positions are corrected by kriging. Expected errors shrink near
+ * the points and, from three points on, never exceed those above; fewer say too little of the
+ * translation. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
@@ -57,15 +58,16 @@ typedef struct supine_locate_task {
 
 /** What was found. */
 typedef struct supine_location {
-  supine_state state;    /**< its volume is absolute where it was found */
-  double volume;         /**< mL of all lungs, gas and tissue */
-  double volume_error;   /**< its standard deviation; 0 where the volume was given */
-  double rotation[9];    /**< by rows: observed = rotation * body + translation */
-  double translation[3]; /**< mm */
-  double residual_rms;   /**< of the observed points from all others' prediction, mm; 0 of one */
-  double log_evidence;   /**< of the posture, for comparing tasks that differ in it alone */
-  size_t outlier_count;  /**< observations that do not fit and were left out */
-  const void *fit;       /**< in the workspace */
+  supine_state state;        /**< its volume is absolute where it was found */
+  double volume;             /**< mL of all lungs, gas and tissue */
+  double volume_error;       /**< its standard deviation; 0 where the volume was given */
+  double volume_prior_error; /**< the same before any point was observed */
+  double rotation[9];        /**< by rows: observed = rotation (body + correction) + translation */
+  double translation[3];     /**< mm */
+  double residual_rms;  /**< of the observed points from all others' prediction, mm; 0 of one */
+  double log_evidence;  /**< of the posture, for comparing tasks that differ in it alone */
+  size_t outlier_count; /**< observations that do not fit and were left out */
+  const void *fit;      /**< in the workspace */
 } supine_location;
 
 /** How an observed point fits. */
@@ -81,7 +83,7 @@ SUPINE_API size_t supine_locate_space(size_t count);
 /** Find the state, the motion and the correction from observed points.
  *
  * An unknown volume has the prior of rest (of the scan where no rest is known) with a standard
- * deviation of 0.17 of the reference volume. A point farther than 2.6 sigma from where the others
+ * deviation of 0.17 of the reference volume. A point farther than 3 sigma from where the others
  * put it is left out, the worst first, while four fifths of the points remain.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)], kept by `found`

@@ -1,0 +1,386 @@
+/* SPDX-License-Identifier: MIT */
+/* Find a state, a motion and a correction from observed points. */
+#include <math.h>
+#include <string.h>
+
+#include "runtime/locate.h"
+
+_Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "one limit");
+
+static const double prior_spread = 0.17; /* of the volume: 0.3 of the way from rest, 0.43 of full */
+static const double outlier_limit = 3.0; /* of sigma */
+static const double outlier_noise = 300; /* mm: what one that does not fit counts as */
+static const double volume_step = 1;     /* mL, at which the volume has been found */
+static const double angle_step = 1e-4;   /* radians */
+static const double sill_of_error = 4.0 / 3; /* s of c: 6 mm of 4.5, which a translation explains */
+
+enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
+
+/* What is under way. `law` are the observed points' positions in the state. */
+typedef struct study {
+  const supine_locate_task *task;
+  supine_location *found;
+  supine_locate_fit *fit;
+  supine_kriging_point *points; /* [n] */
+  double *law;                  /* [n, 3] mm */
+  double *kriging;
+  double *scratch; /* [n] */
+} study;
+
+static size_t doubles_of(size_t bytes) {
+  return (bytes + sizeof(double) - 1) / sizeof(double);
+}
+
+size_t supine_locate_space(size_t count) {
+  return doubles_of(sizeof(supine_locate_fit)) + doubles_of(count * sizeof(supine_kriging_point)) +
+         4 * count + supine_kriging_space(count);
+}
+
+static void place_in(double *space, size_t count, study *s) {
+  s->fit = (supine_locate_fit *)space;
+  space += doubles_of(sizeof *s->fit);
+  s->points = (supine_kriging_point *)space;
+  space += doubles_of(count * sizeof *s->points);
+  s->law = space;
+  s->scratch = space + 3 * count;
+  s->kriging = space + 4 * count;
+}
+
+static supine_status check(const supine_locate_task *task, supine_error *error) {
+  const size_t n = supine_basis_get_info(task->inside)->vertex_count;
+  if (task->count == 0 || task->count > SUPINE_LOCATE_POINTS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu observed points: give 1 to %d",
+                            task->count, (int)SUPINE_LOCATE_POINTS_MAX);
+  }
+  if (task->rigid && task->count < 3) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a rotation needs three observed points, not %zu", task->count);
+  }
+  for (size_t j = 0; j < task->count; ++j) {
+    const supine_observation *o = &task->observed[j];
+    const double sum = o->position[0] + o->position[1] + o->position[2];
+    if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "observation %zu: vertex %zu of %zu, or numbers out of range", j + 1,
+                              o->vertex, n);
+    }
+  }
+  return SUPINE_OK;
+}
+
+static void position(const supine_basis *basis, const supine_pose *pose, size_t vertex,
+                     double at[3]) {
+  float x[3];
+  supine_deform_range(basis, pose, vertex, vertex + 1, x);
+  for (size_t i = 0; i < 3; ++i) {
+    at[i] = (double)x[i];
+  }
+}
+
+/* What does not change with the state. */
+static supine_status begin(study *s, supine_error *error) {
+  const supine_locate_task *task = s->task;
+  const supine_basis *basis = task->inside;
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_state scan = supine_basis_scan(basis);
+  const bool unknown = task->state.lung_count == 0 && info->has_volume && !info->is_fields &&
+                       task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
+  supine_pose pose;
+  const supine_status status = supine_basis_pose(basis, &scan, &pose, error);
+  for (size_t j = 0; j < task->count && status == SUPINE_OK; ++j) {
+    supine_kriging_point *p = &s->points[j];
+    *p = (supine_kriging_point){.noise = task->observed[j].noise};
+    position(basis, &pose, task->observed[j].vertex, p->position);
+    while (task->observed[j].vertex >= info->lung_begin[p->lung + 1]) {
+      ++p->lung;
+    }
+  }
+  *s->found = (supine_location){.state = task->state, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  if (unknown) {
+    s->found->state.volume =
+        (supine_volume){info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, 0};
+  }
+  *s->fit = (supine_locate_fit){
+      .options = {.model = supine_kriging_default, .volume = unknown, .rotation = task->rigid},
+      .deviation = unknown ? prior_spread * supine_expected_reference(basis) : 0};
+  s->fit->options.model.sill = sill_of_error * supine_expected_constant(basis);
+  return status;
+}
+
+static void turn(const double rotation[9], const double x[3], double turned[3]) {
+  for (size_t i = 0; i < 3; ++i) {
+    turned[i] = rotation[3 * i] * x[0] + rotation[3 * i + 1] * x[1] + rotation[3 * i + 2] * x[2];
+  }
+}
+
+/* Put the law's points of the state, and what volume adds to them, into the study. */
+static supine_status evaluate(study *s, supine_error *error) {
+  const supine_locate_task *task = s->task;
+  const double step = supine_expected_shift * supine_expected_reference(task->inside);
+  supine_pose pose;
+  supine_pose fuller;
+  supine_status status = supine_basis_pose(task->inside, &s->found->state, &pose, error);
+  if (status == SUPINE_OK && s->fit->options.volume) {
+    status = supine_expected_shifted(task->inside, &s->found->state, &fuller, error);
+  }
+  for (size_t j = 0; j < task->count && status == SUPINE_OK; ++j) {
+    double *x = s->law + 3 * j;
+    double other[3];
+    double square = 0;
+    position(task->inside, &pose, task->observed[j].vertex, x);
+    if (s->fit->options.volume) {
+      position(task->inside, &fuller, task->observed[j].vertex, other);
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      const double u = x[i] - s->points[j].position[i];
+      square += u * u;
+      s->points[j].volume[i] =
+          s->fit->options.volume ? (other[i] - x[i]) * s->fit->deviation / step : 0;
+    }
+    s->points[j].size = sqrt(square);
+  }
+  return status;
+}
+
+/* The translation between means, and residuals in the body's axes. */
+static void find_residuals(study *s) {
+  const size_t n = s->task->count;
+  supine_location *found = s->found;
+  double mean[3] = {0};
+  double observed[3] = {0};
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t i = 0; i < 3; ++i) {
+      mean[i] += s->law[3 * j + i] / (double)n;
+      observed[i] += s->task->observed[j].position[i] / (double)n;
+    }
+  }
+  turn(found->rotation, mean, s->fit->origin);
+  for (size_t i = 0; i < 3; ++i) {
+    s->fit->origin[i] = observed[i] - s->fit->origin[i];
+  }
+  for (size_t j = 0; j < n; ++j) {
+    double d[3];
+    for (size_t i = 0; i < 3; ++i) {
+      d[i] = s->task->observed[j].position[i] - s->fit->origin[i];
+    }
+    for (size_t i = 0; i < 3; ++i) { /* R' d */
+      s->points[j].residual[i] = found->rotation[i] * d[0] + found->rotation[3 + i] * d[1] +
+                                 found->rotation[6 + i] * d[2] - s->law[3 * j + i];
+    }
+  }
+}
+
+/* Start from the rotation that fits the points best [Horn 1987, J Opt Soc Am A 4(4)]: the largest
+ * eigenvector of a symmetric 4 x 4 matrix, by powers. */
+static void rotate_roughly(study *s) {
+  double h[3][3] = {{0}};
+  find_residuals(s);
+  const double *c = s->fit->origin; /* between means, as nothing is turned yet */
+  double mean[3] = {0};
+  const size_t n = s->task->count;
+  for (size_t j = 0; j < 3 * n; ++j) {
+    mean[j % 3] += s->law[j] / (double)n;
+  }
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t a = 0; a < 3; ++a) {
+      for (size_t b = 0; b < 3; ++b) {
+        h[a][b] +=
+            (s->law[3 * j + a] - mean[a]) * (s->task->observed[j].position[b] - c[b] - mean[b]);
+      }
+    }
+  }
+  const double m[4][4] = {
+      {h[0][0] + h[1][1] + h[2][2], h[1][2] - h[2][1], h[2][0] - h[0][2], h[0][1] - h[1][0]},
+      {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
+      {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
+      {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]}};
+  double shift = 0; /* makes every eigenvalue positive */
+  for (size_t k = 0; k < 16; ++k) {
+    shift += m[k / 4][k % 4] * m[k / 4][k % 4];
+  }
+  shift = sqrt(shift);
+  double q[4] = {0.9, 0.3, 0.2, 0.1};
+  for (int step = 0; step < 200; ++step) {
+    double next[4];
+    double square = 0;
+    for (size_t a = 0; a < 4; ++a) {
+      next[a] = shift * q[a] + m[a][0] * q[0] + m[a][1] * q[1] + m[a][2] * q[2] + m[a][3] * q[3];
+      square += next[a] * next[a];
+    }
+    for (size_t a = 0; a < 4 && square > 0; ++a) {
+      q[a] = next[a] / sqrt(square);
+    }
+  }
+  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const double w = q[0] / length;
+  const double x = q[1] / length;
+  const double y = q[2] / length;
+  const double z = q[3] / length;
+  const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                       2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                       2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+  memcpy(s->found->rotation, r, sizeof r);
+}
+
+/* R exp(r) [Rodrigues]. */
+static void rotate_further(double rotation[9], const double r[3]) {
+  const double angle = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+  if (angle == 0) {
+    return;
+  }
+  const double c = cos(angle);
+  const double sine = sin(angle) / angle;
+  const double rest = (1 - c) / (angle * angle);
+  double step[9];
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t b = 0; b < 3; ++b) {
+      const double cross = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * r[3 - a - b];
+      step[3 * a + b] = (a == b ? c : 0) + sine * cross + rest * r[a] * r[b];
+    }
+  }
+  double product[9];
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t b = 0; b < 3; ++b) {
+      product[3 * a + b] = rotation[3 * a] * step[b] + rotation[3 * a + 1] * step[3 + b] +
+                           rotation[3 * a + 2] * step[6 + b];
+    }
+  }
+  memcpy(rotation, product, sizeof product);
+}
+
+/* Change the volume, by less where no surface holds the new one. */
+static supine_status change_volume(study *s, double ml, supine_error *error) {
+  const double most = 0.5 * s->fit->deviation;
+  const double before = s->found->state.volume.ml;
+  ml = fmax(-most, fmin(most, ml));
+  supine_status status = SUPINE_OK;
+  for (int halving = 0; halving < HALVINGS_MAX; ++halving) {
+    s->found->state.volume.ml = before + ml;
+    status = evaluate(s, error);
+    if (status == SUPINE_OK) {
+      return status;
+    }
+    ml /= 2;
+  }
+  return status;
+}
+
+/* Fit, and move volume and rotation until both stay (Gauss and Newton). */
+static supine_status settle(study *s, supine_error *error) {
+  supine_locate_fit *fit = s->fit;
+  const double deviation = fit->deviation;
+  for (int step = 0;; ++step) {
+    find_residuals(s);
+    fit->options.volume_mean = fit->options.volume ? -s->found->state.volume.ml / deviation : 0;
+    supine_status status = supine_kriging_fit(&fit->options, s->task->count, s->points, s->kriging,
+                                              &fit->kriging, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    const double *r = fit->kriging.terms + 4;
+    const double ml = fit->kriging.terms[3] * deviation;
+    const bool turned = fabs(r[0]) + fabs(r[1]) + fabs(r[2]) > angle_step;
+    if (step == STEPS_MAX || (fabs(ml) < volume_step && !turned)) {
+      return SUPINE_OK;
+    }
+    rotate_further(s->found->rotation, r);
+    if (fit->options.volume) {
+      status = change_volume(s, ml, error);
+    }
+    if (status != SUPINE_OK) {
+      return status;
+    }
+  }
+}
+
+/* Compare each point with what the others say.
+ * @return the one that fits worst beyond the limit, or `count` */
+static size_t judge(study *s, supine_locate_residual *residuals) {
+  const size_t n = s->task->count;
+  size_t worst = n;
+  double largest = outlier_limit;
+  double sum = 0;
+  size_t used = 0;
+  for (size_t j = 0; j < n; ++j) {
+    supine_locate_residual *r = &residuals[j];
+    double d[3];
+    const double noise = s->task->observed[j].noise;
+    const double extra = s->points[j].noise * s->points[j].noise - noise * noise;
+    r->sigma = supine_kriging_leave_out(&s->fit->kriging, j, d, s->scratch);
+    r->sigma = sqrt(fmax(0, r->sigma * r->sigma - 3 * extra));
+    r->distance = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    if (r->outlier) {
+      continue;
+    }
+    sum += r->distance * r->distance;
+    ++used;
+    if (r->sigma > 0 && r->distance > largest * r->sigma) {
+      largest = r->distance / r->sigma;
+      worst = j;
+    }
+  }
+  s->found->residual_rms = used > 0 ? sqrt(sum / (double)used) : 0;
+  return worst;
+}
+
+static supine_status locate(study *s, supine_locate_residual *residuals, supine_error *error) {
+  const size_t n = s->task->count;
+  supine_status status = begin(s, error);
+  if (status == SUPINE_OK) {
+    status = evaluate(s, error);
+  }
+  if (status == SUPINE_OK && s->task->rigid) {
+    rotate_roughly(s);
+  }
+  while (status == SUPINE_OK) {
+    status = settle(s, error);
+    if (status != SUPINE_OK) {
+      break;
+    }
+    const size_t worst = judge(s, residuals);
+    if (worst == n || 5 * (s->found->outlier_count + 1) > n) {
+      break;
+    }
+    residuals[worst].outlier = true;
+    s->points[worst].noise = outlier_noise;
+    ++s->found->outlier_count;
+  }
+  return status;
+}
+
+supine_status supine_locate(const supine_locate_task *task, supine_locate_residual *residuals,
+                            double *space, supine_location *found, supine_error *error) {
+  supine_status status = check(task, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const supine_basis_info *info = supine_basis_get_info(task->inside);
+  study s = {.task = task, .found = found};
+  place_in(space, task->count, &s);
+  memset(residuals, 0, task->count * sizeof *residuals);
+  status = locate(&s, residuals, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (info->has_volume) {
+    supine_pose pose;
+    double volumes[SUPINE_LUNGS_MAX];
+    (void)supine_basis_pose(task->inside, &found->state, &pose, NULL);
+    supine_basis_volumes(task->inside, &pose, volumes);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      found->volume += volumes[lung];
+    }
+    found->volume_error = s.fit->deviation * sqrt(s.fit->kriging.covariance[3][3]);
+  }
+  if (s.fit->options.volume) {
+    found->volume_prior_error = s.fit->deviation;
+    found->state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, found->volume};
+  }
+  turn(found->rotation, s.fit->kriging.terms, found->translation);
+  for (size_t i = 0; i < 3; ++i) {
+    found->translation[i] += s.fit->origin[i];
+  }
+  found->log_evidence = s.fit->kriging.log_likelihood;
+  found->fit = s.fit;
+  return SUPINE_OK;
+}

@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Expected errors, and lungs found from points that the law itself moved. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <supine/locate.h>
+
+#include "runtime_fixture.h"
+
+enum { VERTICES = 400, SEEN = 20 };
+
+typedef struct world {
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_observation seen[SEEN];
+  double *space;
+  supine_locate_residual residuals[SEEN];
+} world;
+
+/* Two lungs that shrink towards their apex and, by a third, where gravity points. */
+static void make_field(fixture *f) {
+  memset(f->mode, 0, 2 * 4 * sizeof *f->mode);
+  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y */
+  for (size_t i = 0; i < f->vertices; ++i) {
+    const float *p = f->vertex + 3 * i;
+    const double middle = 150.3 * ((double)f->lung[i] - 0.5);
+    f->direction[3 * i] = (float)(0.2 * ((double)p[0] - middle));
+    f->direction[3 * i + 1] = 0.2F * p[1];
+    f->direction[3 * i + 2] = 0.2F * (p[2] - 131.7F);
+    f->coefficient[2 * i] = 1;
+    f->coefficient[2 * i + 1] = p[1] / 300;
+  }
+}
+
+static int setup(void **state) {
+  static const double resting[9] = {1700 * -3.5449077018110318};
+  world *w = fixture_allocate(1, sizeof *w);
+  fixture *f = fixture_create(VERTICES, 2, 1, 2, false, false, 1, 77);
+  supine_error error = {0};
+  size_t size = 0;
+  make_field(f);
+  fixture_add_forms(f);
+  f->resting = resting;
+  w->bytes = fixture_bytes(f, &size);
+  fixture_destroy(f);
+  if (supine_basis_open_memory(w->bytes, size, &w->basis, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  w->space = fixture_allocate(supine_locate_space(SEEN), sizeof *w->space);
+  *state = w;
+  return 0;
+}
+
+static int teardown(void **state) {
+  world *w = *state;
+  supine_basis_close(w->basis);
+  free(w->bytes);
+  free(w->space);
+  free(w);
+  return 0;
+}
+
+static supine_state state_of(const char *text) {
+  supine_state state = {.gravity = {0, 1, 0}};
+  assert_int_equal(supine_state_parse(text, &state, NULL), SUPINE_OK);
+  return state;
+}
+
+/* Where the vertices are in a state. */
+static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
+  supine_pose pose;
+  supine_error error = {0};
+  if (supine_basis_pose(basis, state, &pose, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  supine_deform(basis, &pose, xyz);
+}
+
+/* Turned by 40 degrees about (1, 2, 2) / 3 where `turned`, and shifted. */
+static void move(bool turned, const double x[3], double moved[3]) {
+  static const double shift[3] = {512, -207, 1020};
+  const double c = turned ? cos(0.7) : 1;
+  const double s = turned ? sin(0.7) : 0;
+  const double a[3] = {1 / 3.0, 2 / 3.0, 2 / 3.0};
+  const double along = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t j = (i + 1) % 3;
+    const size_t k = (i + 2) % 3;
+    moved[i] = c * x[i] + s * (a[j] * x[k] - a[k] * x[j]) + (1 - c) * along * a[i] + shift[i];
+  }
+}
+
+/* Every twentieth vertex, observed in a state. */
+static void observe(world *w, const supine_state *state, bool turned) {
+  float xyz[3 * VERTICES];
+  deform(w->basis, state, xyz);
+  for (size_t j = 0; j < SEEN; ++j) {
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* the apices and bases are among them */
+    const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
+    w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
+    move(turned, x, w->seen[j].position);
+  }
+}
+
+/* RMS over all vertices of what was found less what is true. */
+static double miss(const world *w, const supine_location *found, const supine_state *state,
+                   bool turned) {
+  float truth[3 * VERTICES];
+  float xyz[3 * VERTICES];
+  float sigma[VERTICES];
+  double sum = 0;
+  deform(w->basis, state, truth);
+  assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    const double x[3] = {(double)truth[3 * i], (double)truth[3 * i + 1], (double)truth[3 * i + 2]};
+    double moved[3];
+    move(turned, x, moved);
+    assert_true(sigma[i] > 0 && sigma[i] < 60);
+    for (size_t k = 0; k < 3; ++k) {
+      sum += pow((double)xyz[3 * i + k] - moved[k], 2);
+    }
+  }
+  return sqrt(sum / VERTICES);
+}
+
+static supine_location locate(world *w, const supine_state *state, bool rigid) {
+  const supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = *state, .rigid = rigid};
+  supine_location found;
+  supine_error error = {0};
+  if (supine_locate(&task, w->residuals, w->space, &found, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return found;
+}
+
+static void test_locate_law_as_truth_is_found(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("prone:rest+300");
+  const supine_state posture = state_of("prone");
+  double held[2];
+  supine_pose pose;
+  assert_int_equal(supine_basis_pose(w->basis, &truth, &pose, NULL), SUPINE_OK);
+  supine_basis_volumes(w->basis, &pose, held);
+  for (int rigid = 0; rigid < 2; ++rigid) {
+    observe(w, &truth, rigid == 1);
+    const supine_location found = locate(w, &posture, rigid == 1);
+    print_message("off by %.2f mm, %.0f mL +- %.0f, %.2f mm among the points\n",
+                  miss(w, &found, &truth, rigid == 1), found.volume - held[0] - held[1],
+                  found.volume_error, found.residual_rms);
+    assert_true(miss(w, &found, &truth, rigid == 1) < 2.5);
+    assert_true(fabs(found.volume - held[0] - held[1]) < found.volume_error);
+    assert_true(found.volume_error < found.volume_prior_error);
+    assert_int_equal(found.outlier_count, 0);
+    assert_true(found.rotation[0] > (rigid == 1 ? 0.7 : 0.999));
+  }
+}
+
+static void test_locate_given_volume_stays(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("prone:rest+300");
+  observe(w, &truth, false);
+  const supine_location found = locate(w, &truth, false);
+  assert_int_equal(found.state.volume.kind, SUPINE_VOLUME_REST);
+  assert_true(found.volume_error == 0);
+  assert_true(miss(w, &found, &truth, false) < 0.05);
+}
+
+static void test_locate_wrong_point_is_named_and_moves_nothing(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("left:full-700"); /* where points are known to 10 mm */
+  const supine_state posture = state_of("left");
+  observe(w, &truth, false);
+  const supine_location before = locate(w, &posture, false);
+  float xyz[2][3 * VERTICES];
+  float sigma[VERTICES];
+  assert_int_equal(supine_locate_positions(&before, w->basis, xyz[0], sigma, NULL), SUPINE_OK);
+  for (size_t wrong = 0; wrong < SEEN; ++wrong) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      w->seen[wrong].position[axis] += 30;
+      const supine_location found = locate(w, &posture, false);
+      w->seen[wrong].position[axis] -= 30;
+      assert_int_equal(found.outlier_count, 1);
+      assert_true(w->residuals[wrong].outlier);
+      assert_true(w->residuals[wrong].distance > 20);
+      assert_int_equal(supine_locate_positions(&found, w->basis, xyz[1], sigma, NULL), SUPINE_OK);
+      double square = 0;
+      for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+        square += pow((double)(xyz[1][i] - xyz[0][i]), 2) / VERTICES;
+      }
+      assert_true(sqrt(square) < 1);
+    }
+  }
+}
+
+static void test_locate_error_is_never_above_that_without_points(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("supine:scan-900");
+  float expected[VERTICES];
+  float xyz[3 * VERTICES];
+  float sigma[VERTICES];
+  observe(w, &truth, false);
+  assert_int_equal(supine_expected_error(w->basis, &truth, NULL, expected, NULL), SUPINE_OK);
+  for (size_t count = 3; count <= SEEN; ++count) {
+    const supine_locate_task task = {
+        .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
+    supine_location found;
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+    assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i])); /* |u| counts 2 mm at least */
+    }
+  }
+}
+
+static void test_locate_one_point_leaves_no_residual(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("supine:scan-900");
+  observe(w, &truth, false);
+  for (size_t count = 1; count < 3; ++count) {
+    const supine_locate_task task = {
+        .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
+    supine_location found;
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+    assert_int_equal(w->residuals[0].sigma > 0, count > 1);
+    assert_true(miss(w, &found, &truth, false) < 0.05);
+  }
+}
+
+static void test_locate_bad_task_is_refused(void **of) {
+  world *w = *of;
+  const supine_state truth = state_of("supine:rest");
+  observe(w, &truth, false);
+  const supine_observation good = w->seen[0];
+  const supine_observation bad[] = {{VERTICES, {0, 0, 0}, 1},
+                                    {0, {0, (double)NAN, 0}, 1},
+                                    {0, {0, 0, (double)INFINITY}, 1},
+                                    {0, {0, 0, 0}, 0},
+                                    {0, {0, 0, 0}, (double)NAN}};
+  supine_location found;
+  supine_error error;
+  supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = truth};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    w->seen[0] = bad[i];
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_ARGUMENT);
+  }
+  w->seen[0] = good;
+  const size_t counts[] = {0, SUPINE_LOCATE_POINTS_MAX + 1};
+  for (size_t i = 0; i < 2; ++i) {
+    task.count = counts[i];
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_ARGUMENT);
+  }
+  task.rigid = true;
+  task.count = 2;
+  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  task.count = 3;
+  w->seen[1] = w->seen[2] = w->seen[0]; /* one place: no rotation */
+  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+}
+
+/* sigma^2 = |u| min(4.5, RMS of u), and where rest is assumed what 5 % of full inflation moves. */
+static void test_expected_error_follows_its_formula(void **of) {
+  world *w = *of;
+  const supine_basis_info *info = supine_basis_get_info(w->basis);
+  const double full = info->reference_volume[0] + info->reference_volume[1];
+  const char *const states[] = {"prone:scan-900", "supine:scan-20", "left:rest+100"};
+  for (size_t s = 0; s < 3; ++s) {
+    const supine_state state = state_of(states[s]);
+    const supine_state scan = supine_basis_scan(w->basis);
+    supine_state fuller = state;
+    fuller.volume.ml += 0.05 * full;
+    float x[3][3 * VERTICES];
+    float sigma[VERTICES];
+    double squares = 0;
+    deform(w->basis, &state, x[0]);
+    deform(w->basis, &scan, x[1]);
+    deform(w->basis, &fuller, x[2]);
+    for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+      squares += pow((double)(x[0][i] - x[1][i]), 2) / VERTICES;
+    }
+    const double c = fmin(4.5, sqrt(squares));
+    assert_int_equal(supine_expected_error(w->basis, &state, NULL, sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      double u = 0;
+      double slope = 0;
+      for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
+        u += pow((double)(x[0][j] - x[1][j]), 2);
+        slope += state.volume.kind == SUPINE_VOLUME_REST ? pow((double)(x[2][j] - x[0][j]), 2) : 0;
+      }
+      const double expected = sqrt(c * sqrt(u) + slope);
+      assert_true(fabs((double)sigma[i] - expected) < 1e-3 + 0.03 * expected);
+    }
+  }
+  const supine_state scan = supine_basis_scan(w->basis);
+  float sigma[VERTICES];
+  assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    assert_true(sigma[i] == 0); /* the scan itself is known */
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_locate_law_as_truth_is_found),
+      cmocka_unit_test(test_locate_given_volume_stays),
+      cmocka_unit_test(test_locate_wrong_point_is_named_and_moves_nothing),
+      cmocka_unit_test(test_locate_error_is_never_above_that_without_points),
+      cmocka_unit_test(test_locate_one_point_leaves_no_residual),
+      cmocka_unit_test(test_locate_bad_task_is_refused),
+      cmocka_unit_test(test_expected_error_follows_its_formula),
+  };
+  return cmocka_run_group_tests(tests, setup, teardown);
+}
