@@ -146,6 +146,9 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status =
       supine_command_located_find(&task, wanted->orientation.given, shown, &located, error);
+  if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) { /* the file's points, no option */
+    status = error->status = SUPINE_ERROR_FORMAT;
+  }
   if (status == SUPINE_OK) {
     status = csv ? write_points(wanted->output, inside, names, &located, error)
                  : write_surface(wanted->output, lungs, &located, error);
