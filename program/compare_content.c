@@ -11,6 +11,7 @@
 
 #include "program/compare_content.h"
 #include "program/names.h"
+#include "program/options/expected.h"
 
 /* Where everything is in every posture: moves [postures, names, 3], mm from the reference surface.
  */
@@ -18,6 +19,7 @@ typedef struct comparison {
   const supine_posture_list *postures;
   supine_command_names names;
   double *moves;
+  double *errors; /* [postures, postures, names] expected, mm RMS; 0 where they are not known */
 } comparison;
 
 /* Means over each name's vertices in one state. */
@@ -48,6 +50,31 @@ static supine_status find_moves(const supine_basis *basis, const supine_state *s
   return SUPINE_OK;
 }
 
+/* Root mean squares of the expected errors of each name's vertices. */
+static supine_status find_errors(const supine_basis *basis, const supine_state *to,
+                                 const supine_state *from, const supine_command_names *names,
+                                 double *errors, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_expected expected = {0};
+  const supine_status status = supine_options_expected_find(basis, to, from, &expected, error);
+  for (size_t begin = 0; expected.sigma != NULL && begin < info->vertex_count;) {
+    const size_t name = names->part[names->order[begin]];
+    double sum = 0.0;
+    size_t end = begin;
+    for (; end < info->vertex_count && names->part[names->order[end]] == name; ++end) {
+      sum += pow((double)expected.sigma[names->order[end]], 2.0);
+    }
+    errors[name] = sqrt(sum / (double)(end - begin));
+    begin = end;
+  }
+  supine_options_expected_free(&expected);
+  return status;
+}
+
+static double error_of(const comparison *c, size_t from, size_t to, size_t name) {
+  return c->errors[(from * c->postures->count + to) * c->names.count + name];
+}
+
 /* From posture `from` to posture `to`; its length is returned. */
 static double move_between(const comparison *c, size_t from, size_t to, size_t name,
                            double move[3]) {
@@ -64,7 +91,11 @@ static void print_table(const comparison *c, size_t from, size_t to) {
   for (size_t name = 0; name < c->names.count; ++name) {
     double move[3];
     const double length = move_between(c, from, to, name, move);
-    (void)printf("  %-16s %5.1f mm:", c->names.text[name], length);
+    (void)printf("  %-16s %5.1f mm", c->names.text[name], length);
+    if (error_of(c, from, to, name) > 0.0) {
+      (void)printf(" (expected error %.1f)", error_of(c, from, to, name));
+    }
+    (void)putchar(':');
     for (int k = 0; k < 3; ++k) {
       (void)printf("%s %4.1f to the %s", k > 0 ? "," : "", fabs(move[k]), ways[k][move[k] > 0.0]);
     }
@@ -76,9 +107,9 @@ static void write_csv(const comparison *c, size_t from, size_t to, FILE *file) {
   for (size_t name = 0; name < c->names.count; ++name) {
     double move[3];
     const double length = move_between(c, from, to, name, move);
-    (void)fprintf(file, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f\n", c->postures->item[from].name,
+    (void)fprintf(file, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f\n", c->postures->item[from].name,
                   c->postures->item[to].name, c->names.text[name], move[0], move[1], move[2],
-                  length);
+                  length, error_of(c, from, to, name));
   }
 }
 
@@ -87,9 +118,10 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
     double move[3];
     const double length = move_between(c, from, to, name, move);
     if (json_array_append_new(
-            list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f}", "from", c->postures->item[from].name,
-                            "to", c->postures->item[to].name, "name", c->names.text[name], "move",
-                            move[0], move[1], move[2], "mm", length)) != 0) {
+            list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from",
+                            c->postures->item[from].name, "to", c->postures->item[to].name, "name",
+                            c->names.text[name], "move", move[0], move[1], move[2], "mm", length,
+                            "expected_error_mm", error_of(c, from, to, name))) != 0) {
       return false;
     }
   }
@@ -99,7 +131,7 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
 /* All that was asked for, pair by pair. */
 static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
   if (csv != NULL) {
-    (void)fputs("from,to,name,dx,dy,dz,mm\n", csv);
+    (void)fputs("from,to,name,dx,dy,dz,mm,expected_error_mm\n", csv);
   }
   for (size_t from = 0; from < c->postures->count; ++from) {
     for (size_t to = from + 1; to < c->postures->count; ++to) {
@@ -120,6 +152,9 @@ static supine_status write_all(const comparison *c, bool json, const char *csv,
   supine_output output = {0};
   json_t *list = json ? json_array() : NULL;
   supine_status status = json && list == NULL ? SUPINE_ERROR_MEMORY : write_pairs(c, list, NULL);
+  if (!json) {
+    (void)puts("Expected error: " SUPINE_EXPECTED_MEANING ".\n" SUPINE_EXPECTED_SUPPORT);
+  }
   if (status == SUPINE_OK && json) {
     status = json_dumpf(list, stdout, JSON_INDENT(2)) == 0 ? SUPINE_OK : SUPINE_ERROR_WRITE;
     (void)putchar('\n');
@@ -150,19 +185,27 @@ int supine_command_compare_content(const char *command, const supine_basis *basi
   }
   float *step = malloc(3 * n * sizeof *step);
   c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
-  if (step == NULL || c.moves == NULL) {
+  c.errors = calloc(postures->count * postures->count * c.names.count, sizeof *c.errors);
+  if (step == NULL || c.moves == NULL || c.errors == NULL) {
     status = supine_error_set(&error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
   }
   for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
     supine_state state = *volume;
     memcpy(state.gravity, postures->item[i].gravity, sizeof state.gravity);
     status = find_moves(basis, &state, &c.names, step, c.moves + 3 * i * c.names.count, &error);
+    for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
+      supine_state other = *volume;
+      memcpy(other.gravity, postures->item[j].gravity, sizeof other.gravity);
+      status = find_errors(basis, &other, &state, &c.names,
+                           c.errors + (i * postures->count + j) * c.names.count, &error);
+    }
   }
   if (status == SUPINE_OK) {
     status = write_all(&c, json, csv, &error);
   }
   free(step);
   free(c.moves);
+  free(c.errors);
   supine_command_names_close(&c.names);
   return status == SUPINE_OK ? supine_options_finish(command)
                              : supine_options_fail(command, &error);

@@ -10,6 +10,7 @@
 
 #include "program/deform_content.h"
 #include "program/options/basis_input.h"
+#include "program/options/expected.h"
 #include "program/options/orientation.h"
 #include "program/options/state.h"
 
@@ -26,8 +27,8 @@ typedef struct request {
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement; what is inside also goes into "
-                         ".csv, images into .nrrd, .nii or .nii.gz",
+     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error; what is "
+                         "inside also goes into .csv, images into .nrrd, .nii or .nii.gz",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
      .endings = SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii or .nii.gz"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
@@ -113,6 +114,8 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   const supine_basis_info *info = supine_basis_get_info(basis);
   supine_pose pose;
   supine_reference_pose reference;
+  supine_expected expected = {0};
+  supine_state state = wanted->volume.state;
   supine_mesh from = {0};
   supine_mesh mesh = {0};
   float *normals = NULL;
@@ -129,9 +132,15 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }
+  memcpy(state.gravity, gravity, sizeof state.gravity);
+  if (!wanted->has_scale && supine_options_expected_find(basis, &state, &reference.state, &expected,
+                                                         &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+    goto cleanup;
+  }
   if (supine_command_deform_content_wanted(&wanted->content)) {
     result = supine_command_deform_content(&wanted->content, name, basis, &pose, &reference,
-                                           wanted->from.given);
+                                           wanted->from.given, &expected);
     goto cleanup;
   }
   (void)snprintf(comment, sizeof comment, "displacement from %s", reference.name);
@@ -154,6 +163,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     goto cleanup;
   }
   save.normals = mesh.triangle_count > 0 ? normals : NULL; /* points inside have none */
+  save.expected_error = expected.sigma;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
   save.field_count = info->has_volume ? 2 : 1;
@@ -163,8 +173,10 @@ static int deform(const supine_basis *basis, const request *wanted, const double
   }
   report(wanted->content.path, gravity, &mesh, &from, reference.name,
          info->has_volume && supine_basis_metadata(basis, "content") == NULL);
+  supine_options_expected_print(&expected, stdout);
   result = supine_options_finish(name);
 cleanup:
+  supine_options_expected_free(&expected);
   supine_mesh_free(&from);
   supine_mesh_free(&mesh);
   free(normals);
@@ -198,7 +210,9 @@ const supine_command supine_command_deform = {
     "deform a basis for a posture and a volume",
     .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE",
     .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
-             "writes the surface. This is what the run-time library does each frame.",
+             "writes the surface. This is what the run-time library does each frame. Each point "
+             "comes with its expected error, expected_error_mm: " SUPINE_EXPECTED_MEANING
+             ". " SUPINE_EXPECTED_SUPPORT,
     .options = table,
     .notes =
         "Examples:\n"

@@ -64,7 +64,7 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
 /* name, lung, x, y, z and where that is now. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_pose *pose, const supine_reference_pose *from,
-                                  supine_error *error) {
+                                  const supine_expected *expected, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
   supine_command_names names;
@@ -84,18 +84,24 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     supine_deform(basis, pose, xyz);
     supine_deform(basis, &from->pose, before);
     (void)fprintf(output.file,
-                  "# x,y,z: position, mm, LPS; dx,dy,dz,mm: displacement from %s\n"
-                  "name,lung,x,y,z,dx,dy,dz,mm\n",
-                  from->name);
+                  "# x,y,z: position, mm, LPS; dx,dy,dz,mm: displacement from %s%s\n"
+                  "name,lung,x,y,z,dx,dy,dz,mm%s\n",
+                  from->name,
+                  expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
+                  expected->sigma == NULL ? "" : ",expected_error_mm");
     for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
       const double d[3] = {(double)p[0] - (double)q[0], (double)p[1] - (double)q[1],
                            (double)p[2] - (double)q[2]};
-      (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n",
+      (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f",
                     names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
                     (double)p[0], (double)p[1], (double)p[2], d[0], d[1], d[2], supine_length(d));
+      if (expected->sigma != NULL) {
+        (void)fprintf(output.file, ",%.3f", (double)expected->sigma[at]);
+      }
+      (void)fputc('\n', output.file);
     }
     status = supine_output_commit(&output, error);
   }
@@ -235,14 +241,18 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
 
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
-                                  const supine_reference_pose *from, bool other) {
+                                  const supine_reference_pose *from, bool other,
+                                  const supine_expected *expected) {
   supine_error error;
   supine_status status = SUPINE_OK;
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
     status = move_grid(wanted, basis, pose, from, other, &error);
   }
   if (status == SUPINE_OK && wanted->path != NULL && is_csv(wanted->path)) {
-    status = write_points(wanted->path, basis, pose, from, &error);
+    status = write_points(wanted->path, basis, pose, from, expected, &error);
+    if (status == SUPINE_OK) {
+      supine_options_expected_print(expected, stdout);
+    }
   }
   return status == SUPINE_OK ? supine_options_finish(command)
                              : supine_options_fail(command, &error);

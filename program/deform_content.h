@@ -5,6 +5,7 @@
 
 #include <supine/runtime.h>
 
+#include "program/options/expected.h"
 #include "program/options/state.h"
 
 typedef struct supine_deform_content {
@@ -24,10 +25,12 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 
 /* Writes what is wanted, and says what it wrote; an exit code.
- * @param from   what displacements count from, and the state that images are in
- * @param other  that is not the scan */
+ * @param from      what displacements count from, and the state that images are in
+ * @param other     that is not the scan
+ * @param expected  errors, for CSV */
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
-                                  const supine_reference_pose *from, bool other);
+                                  const supine_reference_pose *from, bool other,
+                                  const supine_expected *expected);
 
 #endif

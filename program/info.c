@@ -11,6 +11,7 @@
 #include <supine/runtime.h>
 
 #include "program/options/basis_input.h"
+#include "program/options/expected.h"
 
 static const char name[] = "info";
 
@@ -35,11 +36,20 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-static const char *const shown[] = {"assumed",        "patient",    "scanned",
-                                    "resting_shares", "law",
-                                    "force",          "direction",  "direction_constants",
-                                    "stiffness",      "midline_mm", "reference_volume_ml",
-                                    "lung_share",     "lesions",    "reach_mm",
+static const char *const shown[] = {"assumed",
+                                    "patient",
+                                    "scanned",
+                                    "resting_shares",
+                                    "law",
+                                    "force",
+                                    "direction",
+                                    "direction_constants",
+                                    "stiffness",
+                                    "midline_mm",
+                                    "reference_volume_ml",
+                                    "lung_share",
+                                    "lesions",
+                                    "reach_mm",
                                     "made_by"};
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
@@ -91,6 +101,30 @@ static void print_content(const supine_basis *basis, const char *content) {
                info->has_volume ? "volumes are the lungs'" : "no volumes");
 }
 
+/* The expected error of the default state, supine and prone, counted from the scan. */
+static void print_expected(const supine_basis *basis) {
+  const supine_state scan = supine_basis_scan(basis);
+  bool first = true;
+  for (int prone = 0; prone < 2; ++prone) {
+    const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
+                                .volume = supine_basis_default_volume(basis)};
+    supine_expected expected = {0};
+    char text[160];
+    if (supine_options_expected_find(basis, &state, &scan, &expected, NULL) == SUPINE_OK &&
+        expected.largest > 0.0) {
+      (void)supine_state_describe(&state, text, sizeof text);
+      (void)printf("%s  %s, counted from the scan: ",
+                   first ? "\nExpected error, " SUPINE_EXPECTED_MEANING
+                           ".\n" SUPINE_EXPECTED_SUPPORT "\n"
+                         : "",
+                   text);
+      supine_options_expected_print(&expected, stdout);
+      first = false;
+    }
+    supine_options_expected_free(&expected);
+  }
+}
+
 static void print_text(const char *path, const supine_basis *basis, const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const char *content = supine_basis_metadata(basis, "content");
@@ -116,9 +150,10 @@ static void print_text(const char *path, const supine_basis *basis, const double
       (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
     }
   }
+  print_expected(basis);
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
     (void)printf(
-        "\nError%s against the full fields, on %s directions%s:\n"
+        "\nCompression error%s against the full fields, on %s directions%s:\n"
         "             RMS   95th percentile   largest\n"
         "  %%   %10s   %15s   %7s   of the RMS displacement\n",
         content != NULL ? " of the lungs' surface" : "", text_of(basis, "error_directions"),

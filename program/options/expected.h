@@ -1,12 +1,35 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How expected errors are told. */
+/* Expected errors as commands tell them. */
 #ifndef SUPINE_OPTIONS_EXPECTED_H
 #define SUPINE_OPTIONS_EXPECTED_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include <supine/locate.h>
 
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times theirs, 95 % within 1.8"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "It was measured on full breaths in one posture; for a change of posture it is an "              \
   "extrapolation."
+
+/* Zero-initialise; supine_options_expected_free releases what find put there. */
+typedef struct supine_expected {
+  float *sigma;        /* [N] mm; NULL where nothing is known of them */
+  double rms, largest; /* over the vertices, mm */
+  bool turned;         /* the two states are of two postures */
+} supine_expected;
+
+/* Find the expected error of a state, counted from another. Another simulator's fields and open
+ * surfaces leave `sigma` NULL.
+ * @retval those of supine_basis_pose, SUPINE_ERROR_MEMORY */
+supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
+                                           const supine_state *from, supine_expected *expected,
+                                           supine_error *error);
+void supine_options_expected_free(supine_expected *expected);
+
+/* Print them in one line, with what supports them; nothing where they are not known. */
+void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

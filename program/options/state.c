@@ -36,7 +36,8 @@ const supine_option supine_options_folds[] = {
 const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: lung by lung, all named",
-     SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume, .rivals = "breath"},
+     SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
+     .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
     {.name = NULL}};
 
@@ -58,6 +59,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                          : supine_at_rest;
   supine_error inner;
   const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  reference->state = state;
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
   }

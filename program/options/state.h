@@ -34,8 +34,9 @@ typedef struct supine_from {
   supine_state state;
 } supine_from;
 
-/* What displacements count from: a pose, and its name for people. */
+/* What displacements count from: a state, its pose, and its name for people. */
 typedef struct supine_reference_pose {
+  supine_state state;
   supine_pose pose;
   char name[96]; /* "the scan", "supine at rest" */
 } supine_reference_pose;

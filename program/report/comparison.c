@@ -81,6 +81,35 @@ static supine_status find_energy(supine_comparison *c, supine_error *error) {
   return SUPINE_OK;
 }
 
+/* The expected error of one state counted from another; 0 where it is not known. */
+static supine_status find_error(const supine_comparison *c, const supine_state *state,
+                                const supine_state *from, double *rms, supine_error *error) {
+  supine_expected expected = {0};
+  const supine_status status =
+      c->rms > 0.0 ? SUPINE_OK
+                   : supine_options_expected_find(c->basis, state, from, &expected, error);
+  *rms = expected.rms;
+  supine_options_expected_free(&expected);
+  return status;
+}
+
+static supine_status find_errors(supine_comparison *c, supine_error *error) {
+  const size_t count = c->postures.count;
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+    supine_state state = c->state;
+    memcpy(state.gravity, c->postures.item[i].gravity, sizeof state.gravity);
+    status = find_error(c, &state, &c->reference.state, &c->posture[i].expected_error, error);
+    for (size_t j = i + 1; j < count && status == SUPINE_OK; ++j) {
+      supine_state other = c->state;
+      memcpy(other.gravity, c->postures.item[j].gravity, sizeof other.gravity);
+      status = find_error(c, &other, &state, &c->pair_error[i * count + j], error);
+      c->pair_error[j * count + i] = c->pair_error[i * count + j];
+    }
+  }
+  return status;
+}
+
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   supine_state supine = c->state; /* where the search begins */
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
@@ -90,8 +119,9 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   float *xyz[2] = {malloc(3 * n * sizeof(float)), malloc(3 * n * sizeof(float))};
   c->posture = calloc(count, sizeof *c->posture);
   c->pair = calloc(count * count, sizeof *c->pair);
+  c->pair_error = calloc(count * count, sizeof *c->pair_error);
   if (distance == NULL || xyz[0] == NULL || xyz[1] == NULL || c->posture == NULL ||
-      c->pair == NULL) {
+      c->pair == NULL || c->pair_error == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
@@ -120,7 +150,10 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
       c->pair[j * count + i] = c->pair[i * count + j];
     }
   }
-  status = find_energy(c, error);
+  status = find_errors(c, error);
+  if (status == SUPINE_OK) {
+    status = find_energy(c, error);
+  }
   if (status == SUPINE_OK) {
     status = supine_compare_search(c->compare, &supine, c->rms, SUPINE_COMPARISON_DIRECTIONS,
                                    &c->extremes, error);
@@ -136,9 +169,11 @@ void supine_report_free(supine_comparison *c) {
   supine_compare_destroy(c->compare);
   free(c->posture);
   free(c->pair);
+  free(c->pair_error);
   c->compare = NULL;
   c->posture = NULL;
   c->pair = NULL;
+  c->pair_error = NULL;
 }
 
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
@@ -150,6 +185,14 @@ void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   (void)supine_state_describe(&c->state, whole, sizeof whole);
   const char *space = strchr(whole, ' '); /* after the posture, supine */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
+}
+
+bool supine_report_has_errors(const supine_comparison *c) {
+  double sum = 0.0;
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    sum += c->posture[i].expected_error;
+  }
+  return sum > 0.0;
 }
 
 double supine_report_gain(const supine_comparison *c, size_t posture) {

@@ -7,6 +7,7 @@
 
 #include <supine/compare.h>
 
+#include "program/options/expected.h"
 #include "program/options/posture_list.h"
 #include "program/options/state.h"
 
@@ -16,6 +17,7 @@ enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
 typedef struct supine_compared_posture {
   supine_pose pose;
   supine_distance_statistics displacement;   /* from the comparison's reference */
+  double expected_error;                     /* of it, mm RMS; 0 where it is not known */
   double volume[SUPINE_LUNGS_MAX];           /* mL that each lung holds, tissue included; closed */
   double gain[SUPINE_LUNGS_MAX];             /* mL that each takes of the breath; closed */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
@@ -35,6 +37,7 @@ typedef struct supine_comparison {
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
   supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
+  double *pair_error;               /* [count, count] expected error of it, mm RMS, likewise */
   double constant, odd, even;       /* shares of energy: l = 0, odd bands, even bands beyond 0 */
   supine_extremes extremes;         /* farthest: from supine */
 } supine_comparison;
@@ -45,6 +48,9 @@ void supine_report_free(supine_comparison *comparison);
 
 /* "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
+
+/* Are expected errors known? */
+bool supine_report_has_errors(const supine_comparison *comparison);
 
 /* What all lungs together take of the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);

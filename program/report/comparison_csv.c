@@ -25,6 +25,9 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   row(file, "gravity", name, "", "head", g[2] + 0.0, "1");
   static const char before[] = "before the breath";
   statistics(file, "displacement", name, c->reference.name, &posture->displacement);
+  if (supine_report_has_errors(c)) {
+    row(file, "expected error", name, c->reference.name, "rms", posture->expected_error, "mm");
+  }
   if (!supine_basis_get_info(c->basis)->has_volume) {
     return;
   }
@@ -83,6 +86,10 @@ void supine_report_csv(const supine_comparison *c, FILE *file) {
     for (size_t j = i + 1; j < count; ++j) {
       statistics(file, "distance", c->postures.item[i].name, c->postures.item[j].name,
                  &c->pair[i * count + j]);
+      if (supine_report_has_errors(c)) {
+        row(file, "expected error", c->postures.item[i].name, c->postures.item[j].name, "rms",
+            c->pair_error[i * count + j], "mm");
+      }
     }
   }
   row(file, "energy", "all", "", "constant", c->constant, "1");

@@ -47,6 +47,10 @@ static json_t *postures(const supine_comparison *c) {
     json_t *posture =
         json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->gravity),
                   "displacement_mm", statistics(&c->posture[i].displacement));
+    if (supine_report_has_errors(c)) {
+      (void)json_object_set_new(posture, "expected_error_mm",
+                                json_real(c->posture[i].expected_error));
+    }
     if (supine_basis_get_info(c->basis)->has_volume) {
       (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
       (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
@@ -61,9 +65,13 @@ static json_t *pairs(const supine_comparison *c) {
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
-      (void)json_array_append_new(list, json_pack("{s:s, s:s, s:o}", "a", c->postures.item[i].name,
-                                                  "b", c->postures.item[j].name, "distance_mm",
-                                                  statistics(&c->pair[i * c->postures.count + j])));
+      const size_t at = i * c->postures.count + j;
+      json_t *pair = json_pack("{s:s, s:s, s:o}", "a", c->postures.item[i].name, "b",
+                               c->postures.item[j].name, "distance_mm", statistics(&c->pair[at]));
+      if (supine_report_has_errors(c)) {
+        (void)json_object_set_new(pair, "expected_error_mm", json_real(c->pair_error[at]));
+      }
+      (void)json_array_append_new(list, pair);
     }
   }
   return list;

@@ -19,11 +19,25 @@ static void print_statistics(const supine_distance_statistics *d, FILE *file) {
   (void)fprintf(file, "%9.3f %9.3f %9.3f %9.3f", d->mean, d->rms, d->p95, d->max);
 }
 
+/* The column of expected errors, where they are known. */
+static void print_error_head(const supine_comparison *c, FILE *file) {
+  if (supine_report_has_errors(c)) {
+    (void)fprintf(file, " %9s", "error");
+  }
+}
+
+static void print_error(const supine_comparison *c, double rms, FILE *file) {
+  if (supine_report_has_errors(c)) {
+    (void)fprintf(file, " %9.3f", rms);
+  }
+}
+
 static void print_postures(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s", c->reference.name,
                 info->has_volume ? ", and what each lung holds, mL" : "", width, "posture", "mean",
                 "RMS", "95 %", "largest");
+  print_error_head(c, file);
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
     (void)fprintf(file, " %9s", info->lung_names[lung]);
   }
@@ -31,6 +45,7 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)fprintf(file, "%-*s ", width, c->postures.item[i].name);
     print_statistics(&c->posture[i].displacement, file);
+    print_error(c, c->posture[i].expected_error, file);
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
       (void)fprintf(file, " %9.2f", c->posture[i].volume[lung]);
     }
@@ -39,13 +54,16 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
 }
 
 static void print_pairs(const supine_comparison *c, int width, FILE *file) {
-  (void)fprintf(file, "\nBetween postures, mm\n%-*s  %-*s %9s %9s %9s %9s\n", width, "posture",
-                width, "and", "mean", "RMS", "95 %", "largest");
+  (void)fprintf(file, "\nBetween postures, mm\n%-*s  %-*s %9s %9s %9s %9s", width, "posture", width,
+                "and", "mean", "RMS", "95 %", "largest");
+  print_error_head(c, file);
+  (void)fputc('\n', file);
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
       (void)fprintf(file, "%-*s  %-*s ", width, c->postures.item[i].name, width,
                     c->postures.item[j].name);
       print_statistics(&c->pair[i * c->postures.count + j], file);
+      print_error(c, c->pair_error[i * c->postures.count + j], file);
       (void)fputc('\n', file);
     }
   }
@@ -114,6 +132,11 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
   print_postures(c, width, file);
   if (c->postures.count > 1) {
     print_pairs(c, width, file);
+  }
+  if (supine_report_has_errors(c)) {
+    (void)fputs("error: the expected error, " SUPINE_EXPECTED_MEANING ".\n" SUPINE_EXPECTED_SUPPORT
+                "\n",
+                file);
   }
   if (info->has_volume) {
     print_gains(c, width, file);
