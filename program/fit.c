@@ -116,9 +116,9 @@ static const supine_option table[] = {
      "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
      .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {"expandability", 0, NULL,
-     "of surfaces: finds how stiff which parts are, as well, by up to twenty smooth regions a "
-     "lung; kept "
-     "where blocks that it has not seen come nearer. Takes a minute or so",
+     "of surfaces: finds how expandable which parts are, as well, under the 'deep' law's force, in "
+     "regions some 45 mm apart, and says which it cannot see; kept where blocks that it has not "
+     "seen come nearer",
      FILLS(expandability)},
     {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -173,6 +173,22 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
   }
 }
 
+/* The regions that move too little, or along the surface, to tell how expandable they are. */
+static void print_unseen(const supine_patient_stiffness *stiffness,
+                         const supine_patient_expand_report *expand) {
+  (void)printf("  not seen: %zu of %zu regions, which have their neighbours' values%s\n",
+               expand->unseen, expand->regions, expand->unseen > 0 ? ":" : "");
+  for (size_t side = 0; side < 2; ++side) {
+    for (size_t k = 0; k < stiffness->count[side]; ++k) {
+      const supine_patient_mode *mode = &stiffness->mode[side][k];
+      if (mode->seen < SUPINE_PATIENT_SEEN) {
+        (void)printf("    %s lung, %.0f mm about %.0f,%.0f,%.0f\n", side == 0 ? "left" : "right",
+                     0.5 * mode->radius, mode->centre[0], mode->centre[1], mode->centre[2]);
+      }
+    }
+  }
+}
+
 static void print_expandability(const supine_patient_expand_report *expand,
                                 const supine_patient_stiffness *stiffness) {
   if (expand->tried) {
@@ -180,17 +196,10 @@ static void print_expandability(const supine_patient_expand_report *expand,
                  "%.2f and %.2f:\n  ",
                  expand->fitted[1], expand->fitted[0], expand->held_out[1], expand->held_out[0]);
     if (expand->kept) {
-      (void)printf("kept; stiffness from %.2f to %.2f times its mean:\n", expand->softest,
-                   expand->stiffest);
-      for (size_t side = 0; side < 2; ++side) {
-        for (size_t k = 0; k < stiffness->count[side]; ++k) {
-          const supine_patient_mode *mode = &stiffness->mode[side][k];
-          (void)printf("  %s lung: %.2f times as stiff within %.0f mm of %.0f,%.0f,%.0f, even "
-                       "beyond %.0f mm\n",
-                       side == 0 ? "left" : "right", exp(mode->value), 0.5 * mode->radius,
-                       mode->centre[0], mode->centre[1], mode->centre[2], mode->radius);
-        }
-      }
+      (void)printf(
+          "kept; nine tenths of what is seen are %.2f to %.2f times as stiff as the mean\n",
+          expand->softest, expand->stiffest);
+      print_unseen(stiffness, expand);
     } else {
       (void)puts("no nearer to what it had not seen, and so not kept: stiffness stays even");
     }
@@ -290,6 +299,8 @@ static supine_status fit_surfaces(const request *wanted, const supine_patient_pa
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
+  model.force = supine_physics_model(SUPINE_LAW_DEEP).force; /* held where tissue is to be found */
+  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain;
   supine_status status = load_lungs(wanted, wanted->rest_path, &rest, error);
   if (status == SUPINE_OK) {
     status = load_lungs(wanted, wanted->state_path, &state, error);

@@ -4,437 +4,327 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_multimin.h>
+#include <cblas.h>
+#include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics.h>
+#include <lapacke.h>
 
 #include "precompute/patient/expand.h"
 
-#include "precompute/physics/inverse.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 enum {
-  PER_MODE = 5, /* value, centre, radius */
-  UNKNOWNS_MAX = 2 * SUPINE_PATIENT_MODES * PER_MODE,
+  REGIONS = 2 * SUPINE_PATIENT_MODES,
+  LANES = 16, /* regions of one solve */
   ROUNDS = 3, /* of finding nearest points anew */
-  STEPS = 20, /* of BFGS for each region that comes */
+  TURNS = 30, /* of the regions and the law, at most */
+  HELD_TURNS = 8,
   FOLDS = 5,
-  HOPELESS = 8, /* steps after which a region that was worth it would show */
-  LAW_STEPS = 50,
-  CANDIDATES = 200 /* places for a region, in a lung */
+  LAW_STEPS = 50
 };
 
-/* A region that makes tissue e times as stiff has to bring the surface 0.1 mm RMS nearer. */
-static const double ridge_mm = 0.1;
+/* What is believed before: neighbouring regions differ by so much, and any from 1. */
+static const double neighbours_differ = 0.3;
+static const double regions_differ = 1.0;
+static const double noise_least = 0.1; /* mm: no surface is known better */
+static const double together = 10.0; /* rows that err alike, as neighbours do: they count as one */
 
-static const double usual_radius = 60.0; /* mm */
-static const double centre_unit = 20.0;  /* mm: a step as large as one of e in the stiffness */
-static const double first_value = 0.3;
-static const double worth = 0.05; /* of J: a region that brings less does not come */
+static const double near_by = 1.7;    /* of the least distance between centres: neighbours */
+static const double least = 0.02;     /* a of any region */
+static const double worth = 0.95;     /* of the held-out RMS: what leaves more is not kept */
+static const double settled = 1e-3;   /* of any a, in a turn */
+static const double tolerance = 1e-6; /* of the law */
+static const double residual = 1e-6;  /* of solves */
 
-static const double first_step = 0.1;
-static const double line_tolerance = 0.1;
-static const double settled = 1e-3; /* of J, in a step */
-/* Of the law and of solves: rows are known to 1e-3 of what moves at best. For J's slopes as they
- * are told to others, what doubles reach. */
-static const double rough[2] = {1e-6, 1e-8};
-static const double sharp[2] = {1e-12, 1e-13};
-
-/* One minimisation: which rows count, and where it stands. */
-typedef struct study {
-  const supine_patient_matching *m;
-  supine_patient_moved moved;
-  supine_patient_row *rows; /* the matching's, with a catch and weights of their own */
-  size_t row_count;
-  supine_equilibrium *equilibrium;
-  double *caught;                                /* [N, SUPINE_PATIENT_COLUMNS] */
-  double *stiffness, *catch_, *slope, *gradient; /* [N] */
-  supine_patient_stiffness at;                   /* last looked at */
+/* The regions' values, and a law to go with them. */
+typedef struct estimate {
+  double a[REGIONS];    /* left lung first */
+  double seen[REGIONS]; /* diagonal of the resolution matrix */
   supine_patient_power power;
-  const double *tolerance; /* of the law and of solves */
-  double cost;
-  double slopes[UNKNOWNS_MAX];
-  bool looked; /* cost and slopes are of `at` */
-  supine_status status;
-  supine_error *error;
+} estimate;
+
+typedef struct study {
+  supine_patient_matching *m;
+  const supine_patient_expand_task *task;
+  supine_patient_stiffness regions; /* where they are */
+  size_t count;                     /* of both lungs */
+  size_t row_count;
+  double *response;                 /* [row_count, count] F_k */
+  double belief[REGIONS * REGIONS]; /* of a - 1, over the squared noise */
 } study;
 
-static void study_free(study *s) {
-  supine_physics_equilibrium_destroy(s->equilibrium);
-  free(s->rows);
-  free(s->caught);
-  free(s->stiffness);
-  free(s->catch_);
-  free(s->slope);
-  free(s->gradient);
+/* --- the linear problem ---------------------------------------------------------------------- */
+
+static const supine_patient_mode *region(const study *s, size_t k) {
+  const size_t left = s->regions.count[0];
+  return k < left ? &s->regions.mode[0][k] : &s->regions.mode[1][k - left];
 }
 
-static supine_status study_create(study *s, const supine_patient_matching *m,
-                                  supine_patient_moved moved, const supine_patient_power *power,
-                                  supine_error *error) {
-  const size_t n = m->rest->mesh.vertex_count;
-  const size_t rows = m->count + m->landmark_rows_count;
-  *s = (study){.m = m,
-               .moved = moved,
-               .rows = malloc(rows * sizeof(supine_patient_row)),
-               .row_count = rows,
-               .caught = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double)),
-               .stiffness = malloc(n * sizeof(double)),
-               .catch_ = malloc(n * sizeof(double)),
-               .slope = malloc(n * sizeof(double)),
-               .gradient = malloc(n * sizeof(double)),
-               .power = *power,
-               .tolerance = rough,
-               .error = error};
-  /* One thread: several studies run side by side. */
-  if (s->rows == NULL || s->caught == NULL || s->stiffness == NULL || s->catch_ == NULL ||
-      s->slope == NULL || s->gradient == NULL ||
-      supine_physics_equilibrium_create(m->network, SUPINE_PATIENT_COLUMNS, 1, &s->equilibrium) !=
-          SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  memcpy(s->rows, m->rows, rows * sizeof *s->rows);
-  memcpy(s->caught, m->caught, SUPINE_PATIENT_COLUMNS * n * sizeof *s->caught);
-  return SUPINE_OK;
-}
-
-/* --- J and its slopes ------------------------------------------------------------------------ */
-
-/* The catch of the force's columns under the stiffness that is looked at. */
-static supine_status solve(study *s) {
-  const supine_patient_matching *m = s->m;
-  supine_patient_stiffness_of(&s->at, m->rest, s->stiffness);
-  supine_status status =
-      supine_physics_equilibrium_set_stiffness(s->equilibrium, s->stiffness, s->error);
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(s->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
-                                              s->tolerance[1], true, s->caught, NULL, s->error);
-  }
-  for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-    memcpy(s->rows[i].force, s->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
-           sizeof s->rows[i].force);
-  }
-  return status;
-}
-
-/* dJ/dF of every vertex, at the law as it is: 2 w r a, a: what a force of 1 moves along the axis.
- * As the law is the best for this catch, what it would change by adds nothing. */
-static void set_slopes(const study *s) {
-  const supine_patient_matching *m = s->m;
-  const double *c = s->power.powers + 3;
-  for (size_t i = 0; i < m->rest->mesh.vertex_count; ++i) {
-    const double *caught = s->caught + SUPINE_PATIENT_COLUMNS * i;
-    s->catch_[i] = caught[0] + c[0] * caught[1] + c[1] * caught[2] + c[2] * caught[3];
-    s->slope[i] = 0.0;
-  }
-  for (size_t i = 0; i < m->count; ++i) {
-    const supine_patient_row *row = &s->rows[i];
-    if (row->weight > 0.0) {
-      s->slope[m->vertex[i]] = 2.0 * row->weight * supine_patient_power_residual(&s->power, row) *
-                               supine_patient_power_along(&s->power, row);
+static void believe(study *s) {
+  double nearest = INFINITY;
+  memset(s->belief, 0, sizeof s->belief);
+  for (size_t j = 0; j < s->count; ++j) {
+    for (size_t k = 0; k < j; ++k) {
+      nearest = fmin(nearest, supine_distance(region(s, j)->centre, region(s, k)->centre));
     }
   }
-}
-
-/* From slopes by log E of the vertices to those by the regions. */
-static void add_modes(study *s) {
-  const supine_patient_matching *m = s->m;
-  double ridge = 0.0;
-  size_t at = 0;
-  for (size_t i = 0; i < m->count; ++i) {
-    ridge += ridge_mm * ridge_mm * s->rows[i].weight;
-  }
-  for (size_t side = 0; side < 2; ++side) {
-    for (size_t k = 0; k < s->at.count[side]; ++k, at += PER_MODE) {
-      const supine_patient_mode *mode = &s->at.mode[side][k];
-      const double r = mode->radius;
-      const double narrow = log(r / usual_radius);
-      double *of = s->slopes + at;
-      memset(of, 0, PER_MODE * sizeof *of);
-      for (size_t i = 0; i < m->rest->mesh.vertex_count; ++i) {
-        const double *p = m->rest->mesh.vertices + 3 * i;
-        double slope;
-        const double w = supine_patient_mode_at(mode, p, &slope);
-        if (w == 0.0 || supine_patient_side_of(m->rest, i) != side) {
-          continue;
-        }
-        of[0] += s->gradient[i] * w;
-        if (slope != 0.0) { /* t = |p - centre| / radius */
-          const double t =
-              sqrt(pow(p[0] - mode->centre[0], 2.0) + pow(p[1] - mode->centre[1], 2.0) +
-                   pow(p[2] - mode->centre[2], 2.0)) /
-              r;
-          const double part = s->gradient[i] * mode->value * slope;
-          for (size_t a = 0; a < 3; ++a) {
-            of[1 + a] -= part * (p[a] - mode->centre[a]) / (t * r * r);
-          }
-          of[4] -= part * t / r;
-        }
+  for (size_t j = 0; j < s->count; ++j) {
+    s->belief[j * s->count + j] += pow(regions_differ, -2.0);
+    for (size_t k = 0; k < j; ++k) {
+      const bool same_lung = (j < s->regions.count[0]) == (k < s->regions.count[0]);
+      if (same_lung &&
+          supine_distance(region(s, j)->centre, region(s, k)->centre) < near_by * nearest) {
+        const double weight = pow(neighbours_differ, -2.0);
+        s->belief[j * s->count + j] += weight;
+        s->belief[k * s->count + k] += weight;
+        s->belief[j * s->count + k] -= weight;
+        s->belief[k * s->count + j] -= weight;
       }
-      of[0] += 2.0 * ridge * mode->value;
-      of[4] += 2.0 * ridge * narrow / r;
-      s->cost += ridge * (mode->value * mode->value + narrow * narrow);
     }
   }
 }
 
-/* J and its slopes where the study stands. */
-static supine_status look(study *s) {
-  supine_status status = solve(s);
-  if (status == SUPINE_OK) {
-    status = supine_patient_power_fit(s->rows, s->row_count, s->moved, s->power.powers, LAW_STEPS,
-                                      s->tolerance[0], &s->power, s->error);
+/* Best a of the rows under the law as it is. normal [count, count] and more of it are space. */
+static bool solve_regions(const study *s, const supine_patient_row *rows, double *space,
+                          estimate *e) {
+  const size_t n = s->count;
+  const int size = (int)n;
+  double *normal = space;
+  double *whole = normal + n * n;
+  double *design = whole + n * n; /* [n] */
+  double squares = 0.0;
+  double weight = 0.0;
+  double right[REGIONS] = {0.0};
+  memset(normal, 0, n * n * sizeof *normal);
+  for (size_t i = 0; i < s->row_count; ++i) {
+    supine_patient_row still = rows[i];
+    const double left = supine_patient_power_residual(&e->power, &rows[i]);
+    const double along = supine_patient_power_along(&e->power, &rows[i]);
+    memset(still.force, 0, sizeof still.force);
+    const double target = -supine_patient_power_residual(&e->power, &still);
+    if (rows[i].weight == 0.0) {
+      continue;
+    }
+    squares += rows[i].weight * left * left;
+    weight += rows[i].weight;
+    cblas_dcopy(size, s->response + i * n, 1, design, 1);
+    cblas_dscal(size, along, design, 1);
+    cblas_dsyr(CblasColMajor, CblasLower, size, rows[i].weight, design, 1, normal, size);
+    cblas_daxpy(size, rows[i].weight * target, design, 1, right, 1);
   }
-  if (status == SUPINE_OK) {
-    set_slopes(s);
-    status = supine_physics_inverse_gradient(s->m->network, s->equilibrium, s->stiffness, s->catch_,
-                                             s->slope, s->tolerance[1], s->gradient, s->error);
+  const double noise = together * fmax(noise_least * noise_least, squares / fmax(weight, 1.0));
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t k = 0; k <= j; ++k) { /* one triangle of two */
+      normal[j * n + k] = normal[k * n + j];
+      whole[j * n + k] = whole[k * n + j] = normal[j * n + k] + noise * s->belief[j * n + k];
+    }
+    right[j] += noise * pow(regions_differ, -2.0); /* (a - 1)^2; differences have no mean */
   }
-  if (status == SUPINE_OK) {
-    s->cost = s->power.squares + s->power.pulled;
-    add_modes(s);
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', size, 1, whole, size, right, size) != 0 ||
+      LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', size, size, whole, size, normal, size) != 0) {
+    return false;
   }
+  for (size_t k = 0; k < n; ++k) {
+    e->a[k] = fmax(least, right[k]);
+    e->seen[k] = normal[k * n + k];
+  }
+  return true;
+}
+
+/* The rows' force under a. */
+static void set_forces(const study *s, const estimate *e, supine_patient_row *rows) {
+  for (size_t i = 0; i < s->row_count; ++i) {
+    memset(rows[i].force, 0, sizeof rows[i].force);
+    rows[i].force[0] = cblas_ddot((int)s->count, s->response + i * s->count, 1, e->a, 1);
+  }
+}
+
+/* Regions (where `with`) and the law by turns, for the rows as they are weighted. */
+static supine_status fit_rows(const study *s, supine_patient_row *rows, bool with, size_t turns,
+                              estimate *e, supine_error *error) {
+  double *space = malloc((2 * s->count + 1) * s->count * sizeof *space);
+  double change = INFINITY;
+  supine_status status = space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                                          "no memory for %zu regions", s->count)
+                                       : SUPINE_OK;
+  for (size_t turn = 0; turn < turns && status == SUPINE_OK && change > settled; ++turn) {
+    const estimate before = *e;
+    set_forces(s, e, rows);
+    status = supine_patient_power_fit(rows, s->row_count, s->task->moved, e->power.powers,
+                                      LAW_STEPS, tolerance, &e->power, error);
+    if (status == SUPINE_OK && with && !solve_regions(s, rows, space, e)) {
+      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the surfaces do not determine the expandability");
+    }
+    change = 0.0;
+    for (size_t k = 0; k < s->count; ++k) {
+      change = fmax(change, fabs(e->a[k] - before.a[k]));
+    }
+  }
+  set_forces(s, e, rows);
+  free(space);
   return status;
 }
 
-supine_status supine_patient_expand_cost(const supine_patient_matching *matching,
-                                         supine_patient_moved moved,
-                                         const supine_patient_stiffness *stiffness,
-                                         supine_patient_power *power, double *cost, double *slopes,
-                                         supine_error *error) {
-  study s;
-  supine_status status = study_create(&s, matching, moved, power, error);
-  s.at = *stiffness;
-  s.tolerance = sharp;
-  if (status == SUPINE_OK) {
-    status = look(&s);
+/* --- what each region makes of the force ----------------------------------------------------- */
+
+/* The place of a row that stands for no vertex: a landmark is taken not to pass its force on. */
+static void respond_landmark(const study *s, size_t row, const double slopes[4]) {
+  const supine_patient_place *place = &s->m->rows[row].place;
+  const size_t side = place->side > 0.0 ? 0U : 1U;
+  double *out = s->response + row * s->count;
+  double point[3];
+  double shares[SUPINE_PATIENT_MODES];
+  double force = slopes[0];
+  for (size_t k = 0; k < 3; ++k) {
+    point[k] = 0.5 * (s->m->frame.minimum[k] + s->m->frame.maximum[k]) + place->arm[k];
+    force += slopes[1 + k] * (place->box[k] - 0.5);
   }
-  if (status == SUPINE_OK) {
-    *cost = s.cost;
-    *power = s.power;
-    memcpy(slopes, s.slopes,
-           PER_MODE * (stiffness->count[0] + stiffness->count[1]) * sizeof *slopes);
-  }
-  study_free(&s);
-  return status;
-}
-
-/* --- the least J ----------------------------------------------------------------------------- */
-
-static size_t unknowns(const study *s) {
-  return PER_MODE * (s->at.count[0] + s->at.count[1]);
-}
-
-/* Unknown j of a stiffness, and the unit in which GSL counts it; radii are counted as logarithms.
- */
-static double *unknown(supine_patient_stiffness *stiffness, size_t j, double *unit) {
-  const size_t k = j / PER_MODE;
-  supine_patient_mode *mode = k < stiffness->count[0]
-                                  ? &stiffness->mode[0][k]
-                                  : &stiffness->mode[1][k - stiffness->count[0]];
-  *unit = j % PER_MODE == 0 || j % PER_MODE == 4 ? 1.0 : centre_unit;
-  return j % PER_MODE == 0   ? &mode->value
-         : j % PER_MODE == 4 ? &mode->radius
-                             : &mode->centre[j % PER_MODE - 1];
-}
-
-static bool look_at(study *s, const gsl_vector *q) {
-  bool same = s->looked;
-  for (size_t j = 0; j < q->size; ++j) {
-    double unit;
-    double *of = unknown(&s->at, j, &unit);
-    const double value = unit * gsl_vector_get(q, j);
-    const double now = j % PER_MODE == 4 ? usual_radius * exp(value) : value;
-    same = same && *of == now;
-    *of = now;
-  }
-  if (!same && s->status == SUPINE_OK) {
-    s->status = look(s);
-    s->looked = s->status == SUPINE_OK;
-  }
-  return s->status == SUPINE_OK;
-}
-
-static double cost_at(const gsl_vector *q, void *context) {
-  study *s = context;
-  return look_at(s, q) ? s->cost : GSL_NAN;
-}
-
-static void slopes_at(const gsl_vector *q, void *context, gsl_vector *slopes) {
-  study *s = context;
-  const bool right = look_at(s, q);
-  for (size_t j = 0; j < q->size; ++j) {
-    double unit;
-    const double *of = unknown(&s->at, j, &unit);
-    const double by = j % PER_MODE == 4 ? *of : unit; /* d radius = radius d log radius */
-    gsl_vector_set(slopes, j, right ? s->slopes[j] * by : GSL_NAN);
+  supine_patient_stiffness_shares(&s->regions, side, point, shares);
+  memset(out, 0, s->count * sizeof *out);
+  for (size_t k = 0; k < s->regions.count[side]; ++k) {
+    out[(side == 0 ? 0 : s->regions.count[0]) + k] = force * shares[k];
   }
 }
 
-static void both_at(const gsl_vector *q, void *context, double *cost, gsl_vector *slopes) {
-  *cost = cost_at(q, context);
-  slopes_at(q, context, slopes);
-}
-
-/* Minimises from where the study stands; it stands at the least J found in the end. Stops early
- * where J is not below `hoped` soon. */
-static supine_status minimise(study *s, size_t steps, double hoped) {
-  gsl_multimin_function_fdf system = {cost_at, slopes_at, both_at, unknowns(s), s};
-  gsl_multimin_fdfminimizer *work =
-      gsl_multimin_fdfminimizer_alloc(gsl_multimin_fdfminimizer_vector_bfgs2, system.n);
-  gsl_vector *q = gsl_vector_alloc(system.n);
-  s->status = SUPINE_OK;
-  s->looked = false;
-  if (work == NULL || q == NULL) {
-    s->status = supine_error_set(s->error, SUPINE_ERROR_MEMORY, "no memory for regions");
-  } else {
-    for (size_t j = 0; j < system.n; ++j) {
-      double unit;
-      const double *of = unknown(&s->at, j, &unit);
-      gsl_vector_set(q, j, j % PER_MODE == 4 ? log(*of / usual_radius) : *of / unit);
-    }
-    int going = gsl_multimin_fdfminimizer_set(work, &system, q, first_step, line_tolerance);
-    double last = INFINITY;
-    for (size_t k = 0; k < steps && going == GSL_SUCCESS && s->status == SUPINE_OK; ++k) {
-      going = gsl_multimin_fdfminimizer_iterate(work);
-      const double cost = gsl_multimin_fdfminimizer_minimum(work);
-      if (cost > (1.0 - settled) * last || (k + 1 >= HOPELESS && cost > hoped)) {
-        going = GSL_ENOPROG;
-      }
-      last = cost;
-    }
-    (void)look_at(s, gsl_multimin_fdfminimizer_x(work));
-  }
-  if (q != NULL) {
-    gsl_vector_free(q);
-  }
-  if (work != NULL) {
-    gsl_multimin_fdfminimizer_free(work);
-  }
-  return s->status;
-}
-
-/* A region more, where J falls most for a little of it; false where both lungs have all. */
-static bool add_mode(study *s) {
+/* (18) [N] as the model has it in the other state, and as the columns' sum nearest to it. */
+static supine_status find_force(const study *s, double *force, double slopes[4],
+                                supine_error *error) {
+  enum { COLUMNS = SUPINE_PATIENT_COLUMNS };
   const supine_lungs *lungs = s->m->rest;
-  supine_patient_mode best = {.radius = usual_radius};
-  double most = 0.0;
-  size_t best_side = 0;
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const size_t side = lungs->side[lung] > 0 ? 0 : 1;
-    const size_t begin = lungs->lung_begin[lung];
-    const size_t count = lungs->lung_begin[lung + 1] - begin;
-    for (size_t c = 0; c < CANDIDATES && s->at.count[side] < SUPINE_PATIENT_MODES; ++c) {
-      supine_patient_mode mode = {.radius = usual_radius};
-      double fall = 0.0;
-      memcpy(mode.centre, lungs->mesh.vertices + 3 * (begin + c * count / CANDIDATES),
-             sizeof mode.centre);
-      for (size_t i = begin; i < begin + count; ++i) {
-        fall -= s->gradient[i] * supine_patient_mode_at(&mode, lungs->mesh.vertices + 3 * i, NULL);
-      }
-      if (fabs(fall) > most) {
-        most = fabs(fall);
-        best = mode;
-        best.value = fall > 0.0 ? first_value : -first_value;
-        best_side = side;
-      }
-    }
+  const supine_force_law *law = &s->task->model->force;
+  double range[2];
+  double matrix[COLUMNS * COLUMNS] = {0.0};
+  if (supine_physics_height_range(lungs, law->pair, 1, s->task->gravity, range, range + 1) !=
+      SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force");
   }
-  if (most > 0.0) {
-    s->at.mode[best_side][s->at.count[best_side]++] = best;
+  const supine_gravities gravity = {1, s->task->gravity, range, range + 1};
+  supine_physics_force(lungs, law, &gravity, lungs->mesh.vertex_count, NULL, force);
+  memset(slopes, 0, COLUMNS * sizeof *slopes);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    const double *column = s->m->columns + COLUMNS * i;
+    cblas_dsyr(CblasColMajor, CblasLower, COLUMNS, 1.0, column, 1, matrix, COLUMNS);
+    cblas_daxpy(COLUMNS, force[i], column, 1, slopes, 1);
   }
-  return most > 0.0;
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', COLUMNS, 1, matrix, COLUMNS, slopes, COLUMNS) == 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the surface at rest is flat");
 }
 
-/* Regions one by one, from those that are there, until one more is worth next to nothing. */
-static supine_status grow(study *s) {
-  s->status = look(s);
-  for (bool going = true; going && s->status == SUPINE_OK;) {
-    const supine_patient_stiffness before = s->at;
-    const supine_patient_power law = s->power;
-    const double cost = s->cost;
-    going = add_mode(s) && minimise(s, STEPS, (1.0 - worth) * cost) == SUPINE_OK &&
-            s->cost < (1.0 - worth) * cost;
-    if (!going) { /* back to without */
-      s->at = before;
-      s->power = law;
-      s->cost = cost;
+/* Solves for the force on each region alone, some at a time. */
+static supine_status find_responses(const study *s, supine_error *error) {
+  const supine_patient_matching *m = s->m;
+  const size_t n = m->rest->mesh.vertex_count;
+  double slopes[SUPINE_PATIENT_COLUMNS];
+  supine_equilibrium *equilibrium = NULL;
+  double *force = malloc(n * sizeof *force);
+  double *alone = calloc(n * LANES, sizeof *alone);
+  double *caught = malloc(n * LANES * sizeof *caught);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (force == NULL || alone == NULL || caught == NULL ||
+      supine_physics_equilibrium_create(m->network, LANES, 0, &equilibrium) != SUPINE_OK) {
+    (void)supine_error_set(error, status, "no memory for %zu vertices", n);
+    goto cleanup;
+  }
+  status = supine_physics_equilibrium_set_stiffness(equilibrium, NULL, error);
+  if (status == SUPINE_OK) {
+    status = find_force(s, force, slopes, error);
+  }
+  for (size_t first = 0; first < s->count && status == SUPINE_OK; first += LANES) {
+    const size_t lanes = s->count - first < LANES ? s->count - first : LANES;
+    for (size_t i = 0; i < n; ++i) {
+      const size_t side = supine_patient_side_of(m->rest, i);
+      const size_t begin = side == 0 ? 0 : s->regions.count[0];
+      double shares[SUPINE_PATIENT_MODES];
+      supine_patient_stiffness_shares(&s->regions, side, m->rest->mesh.vertices + 3 * i, shares);
+      for (size_t r = 0; r < lanes; ++r) {
+        const size_t k = first + r - begin; /* wraps where it is the other side's */
+        alone[i * lanes + r] = k < s->regions.count[side] ? force[i] * shares[k] : 0.0;
+      }
+    }
+    status = supine_physics_equilibrium_solve(equilibrium, lanes, alone, residual, false, caught,
+                                              NULL, error);
+    for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
+      memcpy(s->response + i * s->count + first, caught + m->vertex[i] * lanes,
+             lanes * sizeof *caught);
     }
   }
-  return s->status;
+  for (size_t i = m->count; i < s->row_count && status == SUPINE_OK; ++i) {
+    respond_landmark(s, i, slopes);
+  }
+cleanup:
+  supine_physics_equilibrium_destroy(equilibrium);
+  free(force);
+  free(alone);
+  free(caught);
+  return status;
 }
 
 /* --- whether it is worth anything ------------------------------------------------------------ */
 
 /* Blocks held out of one fold after the other: squares left of them, by fold. */
 typedef struct holding {
-  const supine_patient_matching *m;
-  supine_patient_moved moved;
-  const supine_patient_power *begin;
-  bool with;             /* stiffness as well as the law */
+  const study *s;
+  const estimate *from;
+  bool with;
   const size_t *fold_of; /* [blocks] */
   double squares[FOLDS], weight[FOLDS];
   supine_status status[FOLDS];
   supine_error error[FOLDS];
-  supine_patient_progress *progress;
-  void *context;
-  double share; /* of the work that was done before */
-  bool stopped;
 } holding;
 
 static void hold_out_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
   holding *h = context;
-  const supine_patient_matching *m = h->m;
-  for (size_t fold = begin; fold < end && !h->stopped; ++fold) {
-    study s;
-    h->status[fold] = study_create(&s, m, h->moved, h->begin, &h->error[fold]);
-    for (size_t i = 0; i < s.row_count && h->status[fold] == SUPINE_OK; ++i) {
-      s.rows[i].weight = h->fold_of[s.rows[i].block] == fold ? 0.0 : s.rows[i].weight;
+  const supine_patient_matching *m = h->s->m;
+  for (size_t fold = begin; fold < end; ++fold) {
+    estimate e = *h->from;
+    supine_patient_row *rows = malloc(h->s->row_count * sizeof *rows);
+    if (rows == NULL) {
+      h->status[fold] =
+          supine_error_set(&h->error[fold], SUPINE_ERROR_MEMORY, "no memory for rows");
+      continue;
     }
-    if (h->status[fold] == SUPINE_OK) {
-      h->status[fold] = h->with ? grow(&s) : look(&s);
+    memcpy(rows, m->rows, h->s->row_count * sizeof *rows);
+    for (size_t i = 0; i < h->s->row_count; ++i) {
+      rows[i].weight = h->fold_of[rows[i].block] == fold ? 0.0 : rows[i].weight;
     }
-    if (h->status[fold] == SUPINE_OK) { /* the rows stand where BFGS looked last */
-      h->status[fold] = solve(&s);
-    }
+    h->status[fold] = fit_rows(h->s, rows, h->with, HELD_TURNS, &e, &h->error[fold]);
     for (size_t i = 0; i < m->count && h->status[fold] == SUPINE_OK; ++i) {
-      if (h->fold_of[m->rows[i].block] == fold) {
-        const double left = supine_patient_power_residual(&s.power, &s.rows[i]);
+      if (h->fold_of[rows[i].block] == fold) {
+        const double left = supine_patient_power_residual(&e.power, &rows[i]);
         h->squares[fold] += m->rows[i].weight * left * left;
         h->weight[fold] += m->rows[i].weight;
       }
     }
-    study_free(&s);
-    if (thread == 0 && h->progress != NULL) { /* the others keep pace */
-      const double done = (double)(fold + 1 - begin) / (double)(end - begin);
-      h->stopped = !h->progress(h->context, h->share + (1.0 - h->share) * done);
-    }
+    free(rows);
   }
 }
 
-/* mm RMS of blocks that the law, and where wanted its stiffness, had not seen. */
-static supine_status hold_out(holding *h, double *rms, supine_error *error) {
-  const supine_patient_matching *m = h->m;
-  const size_t count = m->count + m->landmark_rows_count;
-  const size_t blocks = supine_patient_rows_block(&m->frame, m->rows, count, 1);
+/* mm RMS of blocks that the estimate had not seen. */
+static supine_status hold_out(const study *s, const estimate *from, bool with, double *rms,
+                              supine_error *error) {
+  holding h = {.s = s, .from = from, .with = with};
+  const size_t blocks = supine_patient_rows_block(&s->m->frame, s->m->rows, s->row_count, 1);
   size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
   double squares = 0.0;
   double weight = 0.0;
   if (fold_of == NULL || blocks == 0 ||
       supine_patient_rows_deal(blocks, FOLDS, 1, fold_of) != SUPINE_OK) {
     free(fold_of);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", s->row_count);
   }
-  h->fold_of = fold_of;
-  supine_parallel_for(FOLDS, 1, 0, hold_out_range, h);
+  h.fold_of = fold_of;
+  supine_parallel_for(FOLDS, 1, 0, hold_out_range, &h);
   free(fold_of);
-  if (h->stopped) {
-    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted");
-  }
   for (size_t fold = 0; fold < FOLDS; ++fold) {
-    if (h->status[fold] != SUPINE_OK) {
-      return supine_error_set(error, h->status[fold], "%s", h->error[fold].message);
+    if (h.status[fold] != SUPINE_OK) {
+      return supine_error_set(error, h.status[fold], "%s", h.error[fold].message);
     }
-    squares += h->squares[fold];
-    weight += h->weight[fold];
+    squares += h.squares[fold];
+    weight += h.weight[fold];
   }
   *rms = weight > 0.0 ? sqrt(squares / weight) : 0.0;
   return SUPINE_OK;
@@ -442,110 +332,152 @@ static supine_status hold_out(holding *h, double *rms, supine_error *error) {
 
 /* --- all of it ------------------------------------------------------------------------------- */
 
-/* The matching at a law: its vertices to where the law has them, and their rows. */
-static void match_anew(supine_patient_matching *m, const study *s) {
+/* The matching at an estimate: its vertices to where the law has them, and their rows. */
+static void match_anew(const study *s, const estimate *e) {
+  supine_patient_matching *m = s->m;
+  set_forces(s, e, m->rows);
   for (size_t i = 0; i < m->count; ++i) {
-    supine_patient_row row = s->rows[i];
+    supine_patient_row row = m->rows[i];
     row.value = 0.0;
     for (size_t a = 0; a < 3; ++a) {
       for (size_t k = 0; k < 3; ++k) {
         row.axis[k] = a == k ? 1.0 : 0.0;
       }
       m->moved[3 * i + a] = m->rest->mesh.vertices[3 * m->vertex[i] + a] +
-                            supine_patient_power_residual(&s->power, &row);
+                            supine_patient_power_residual(&e->power, &row);
     }
-    memcpy(m->rows[i].force, s->rows[i].force, sizeof row.force);
   }
   supine_patient_matching_find(m); /* whole weights: what the law misses is what is looked for */
 }
 
-static double root_mean(const study *s) {
+static double root_mean(const study *s, const estimate *e) {
   double squares = 0.0;
   double weight = 0.0;
   for (size_t i = 0; i < s->m->count; ++i) {
-    squares += s->rows[i].weight * pow(supine_patient_power_residual(&s->power, &s->rows[i]), 2.0);
-    weight += s->rows[i].weight;
+    const supine_patient_row *row = &s->m->rows[i];
+    squares += row->weight * pow(supine_patient_power_residual(&e->power, row), 2.0);
+    weight += row->weight;
   }
   return weight > 0.0 ? sqrt(squares / weight) : 0.0;
 }
 
-static void note_range(const double *e, size_t count, supine_patient_expand_report *report) {
-  double logarithms = 0.0;
-  double low = INFINITY;
-  double high = 0.0;
-  for (size_t i = 0; i < count; ++i) {
-    logarithms += log(e[i]) / (double)count;
-    low = fmin(low, e[i]);
-    high = fmax(high, e[i]);
-  }
-  report->softest = low / exp(logarithms);
-  report->stiffest = high / exp(logarithms);
-}
-
-/* Nearest points, and the law (with its stiffness) by turns; the matching stands at both. */
-static supine_status settle(supine_patient_matching *m, study *s, bool with, holding *h,
-                            double *rms) {
+/* Nearest points, and the estimate, by turns. */
+static supine_status settle(const study *s, bool with, estimate *e, double *rms,
+                            supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    memcpy(s->rows, m->rows, s->row_count * sizeof *s->rows);
-    const bool even = s->at.count[0] + s->at.count[1] == 0;
-    status = !with ? look(s) : round == 0 || even ? grow(s) : minimise(s, STEPS, INFINITY);
-    if (status == SUPINE_OK) {
-      status = solve(s); /* the rows stand where BFGS looked last */
+    const double share = (with ? 0.3 : 0.0) + 0.3 * (double)round / ROUNDS;
+    if (s->task->progress != NULL && !s->task->progress(s->task->context, share)) {
+      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted");
     }
+    status = fit_rows(s, s->m->rows, with, TURNS, e, error);
     if (status == SUPINE_OK) {
-      *rms = root_mean(s);
-      match_anew(m, s);
-    }
-    h->stopped = with && h->progress != NULL &&
-                 !h->progress(h->context, h->share * (double)(round + 1) / ROUNDS);
-    if (h->stopped) {
-      status = supine_error_set(s->error, SUPINE_ERROR_INTERRUPTED, "interrupted");
+      *rms = root_mean(s, e);
+      match_anew(s, e);
     }
   }
   return status;
 }
 
-/* Eight parameters: what is fitted to, how to tell of it, and what comes of it. */
-supine_status supine_patient_expand(supine_patient_matching *matching, supine_patient_moved moved,
-                                    supine_patient_progress *progress, void *context,
+/* Between which E nine tenths of what is seen lie, of geometric mean 1 over all, and how much is
+ * not seen. e [N] is sorted. */
+static void note_range(const study *s, double *e, supine_patient_expand_report *report) {
+  const supine_lungs *lungs = s->m->rest;
+  const size_t n = lungs->mesh.vertex_count;
+  double logarithms = 0.0;
+  size_t seen_count = 0;
+  for (size_t i = 0; i < n; ++i) {
+    logarithms += log(e[i]) / (double)n;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    const size_t side = supine_patient_side_of(lungs, i);
+    double shares[SUPINE_PATIENT_MODES];
+    double seen = 0.0;
+    supine_patient_stiffness_shares(&s->regions, side, lungs->mesh.vertices + 3 * i, shares);
+    for (size_t k = 0; k < s->regions.count[side]; ++k) {
+      seen += shares[k] * s->regions.mode[side][k].seen;
+    }
+    if (seen >= SUPINE_PATIENT_SEEN) {
+      e[seen_count++] = e[i] / exp(logarithms);
+    }
+  }
+  if (seen_count > 0) {
+    gsl_sort(e, 1, seen_count);
+    report->softest = gsl_stats_quantile_from_sorted_data(e, 1, seen_count, 0.05);
+    report->stiffest = gsl_stats_quantile_from_sorted_data(e, 1, seen_count, 0.95);
+  }
+  for (size_t k = 0; k < s->count; ++k) {
+    report->unseen += region(s, k)->seen < SUPINE_PATIENT_SEEN;
+  }
+  report->regions = s->count;
+}
+
+/* Leaves matching, law and stiffness as they were found to be worth it. */
+static supine_status finish(study *s, const estimate *e, supine_patient_power *power,
+                            supine_patient_stiffness *stiffness,
+                            supine_patient_expand_report *report, supine_error *error) {
+  const size_t n = s->m->rest->mesh.vertex_count;
+  double *space = malloc(n * sizeof *space);
+  if (space == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  for (size_t k = 0; k < s->count; ++k) {
+    const size_t left = s->regions.count[0];
+    supine_patient_mode *mode = k < left ? &s->regions.mode[0][k] : &s->regions.mode[1][k - left];
+    mode->value = e->a[k];
+    mode->seen = e->seen[k];
+  }
+  supine_patient_stiffness_of(&s->regions, s->m->rest, space);
+  *stiffness = report->kept ? s->regions : (supine_patient_stiffness){0};
+  *power = e->power;
+  match_anew(s, e);
+  const supine_status status =
+      supine_patient_matching_solve(s->m, report->kept ? space : NULL, error);
+  if (report->kept) {
+    note_range(s, space, report);
+  }
+  free(space);
+  return status;
+}
+
+supine_status supine_patient_expand(supine_patient_matching *matching,
+                                    const supine_patient_expand_task *task,
                                     supine_patient_power *power,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
   supine_patient_matching *m = matching;
-  const size_t n = m->rest->mesh.vertex_count;
-  supine_patient_stiffness found[2] = {0}; /* without and with */
-  supine_patient_power law[2] = {*power, *power};
-  study s;
+  estimate found[2] = {{.power = *power}, {.power = *power}}; /* without and with */
+  study *s = calloc(1, sizeof *s);
   *report = (supine_patient_expand_report){.tried = true, .softest = 1.0, .stiffest = 1.0};
+  *stiffness = (supine_patient_stiffness){0};
+  if (s == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for regions");
+  }
+  *s = (study){.m = m, .task = task, .row_count = m->count + m->landmark_rows_count};
+  supine_patient_stiffness_spread(m->rest, &s->regions);
+  s->count = s->regions.count[0] + s->regions.count[1];
+  s->response = malloc((s->row_count * s->count + 1) * sizeof *s->response);
+  supine_status status =
+      s->response == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", s->count)
+          : find_responses(s, error);
+  believe(s);
   supine_patient_matching_find(m);
-  supine_status status = study_create(&s, m, moved, power, error);
+  for (size_t k = 0; k < s->count; ++k) {
+    found[0].a[k] = found[1].a[k] = 1.0;
+  }
   for (int with = 0; with < 2 && status == SUPINE_OK; ++with) {
-    holding h = {.m = m,
-                 .moved = moved,
-                 .begin = &law[0],
-                 .with = with == 1,
-                 .progress = with == 1 ? progress : NULL,
-                 .context = context,
-                 .share = 0.4}; /* of the work is the fit of all rows */
-    status = settle(m, &s, with == 1, &h, &report->fitted[with]);
-    law[with] = s.power;
-    found[with] = s.at;
+    found[with].power = found[0].power;
+    status = settle(s, with == 1, &found[with], &report->fitted[with], error);
     if (status == SUPINE_OK) {
-      status = hold_out(&h, &report->held_out[with], error);
+      status = hold_out(s, &found[with], with == 1, &report->held_out[with], error);
     }
   }
   if (status == SUPINE_OK) {
-    note_range(s.stiffness, n, report);
-    report->kept = report->held_out[1] < report->held_out[0];
-    s.power = *power = law[report->kept];
-    s.at = *stiffness = found[report->kept];
-    status = solve(&s);
+    report->kept = report->held_out[1] < worth * report->held_out[0];
+    status = finish(s, &found[report->kept], power, stiffness, report, error);
   }
-  if (status == SUPINE_OK) {
-    match_anew(m, &s);
-    memcpy(m->caught, s.caught, SUPINE_PATIENT_COLUMNS * n * sizeof *m->caught);
-  }
-  study_free(&s);
+  free(s->response);
+  free(s);
   return status;
 }

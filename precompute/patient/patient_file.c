@@ -84,9 +84,9 @@ static json_t *modes(const supine_patient_stiffness *stiffness, size_t side) {
   json_t *all = json_array();
   for (size_t k = 0; k < stiffness->count[side]; ++k) {
     const supine_patient_mode *mode = &stiffness->mode[side][k];
-    (void)json_array_append_new(all, json_pack("{s:f, s:o, s:f}", "log_stiffness", mode->value,
-                                               "centre_mm", numbers(mode->centre, 3), "radius_mm",
-                                               mode->radius));
+    (void)json_array_append_new(
+        all, json_pack("{s:f, s:f, s:o, s:f}", "expandability", mode->value, "seen", mode->seen,
+                       "centre_mm", numbers(mode->centre, 3), "radius_mm", mode->radius));
   }
   return all;
 }
@@ -294,10 +294,11 @@ static bool take_stiffness(const json_t *object, supine_patient_stiffness *stiff
     for (size_t k = 0; k < stiffness->count[side] && right; ++k) {
       const json_t *of = json_array_get(all, k);
       supine_patient_mode *mode = &stiffness->mode[side][k];
-      mode->value = json_number_value(json_object_get(of, "log_stiffness"));
+      mode->value = json_number_value(json_object_get(of, "expandability"));
+      mode->seen = json_number_value(json_object_get(of, "seen"));
       mode->radius = json_number_value(json_object_get(of, "radius_mm"));
-      right = isfinite(mode->value) && isfinite(mode->radius) && mode->radius > 0.0 &&
-              take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre);
+      right = mode->value > 0.0 && isfinite(mode->value) && isfinite(mode->radius) &&
+              mode->radius > 0.0 && take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre);
     }
   }
   return right;

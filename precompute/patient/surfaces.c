@@ -278,9 +278,10 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
  * expandability's blocks have it, as their stiffness had not seen them either. */
 static supine_status expand(matching *m, const supine_patient_surface_task *task, estimate *e,
                             supine_patient_surface_fit *fit, supine_error *error) {
+  const supine_patient_expand_task wanted = {task->options.moved, task->model, task->gravity,
+                                             later_progress, (void *)task};
   const supine_status status =
-      supine_patient_expand(m, task->options.moved, later_progress, (void *)task, &e->power,
-                            &fit->stiffness, &fit->expand, error);
+      supine_patient_expand(m, &wanted, &e->power, &fit->stiffness, &fit->expand, error);
   if (status == SUPINE_OK) {
     fit->surface.matched = supine_patient_matching_weigh(m, 0.0, &fit->surface.after);
   }

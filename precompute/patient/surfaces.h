@@ -53,8 +53,8 @@ typedef struct supine_patient_surface_fit {
 } supine_patient_surface_fit;
 
 /** Fits a law to a surface in another state.
- * @retval SUPINE_ERROR_MESH  nothing overlaps (frames, units or sides differ), axes are reversed, the
- *                            same surface as rest, or next to no compatible points
+ * @retval SUPINE_ERROR_MESH  nothing overlaps (frames, units or sides differ), axes are reversed,
+ * the same surface as rest, or next to no compatible points
  * @retval SUPINE_ERROR_ARGUMENT     expandability of another law than the paper's
  * @retval SUPINE_ERROR_INTERRUPTED  progress said so
  * @retval those of supine_patient_fit */

@@ -17,17 +17,4 @@ supine_status supine_physics_inverse_force(const supine_network *network, const 
                                            const double *catch_, double *force,
                                            supine_error *error);
 
-/** dJ/dlog E [N] of a function J of one catch, with a reach. As only ratios of E count, it sums to
- * 0.
- * @param equilibrium  of the network; its stiffness becomes the one given
- * @param catch_       [N] F at that stiffness
- * @param slope        [N] dJ/dF there
- * @param gradient     [N] written
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
-supine_status supine_physics_inverse_gradient(const supine_network *network,
-                                              supine_equilibrium *equilibrium,
-                                              const double *stiffness, const double *catch_,
-                                              const double *slope, double tolerance,
-                                              double *gradient, supine_error *error);
-
 #endif
