@@ -173,6 +173,28 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
   }
 }
 
+/* The region that is seen and gives way least, or most. */
+static void print_extreme(const supine_patient_stiffness *stiffness, const char *what,
+                          double sign) {
+  const supine_patient_mode *found = NULL;
+  size_t lung = 0;
+  for (size_t side = 0; side < 2; ++side) {
+    for (size_t k = 0; k < stiffness->count[side]; ++k) {
+      const supine_patient_mode *mode = &stiffness->mode[side][k];
+      if (mode->seen >= SUPINE_PATIENT_SEEN &&
+          (found == NULL || sign * mode->value > sign * found->value)) {
+        found = mode;
+        lung = side;
+      }
+    }
+  }
+  if (found != NULL) {
+    (void)printf("  %s expandable: %s lung, %.0f mm about %.0f,%.0f,%.0f, %.2f\n", what,
+                 lung == 0 ? "left" : "right", 0.5 * found->radius, found->centre[0],
+                 found->centre[1], found->centre[2], found->value);
+  }
+}
+
 /* The regions that move too little, or along the surface, to tell how expandable they are. */
 static void print_unseen(const supine_patient_stiffness *stiffness,
                          const supine_patient_expand_report *expand) {
@@ -199,6 +221,8 @@ static void print_expandability(const supine_patient_expand_report *expand,
       (void)printf(
           "kept; nine tenths of what is seen are %.2f to %.2f times as stiff as the mean\n",
           expand->softest, expand->stiffest);
+      print_extreme(stiffness, "least", -1.0);
+      print_extreme(stiffness, "most", 1.0);
       print_unseen(stiffness, expand);
     } else {
       (void)puts("no nearer to what it had not seen, and so not kept: stiffness stays even");

@@ -456,7 +456,7 @@ static void test_record_survives_text(void **state) {
   supine_patient_record before = record_of(&patient);
   before.stiffness = (supine_patient_stiffness){
       .count = {0, 2},
-      .mode = {{{0}}, {{1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7}, {-0.2, {7.0, 8.0, 9.0}, 40.0}}}};
+      .mode = {{{0}}, {{1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7}, {0.2, {7.0, 8.0, 9.0}, 40.0}}}};
   supine_patient_record after;
   supine_error error;
   char *text = supine_patient_text(&before, NULL, "test");

@@ -27,7 +27,7 @@ enum {
 /* What is believed before: neighbouring regions differ by so much, and any from 1. */
 static const double neighbours_differ = 0.3;
 static const double regions_differ = 1.0;
-static const double noise_least = 0.1; /* mm: no surface is known better */
+static const double noise_least = 0.3; /* mm: no surface is known better */
 static const double together = 10.0; /* rows that err alike, as neighbours do: they count as one */
 
 static const double near_by = 1.7;    /* of the least distance between centres: neighbours */
