@@ -345,7 +345,7 @@ static int run(void *chosen, const supine_arguments *given) {
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  supine_status status = supine_basis_open(path, &basis, &error);
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, &error);
   if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
     status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
                               "%s: its surface is open and encloses no volume: close the mesh "

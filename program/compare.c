@@ -6,6 +6,7 @@
 #include "sh/base/output.h"
 
 #include "program/compare_content.h"
+#include "program/options/basis_input.h"
 #include "program/options/state.h"
 #include "program/report/comparison.h"
 
@@ -124,7 +125,8 @@ cleanup:
 static int run(void *chosen, const supine_arguments *given) {
   supine_basis *basis = NULL;
   supine_error error;
-  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
+  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
+      SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   const int result = compare(given->operand[0], basis, chosen);

@@ -185,8 +185,6 @@ cleanup:
 
 static int run(void *chosen, const supine_arguments *given) {
   const request *wanted = chosen;
-  const supine_basis_options exact = {sizeof exact,
-                                      .storage = SUPINE_STORAGE_EXACT}; /* one frame, for a file */
   supine_basis *basis = NULL;
   supine_error error;
   double gravity[3];
@@ -197,7 +195,8 @@ static int run(void *chosen, const supine_arguments *given) {
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  if (supine_basis_open_with(given->operand[0], &exact, &basis, &error) != SUPINE_OK) {
+  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, &error) !=
+      SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   result = deform(basis, wanted, gravity);

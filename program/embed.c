@@ -11,6 +11,7 @@
 #include "precompute/inside/embed.h"
 #include "precompute/inside/grid.h"
 
+#include "program/options/basis_input.h"
 #include "program/options/command.h"
 
 static const char name[] = "embed";
@@ -247,7 +248,8 @@ static int run(void *chosen, const supine_arguments *given) {
   if (!image && given->count > 1 && wanted->has_grid) {
     return supine_options_usage(name, "a grid, or an image, goes into a file of its own");
   }
-  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
+  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
+      SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   const int result = embed(basis, wanted, given);

@@ -289,7 +289,7 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_error error;
   int result = SUPINE_EXIT_OK;
   double *energy = NULL;
-  if (supine_basis_open(path, &basis, &error) != SUPINE_OK) {
+  if (supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
     goto cleanup;
   }

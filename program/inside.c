@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "program/inside.h"
+#include "program/options/basis_input.h"
 
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error) {
@@ -24,7 +25,7 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error) {
-  supine_status status = supine_basis_open(path, inside, error);
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error);
   status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
   return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
 }

@@ -242,7 +242,8 @@ static int run(void *chosen, const supine_arguments *given) {
   if (result != SUPINE_EXIT_OK) {
     return result;
   }
-  if (supine_basis_open(given->operand[0], &basis, &error) != SUPINE_OK) {
+  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
+      SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
   if (supine_options_reference(basis, &wanted->from, true, &from, &error) != SUPINE_OK) {

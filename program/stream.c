@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/options/state.h"
 #include "program/stream/address.h"
@@ -295,7 +296,8 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_stream_rotation(unit, options.setup.body);
   supine_basis *basis = NULL;
   supine_error error;
-  supine_status status = supine_basis_open(given->operand[0], &basis, &error);
+  supine_status status =
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error);
   if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
     status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
                               "%s: its surface is open and encloses no volume: close the mesh "

@@ -35,7 +35,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
     s->has_patient = true;
     return supine_patient_read(path, &s->record, error);
   }
-  supine_status status = supine_basis_open(path, &s->basis, error);
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
   if (status != SUPINE_OK) {
     return status;
   }

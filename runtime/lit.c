@@ -22,10 +22,17 @@ uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size
 static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
                       unsigned char *at) {
   const size_t last = basis->info.vertex_count - 1;
+  const size_t count = basis->info.normal_count;
+  double three[3][TILE] = {{0}};
   uint32_t packed[TILE];
+  for (size_t j = word, which = 0; j < count; j += supine_tiles_normal_words(count), ++which) {
+    for (size_t v = 0; v < TILE; ++v) {
+      const size_t i = tile * TILE + v < last ? tile * TILE + v : last;
+      three[which][v] = basis->info.normals[(3 * i + axis) * count + j] * (1 / normal_unit());
+    }
+  }
   for (size_t v = 0; v < TILE; ++v) {
-    const size_t i = tile * TILE + v;
-    packed[v] = supine_basis_normal_word(basis, i < last ? i : last, axis, word);
+    packed[v] = normal_narrow(three[0][v], three[1][v], three[2][v]);
   }
   memcpy(at, packed, sizeof packed);
 }

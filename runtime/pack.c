@@ -298,7 +298,9 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   for (size_t t = 0; t < count; ++t) {
     unsigned char *tile = tiles->bytes + t * tiles->stride;
     source_load(basis, t, was);
-    *is = *was;
+    memcpy(is->coefficients, was->coefficients, tiles->axes * tiles->modes * TILE * sizeof(float));
+    memcpy(is->direction, was->direction, sizeof is->direction);
+    memcpy(is->rest, was->rest, sizeof is->rest);
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
       pack_coefficients(tiles, u, is->coefficients + axis * tiles->modes * TILE,
                         tile + axis * tiles->axis_bytes);

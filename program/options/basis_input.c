@@ -11,6 +11,13 @@ const supine_option supine_options_as_scanned[] = {
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
+supine_status supine_options_basis_open(const char *path, supine_storage storage,
+                                        supine_basis **basis, supine_error *error) {
+  const supine_basis_options options = {sizeof options, .storage = storage,
+                                        .without_normals = true};
+  return supine_basis_open_with(path, &options, basis, error);
+}
+
 int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
                                supine_mesh_save_options *save) {
   const char *axes = supine_basis_metadata(basis, "scan_axes");

@@ -11,6 +11,10 @@
 /* --as-scanned, into a bool: outputs lie on top of the scan. */
 extern const supine_option supine_options_as_scanned[];
 
+/* Open a basis for a command that draws no normals, which then need not be packed. */
+supine_status supine_options_basis_open(const char *path, supine_storage storage,
+                                        supine_basis **basis, supine_error *error);
+
 /* Files in the axes and units that the scan came in, where they are wanted; an exit code after a
  * message where the basis does not know them. */
 int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,

@@ -33,11 +33,16 @@ static inline int32_t word_integer(uint32_t word) {
   return value;
 }
 
+/** rint of what is far below 2^51, in instructions that every processor has. */
+static inline double nearest_integer(double value) {
+  return (value + 0x1.8p52) - 0x1.8p52;
+}
+
 /** The word nearest to `value` with the given lowest `bits`, which are all that is set in `low`. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
-  const double above = rint((value - (double)low) / step);
+  const double above = nearest_integer((value - (double)low) / step);
   const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* or NaN */
   return (uint32_t)(int32_t)(held * step) | low;
 }
