@@ -7,11 +7,13 @@
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/state.h"
 
 static const char name[] = "export";
 typedef struct request {
   const char *path;
   const char *title;
+  supine_from from;
   double volume;
   double largest;
   bool page;
@@ -60,6 +62,7 @@ static const supine_option table[] = {
     {.help = "Of a page:"},
     {"title", 0, "TEXT", "its title; default the name of the basis file",
      SUPINE_FILLS(request, title)},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.help = "Of glTF:"},
     {"profile", 0, "NAME",
      "raw: a target for each mode of the basis; weights of either sign (default)\n"
@@ -84,6 +87,10 @@ static const supine_option table[] = {
 static int write_glb(const export_source *source, const request *wanted) {
   export_glb_report report = {0};
   supine_error error;
+  if (source->resting_rows > 1) {
+    supine_options_say(name, "morph targets have one gain for all lungs: each lung holds its share "
+                             "of the same total volume only nearly; the page has a gain for each");
+  }
   if (supine_export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);
   }
@@ -98,8 +105,14 @@ static int write_glb(const export_source *source, const request *wanted) {
 
 static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
   supine_error error;
+  supine_reference_pose from;
+  if (supine_options_reference(source->basis, &wanted->from, true, &from, &error) != SUPINE_OK) {
+    return supine_options_fail(name, &error);
+  }
   const char *slash = strrchr(basis_path, '/');
   const export_page page = {.breath = wanted->glb.breath,
+                            .from = &from.pose,
+                            .from_name = from.name,
                             .title = wanted->title != NULL ? wanted->title
                                      : slash != NULL       ? slash + 1
                                                            : basis_path,
@@ -169,8 +182,8 @@ static int run(void *chosen, const supine_arguments *given) {
   if (wanted->page && wanted->glb_only) {
     return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
   }
-  if (!wanted->page && wanted->title != NULL) {
-    return supine_options_usage(name, "--title is for .html");
+  if (!wanted->page && (wanted->title != NULL || wanted->from.given)) {
+    return supine_options_usage(name, "%s is for .html", wanted->from.given ? "--from" : "--title");
   }
   return export_basis(given->operand[0], wanted);
 }
@@ -189,6 +202,7 @@ const supine_command supine_command_export = {
         "\n"
         "Examples:\n"
         "  supine export lungs.safetensors -o lungs.html\n"
+        "  supine export lungs.safetensors -o lungs.html --from scan\n"
         "  supine export lungs.safetensors -o lungs.glb --animate\n"
         "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --breath 1000",

@@ -29,6 +29,7 @@ typedef struct request {
   size_t peers;
   const char *record, *replay;
   const char *web, *certificate, *key;
+  supine_from from;
 } request;
 
 static const char *const sends[] = {"weights", "points", "surface", "nothing", NULL};
@@ -85,6 +86,7 @@ static const supine_option table[] = {
      "serves the basis as a page that shows each moment, to any number of viewers; a phone that "
      "looks at it may send its own tilt. A port alone is reached from this machine only",
      SUPINE_FILLS(request, web)},
+    {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
      "and --key: serves it encrypted; browsers ask for that before they give a phone's tilt to "
      "another machine",
@@ -164,11 +166,12 @@ static void report(const supine_stream_server *server, const request *wanted) {
 }
 
 /* Opens the page, where it was asked for. */
-static supine_status open_page(const request *wanted, const char *basis, char **page,
-                               supine_stream_web **web, supine_error *error) {
+static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
+                               char **page, supine_stream_web **web, supine_error *error) {
   const char *colon = wanted->web == NULL ? NULL : strrchr(wanted->web, ':');
   char address[256] = "";
   supine_stream_address checked;
+  supine_reference_pose from;
   supine_stream_site site = {
       .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->peers};
   if (wanted->web == NULL) {
@@ -176,8 +179,14 @@ static supine_status open_page(const request *wanted, const char *basis, char **
   }
   supine_status status = supine_stream_address_read(wanted->web, true, &checked, error);
   if (status == SUPINE_OK) {
-    status = supine_stream_live_page(basis, wanted->breath.tidal, "Lungs, live", page,
-                                     &site.page_size, error);
+    status = supine_options_reference(basis, &wanted->from, true, &from, error);
+  }
+  if (status == SUPINE_OK) {
+    const export_page shown = {.breath.volume = wanted->breath.tidal,
+                               .from = &from.pose,
+                               .from_name = from.name,
+                               .title = "Lungs, live"};
+    status = supine_stream_live_page(path, &shown, page, &site.page_size, error);
   }
   if (status == SUPINE_OK) {
     if (colon != NULL) {
@@ -235,7 +244,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     }
   }
   if (status == SUPINE_OK) {
-    status = open_page(wanted, path, &page, &options.web, error);
+    status = open_page(wanted, basis, path, &page, &options.web, error);
   }
   if (status == SUPINE_OK) {
     status = supine_stream_server_create(basis, &options, &server, error);

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <supine/volume.h>
+
 #include "program/export/export.h"
 
 supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
@@ -39,6 +41,25 @@ supine_status supine_export_breath_set(const export_source *source, double volum
   return SUPINE_OK;
 }
 
+/* One gain for all lungs, at which they hold together what they hold in the pose. */
+static supine_status share_one_gain(const export_source *source, supine_pose *pose,
+                                    supine_error *error) {
+  const size_t k = source->info->mode_count;
+  double held[SUPINE_LUNGS_MAX];
+  double cubic[3] = {0};
+  double beyond = 0;
+  double gain = 0;
+  supine_basis_volumes(source->basis, pose, held);
+  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+    beyond += held[lung] - source->info->reference_volume[lung];
+    supine_volume_add(k, source->linear + lung * k, source->quadratic + lung * k * k,
+                      source->cubic + lung * k * k * k, pose->weights, cubic);
+  }
+  const supine_status status = supine_volume_scale(cubic, beyond, &gain, error);
+  supine_pose_fill(pose, gain);
+  return status;
+}
+
 supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error) {
@@ -49,5 +70,9 @@ supine_status supine_export_breath_pose(const export_source *source, const expor
   const supine_volume_kind from = source->info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
   const supine_state state = {.gravity = {g[0], g[1], g[2]},
                               .volume = {from, fraction * breath->volume}};
-  return supine_basis_pose(source->basis, &state, pose, error);
+  const supine_status status = supine_basis_pose(source->basis, &state, pose, error);
+  if (status != SUPINE_OK || source->resting_rows < 2) {
+    return status;
+  }
+  return share_one_gain(source, pose, error);
 }

@@ -8,7 +8,7 @@
 
 #include <supine/runtime.h>
 
-enum { EXPORT_RESTING_TERMS = 9 };
+enum { EXPORT_RESTING_TERMS = 9 }; /* Y_lm of bands 0 to 2 */
 
 /** An open basis, and what it shows, at hand. */
 typedef struct export_source {
@@ -23,8 +23,9 @@ typedef struct export_source {
   const double *linear;      /**< [G, K], mL; NULL where the surface is open; likewise: */
   const double *quadratic;   /**< [G, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
-  double resting[EXPORT_RESTING_TERMS]; /**< mL at rest beyond the reference, all lungs, over Y_lm
-                                           of bands 0 to 2; where info->has_rest */
+  const double *resting;     /**< [resting_rows, EXPORT_RESTING_TERMS], mL at rest beyond the
+                                reference surface; where info->has_rest */
+  size_t resting_rows;       /**< G, or 1 for all lungs together */
 } export_source;
 
 /** Opens a basis file.
@@ -52,7 +53,8 @@ typedef struct export_breath {
 supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
                                        export_breath *breath, supine_error *error);
 
-/** The pose at a fraction of the breath (0 rest, or the scan where no rest is known; 1 all of it).
+/** The pose at a fraction of the breath (0 rest, or the scan where no rest is known; 1 all of it),
+ * with one gain for all lungs, as morph targets have it.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
 supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
                                         const double g[3], double fraction, supine_pose *pose,
@@ -109,6 +111,8 @@ enum { EXPORT_PAGE_MODES_MAX = 16 };
 /** What a page shows beside the lungs. */
 typedef struct export_page {
   export_breath breath;
+  const supine_pose *from; /**< what displacements count from */
+  const char *from_name;   /**< "supine at rest" */
   const char *title;
   const export_source
       *inside;               /**< content of the same lungs, as in export_glb_options; NULL: none */

@@ -97,6 +97,15 @@ static json_t *lungs(const export_source *source) {
   return array;
 }
 
+/* All lungs' resting volume over Y_lm. */
+static json_t *resting_harmonics(const export_source *source) {
+  double sum[EXPORT_RESTING_TERMS] = {0};
+  for (size_t i = 0; i < source->resting_rows * EXPORT_RESTING_TERMS; ++i) {
+    sum[i % EXPORT_RESTING_TERMS] += source->resting[i];
+  }
+  return supine_export_glb_numbers(sum, EXPORT_RESTING_TERMS);
+}
+
 /* Keys of the basis' metadata that go along. */
 static json_t *origin(const export_source *source) {
   static const char *const keys[] = {
@@ -137,8 +146,7 @@ json_t *supine_export_glb_extras(const export_source *source, const export_glb_o
   if (source->info->has_rest) {
     (void)json_object_set_new(
         supine, "restingVolume",
-        json_pack("{s:s, s:o}", "text", resting_text, "harmonics",
-                  supine_export_glb_numbers(source->resting, EXPORT_RESTING_TERMS)));
+        json_pack("{s:s, s:o}", "text", resting_text, "harmonics", resting_harmonics(source)));
   }
   if (source->info->has_volume && count <= FORMS_MAX &&
       json_object_set_new(supine, "volume",

@@ -158,6 +158,14 @@ static json_t *numbers(const double *values, size_t count) {
   return list;
 }
 
+static json_t *lung_begins(const supine_basis_info *info) {
+  json_t *list = json_array();
+  for (size_t i = 0; i <= info->lung_count; ++i) {
+    (void)json_array_append_new(list, json_integer((json_int_t)info->lung_begin[i]));
+  }
+  return list;
+}
+
 /* What is inside, or null. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
@@ -169,9 +177,33 @@ static json_t *describe_inside(const page *p) {
     json_t *name = json_string(p->shown->parts->name[i]);
     (void)json_array_append_new(names, name != NULL ? name : json_string("?")); /* not UTF-8 */
   }
-  return json_pack("{s:I, s:I, s:o, s:o}", "vertices", (json_int_t)info->vertex_count, "triangles",
-                   (json_int_t)info->triangle_count, "names", names, "units",
+  return json_pack("{s:I, s:o, s:o, s:o}", "vertices", (json_int_t)info->vertex_count, "lungBegin",
+                   lung_begins(info), "names", names, "units",
                    numbers(p->inside_unit, info->mode_count));
+}
+
+/* mL of the scan beyond the reference surface. */
+static double scan_volume(const export_source *s) {
+  const supine_state scan = supine_basis_scan(s->basis);
+  double held[SUPINE_LUNGS_MAX];
+  double beyond = 0;
+  supine_pose pose;
+  supine_error error;
+  if (!s->info->has_volume || supine_basis_pose(s->basis, &scan, &pose, &error) != SUPINE_OK) {
+    return 0;
+  }
+  supine_basis_volumes(s->basis, &pose, held);
+  for (size_t lung = 0; lung < s->info->lung_count; ++lung) {
+    beyond += held[lung] - s->info->reference_volume[lung];
+  }
+  return beyond;
+}
+
+/* What displacements count from. */
+static json_t *describe_from(const page *p) {
+  return json_pack("{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
+                   numbers(p->shown->from->weights, p->source->info->mode_count), "gains",
+                   numbers(p->shown->from->gains[0], 3 * p->source->info->lung_count));
 }
 
 /* Sizes and metadata. */
@@ -185,6 +217,7 @@ static json_t *describe(const page *p) {
                                      "reference_volume_ml",
                                      "scan_volume_ml",
                                      "scanned",
+                                     "full_upright_gain",
                                      "law",
                                      "error_rms_percent",
                                      "error_p95_percent",
@@ -193,11 +226,7 @@ static json_t *describe(const page *p) {
                                      "attribution",
                                      "made_by"};
   const supine_basis_info *info = p->source->info;
-  json_t *lungs = json_array();
   json_t *metadata = json_object();
-  for (size_t i = 0; i <= info->lung_count; ++i) {
-    (void)json_array_append_new(lungs, json_integer((json_int_t)info->lung_begin[i]));
-  }
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(p->source->basis, keys[i]);
     if (value != NULL) {
@@ -207,14 +236,17 @@ static json_t *describe(const page *p) {
   json_t *title = json_string(p->shown->title);
   const export_breath *breath = &p->shown->breath;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:o}",
+      "{s:I, s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, "
+      "s:f}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
-      (json_int_t)info->band, "lungBegin", lungs, "hasVolume", (int)info->has_volume, "hasResting",
-      (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
-      "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
-      title != NULL ? title : json_string("lungs"), "units", numbers(p->unit, info->mode_count),
-      "inside", describe_inside(p));
+      (json_int_t)info->band, "lungBegin", lung_begins(info), "hasVolume", (int)info->has_volume,
+      "hasResting", (int)(p->source->info->has_rest), "colours", colours(), "breathVolume",
+      breath->volume, "breathLargest", breath->largest, "breathScale", breath->scale, "metadata",
+      metadata, "title", title != NULL ? title : json_string("lungs"), "units",
+      numbers(p->unit, info->mode_count), "inside", describe_inside(p), "from", describe_from(p),
+      "references", numbers(info->reference_volume, info->lung_count), "scanVolume",
+      scan_volume(p->source));
 }
 
 /* {{tensors}} */
@@ -236,7 +268,8 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
     write_normals(file, s);
   }
   if (s->info->has_rest) {
-    write_tensor(file, "resting", s->resting, EXPORT_RESTING_TERMS * sizeof *s->resting);
+    write_tensor(file, "resting", s->resting,
+                 s->resting_rows * EXPORT_RESTING_TERMS * sizeof *s->resting);
   }
   if (s->info->has_volume) {
     write_tensor(file, "linear", s->linear, g * k * sizeof *s->linear);

@@ -23,10 +23,9 @@ supine_status supine_export_source_open(const char *path, export_source *source,
   made.quadratic = made.info->volume_quadratic;
   made.cubic = made.info->volume_cubic;
   const supine_tensor *resting = supine_basis_tensor(made.basis, "resting_volume");
-  for (size_t i = 0; made.info->has_rest &&
-                     i < EXPORT_RESTING_TERMS * (resting->rank == 2 ? resting->shape[0] : 1);
-       ++i) {
-    made.resting[i % EXPORT_RESTING_TERMS] += ((const double *)resting->data)[i];
+  if (made.info->has_rest) {
+    made.resting = resting->data;
+    made.resting_rows = resting->rank == 2 ? resting->shape[0] : 1;
   }
   *source = made;
   return SUPINE_OK;

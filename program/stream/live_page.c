@@ -52,18 +52,18 @@ static supine_status print_page(const export_source *source, const export_page *
   return status;
 }
 
-supine_status supine_stream_live_page(const char *basis, double breath, const char *title,
-                                      char **page, size_t *size, supine_error *error) {
+supine_status supine_stream_live_page(const char *basis, const export_page *shown, char **page,
+                                      size_t *size, supine_error *error) {
   export_source source = {0};
-  export_page shown = {.title = title};
+  export_page sized = *shown;
   *page = NULL;
   *size = 0;
   supine_status status = supine_export_source_open(basis, &source, error);
   if (status == SUPINE_OK) {
-    status = supine_export_breath_set(&source, breath, 20.0, &shown.breath, error);
+    status = supine_export_breath_set(&source, shown->breath.volume, 20.0, &sized.breath, error);
   }
   if (status == SUPINE_OK) {
-    status = print_page(&source, &shown, page, size, error);
+    status = print_page(&source, &sized, page, size, error);
   }
   supine_export_source_close(&source);
   if (status == SUPINE_OK) {

@@ -6,12 +6,13 @@
 
 #include <stddef.h>
 
-#include <supine/status.h>
+#include "program/export/export.h"
 
 /** The page of a basis file with the script that follows, as bytes (free).
+ * @param shown  of its breath the volume alone
  * @retval SUPINE_ERROR_UNSUPPORTED  a basis that the page cannot show
  * Other statuses as supine_export_source_open and supine_export_html_write. */
-supine_status supine_stream_live_page(const char *basis, double breath, const char *title,
-                                      char **page, size_t *size, supine_error *error);
+supine_status supine_stream_live_page(const char *basis, const export_page *shown, char **page,
+                                      size_t *size, supine_error *error);
 
 #endif

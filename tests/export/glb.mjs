@@ -112,7 +112,7 @@ function stillErrors(rest, xyz, meshes) {
 /** One profile of one basis; returns the largest distance, mm. */
 async function check(basis, words, tolerance, targets, clamped) {
   const path = join(folder, 'lungs.glb');
-  supine('export', basis, '-o', path, '--volume', String(BREATH), ...words);
+  supine('export', basis, '-o', path, '--breath', String(BREATH), ...words);
   await validate(path);
   const { mesh, meshes } = await open(path);
   assert.deepEqual(meshes.map((m) => m.material.name), ['left', 'right']);
@@ -191,7 +191,7 @@ async function checkInside(basis, words, tolerance) {
   const extras = named.left.userData.supine;
   const all = [named.left, named.nodule];
   for (const gravity of [[0, -1, 0], [0.6, 0, -0.8]]) {
-    supine('deform', inside, '--gravity', gravity.join(','), '--volume', '300', '-o', moved);
+    supine('deform', inside, '--gravity', gravity.join(','), '--volume', 'scan+300', '-o', moved);
     const rows = readFileSync(moved, 'utf8').trim().split('\n').slice(1).map((row) => row.split(','));
     const { weights } = weightsFor(extras, gravity, 300);
     all.forEach((m) => m.morphTargetInfluences.splice(0, weights.length, ...weights));

@@ -53,7 +53,7 @@ async function checkControls(page) {
   await changes('a key', () => page.keyboard.press('5'));
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
-  await changes('pinning', () => page.getByRole('button', { name: 'Take as reference' }).click());
+  await changes('pinning', () => page.getByRole('button', { name: 'Take as the other posture' }).click());
   await changes('another key', () => page.keyboard.press('3')); /* upright, the room turns nothing */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });
@@ -120,13 +120,13 @@ assert.deepEqual(dark.complaints, []);
 await dark.page.close();
 
 // A surface with a hole has no volume: the breath is in millimetres.
-supine('deform', bases[0], '--posture', 'supine', '--volume', '0', '-o', torn);
+supine('deform', bases[0], '--posture', 'supine', '--volume', 'scan', '-o', torn);
 writeFileSync(torn, readFileSync(torn, 'utf8').replace(/^f .*\n/m, ''));
 supine('precompute', torn, '--law', 'paper', '-o', bases[2]);
 supine('export', bases[2], '-o', html, '--scale', '8');
 const { page: opened, complaints: last } = await open(html);
 const [scale, found] = await opened.evaluate(() => [
-  window.supine.moment([0, 1, 0], 8).scale, Array.from(window.supine.positions([0, 1, 0], 8))]);
+  window.supine.moment([0, 1, 0], 8).gains[0], Array.from(window.supine.positions([0, 1, 0], 8))]);
 const [moved, rest] = evaluate(bases[2], [[[0, 1, 0], scale], [[0, 1, 0], 0]]);
 assert.ok(largestDistance(found, moved.xyz) < TOLERANCE_MM);
 assert.ok(Math.abs(largestDistance(found, rest.xyz) - 8) < TOLERANCE_MM);

@@ -27,7 +27,7 @@ async function checkViews(page) {
     const { basis } = window.supine;
     const mean = (lung) => { let sum = 0; for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v]; return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]); };
     const names = basis.lungNames;
-    return [mean(names.indexOf('left')), mean(names.indexOf('right'))];
+    return [mean(names.indexOf('left lung')), mean(names.indexOf('right lung'))];
   });
   assert.ok(left > middle);
 }
@@ -111,7 +111,7 @@ async function checkProbes(page) {
   await page.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
   const [list, between] = [await page.locator('#probes').textContent(), await page.locator('#probes-text').textContent()];
   assert.match(list, /1  (left|right) lung  [\d.]+ mm  [LR] \d+  [PA] \d+  [HF] \d+ mm/);
-  assert.match(between, /1 to 2: [\d.]+ mm, at rest [\d.]+ mm/);
+  assert.match(between, /1 to 2: [\d.]+ mm; supine at rest [\d.]+ mm/);
   await page.keyboard.press('2');
   await settled(page);
   await page.waitForFunction(() => location.hash.includes('prone') && location.hash.includes('probes='));

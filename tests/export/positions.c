@@ -1,29 +1,26 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* positions BASIS X,Y,Z,ML...: what the run-time library makes of each gravity and volume. Writes,
- * for each, the breath scale (float64) and the positions (float32, [N, 3]) to standard output. A
- * basis of an open surface takes a breath scale in place of the volume. */
+/* positions BASIS X,Y,Z,ML...: what the run-time library makes of each gravity and volume above rest,
+ * or above the scan where no rest is known. Writes, for each, the first lung's gain (float64) and
+ * the positions (float32, [N, 3]) to standard output. A basis of an open surface takes a gain in
+ * place of the volume. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include <supine/runtime.h>
 
-#include "tests/poses.h"
-
-static bool write_positions(const supine_basis *basis, const double gravity[3], double depth,
+static bool write_positions(const supine_basis *basis, const double g[3], double depth,
                             float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
-  double scale = depth;
-  if (supine_basis_weights(basis, gravity, weights) != SUPINE_OK ||
-      (info->has_volume && posed_scale(basis, weights, depth, &scale, NULL) != SUPINE_OK)) {
+  const supine_volume_kind from = info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
+  const supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {from, depth}};
+  supine_pose pose;
+  supine_pose_fill(&pose, depth);
+  if (info->has_volume ? supine_basis_pose(basis, &state, &pose, NULL) != SUPINE_OK
+                       : supine_basis_weights(basis, g, pose.weights) != SUPINE_OK) {
     return false;
   }
-  for (size_t j = 0; j < info->lung_count; ++j) {
-    scales[j] = scale;
-  }
-  supine_deform(basis, POSED(basis, weights, scales), xyz);
-  return fwrite(&scale, sizeof scale, 1, stdout) == 1 &&
+  supine_deform(basis, &pose, xyz);
+  return fwrite(pose.gains[0], sizeof pose.gains[0][0], 1, stdout) == 1 &&
          fwrite(xyz, 3 * sizeof *xyz, info->vertex_count, stdout) == info->vertex_count;
 }
 

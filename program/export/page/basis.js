@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The basis in the page, and what the run-time library computes once a frame: weights from gravity,
-// the breath scale from a volume.
+// the lungs' gains from a volume.
 
 /** Bytes of a base64 text. */
 function fromBase64(text) {
@@ -36,10 +36,9 @@ const takeTriangles = (name, vertices) => Uint32Array.from(takeTensor(name, vert
 
 /** Triangles in the order of their lungs, and where each lung's corners begin. */
 function groupByLung(basis) {
-  const lungOf = (vertex) => basis.lungBegin.findIndex((begin, lung) => vertex < (basis.lungBegin[lung + 1] ?? Infinity));
   const lungs = basis.lungBegin.length - 1;
   const parts = Array.from({ length: lungs }, () => []);
-  for (let t = 0; t < basis.corners.length; t += 3) parts[lungOf(basis.corners[t])].push(t);
+  for (let t = 0; t < basis.corners.length; t += 3) parts[lungOf(basis, basis.corners[t])].push(t);
   const grouped = new Uint32Array(basis.corners.length);
   basis.cornerBegin = [0];
   let at = 0;
@@ -77,9 +76,10 @@ function readBasis() {
   basis.normals = basis.words ? takeTensor('normals', Uint32Array) : new Uint32Array(0);
   basis.turns = basis.words ? takeTensor('normal-weights', Float64Array) : null;
   basis.resting = basis.hasResting ? takeTensor('resting', Float64Array) : null;
+  basis.byLung = basis.resting?.length > 9;
   basis.lungs = basis.lungBegin.length - 1;
   const names = (basis.metadata.lungs ?? '').split(',');
-  basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => names[i] || `lung ${i}`);
+  basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
   groupByLung(basis);
   if (basis.inside) takeInside(basis.inside);
   return basis;
@@ -200,44 +200,70 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Resting volume for gravity along a unit vector, mL relative to the basis' surface; that surface is
- * at rest where the basis does not say. */
-function restFor(basis, gravity) {
-  if (!basis.resting) return 0;
-  return harmonics(2, gravity).reduce((sum, y, i) => sum + y * basis.resting[i], 0);
+const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
+
+/** What the lungs hold in a posture, mL beyond the basis' surface: at rest and at full inflation, by
+ * lung; at rest only together (`rest` has one number) where all lungs have one gain. Rest is the scan
+ * where the basis does not know it. */
+function volumesFor(basis, gravity) {
+  const y = harmonics(2, gravity);
+  const rows = basis.resting ? basis.resting.length / y.length : 1;
+  const rest = Array.from({ length: rows }, (_, row) => (basis.resting ? y.reduce((sum, x, i) => sum + x * basis.resting[row * y.length + i], 0) : basis.scanVolume));
+  const up = Math.max(0, -gravity[2]) ** 2;
+  return { rest, full: basis.references.map((ml) => (Number(basis.metadata.full_upright_gain) || 0) * up * ml) };
 }
 
-/** Everything about one moment: the weights with the breath scale in them, and each lung's gain over
- * rest in that posture. `depth` is mL above rest where the surface is closed, else mm of the largest
- * displacement when supine. */
+/** All lungs' resting volume for gravity along a unit vector, mL relative to the basis' surface. */
+const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
+
+/** Share a total out among the lungs: each fills on the straight line between its rest and its full
+ * volume, all at the same part of the way; below rest all shrink in proportion. */
+function shareOut({ references }, { rest, full }, total) {
+  const [all, resting] = [sumOf(references), sumOf(rest)];
+  const part = (total - resting) / (sumOf(full) - resting);
+  const shrunk = (all + total) / (all + resting);
+  return references.map((ml, lung) => (total >= resting ? rest[lung] + part * (full[lung] - rest[lung]) : (ml + rest[lung]) * shrunk - ml));
+}
+
+/** The gain of each lung, x, y and z of them alike, at which the lungs hold `total` mL beyond the
+ * basis' surface together. */
+function gainsFor(basis, cubics, volumes, total) {
+  if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => scaleForVolume(cubics[lung], ml));
+  const scale = scaleForVolume([0, 1, 2].map((i) => sumOf(cubics.map((c) => c[i]))), total);
+  return cubics.map(() => scale);
+}
+
+const spread = (gains) => Float64Array.from(gains.flatMap((gain) => [gain, gain, gain]));
+
+/** Everything about one moment: the modes' weights, three gains of each lung, and the mL that each
+ * lung holds (`held`) and gains over rest in that posture (`gained`). `depth` is mL above rest where
+ * the surface is closed, else mm of the largest displacement when supine. `folds` where the surface
+ * would fold before it holds that. */
 function momentFor(basis, gravity, depth) {
-  const w = weightsFor(basis, gravity);
-  let scale;
-  let gains = null;
-  if (basis.hasVolume) {
-    const cubics = Array.from({ length: basis.lungs }, (_, lung) => lungCubic(basis, lung, w));
-    const all = [0, 1, 2].map((i) => cubics.reduce((sum, c) => sum + c[i], 0));
-    const rest = restFor(basis, gravity);
-    scale = scaleForVolume(all, rest + depth);
-    const still = rest === 0 ? 0 : scaleForVolume(all, rest);
-    gains = cubics.map((c) => cubicAt(c, scale) - cubicAt(c, still));
-  } else {
-    scale = (depth / basis.breathLargest) * basis.breathScale;
+  const weights = weightsFor(basis, gravity);
+  if (!basis.hasVolume) {
+    const gains = spread(Array(basis.lungs).fill((depth / basis.breathLargest) * basis.breathScale));
+    return { gravity, weights, gains, held: null, gained: null, folds: false };
   }
-  return { gravity, scale, gains, weights: w.map((x) => x * scale) };
+  const cubics = basis.references.map((_, lung) => lungCubic(basis, lung, weights));
+  const volumes = volumesFor(basis, gravity);
+  const rest = sumOf(volumes.rest);
+  const now = gainsFor(basis, cubics, volumes, rest + depth);
+  const still = gainsFor(basis, cubics, volumes, rest);
+  const held = now.map((gain, lung) => basis.references[lung] + cubicAt(cubics[lung], gain));
+  const gained = held.map((ml, lung) => ml - basis.references[lung] - cubicAt(cubics[lung], still[lung]));
+  return { gravity, weights, gains: spread(now), held, gained, folds: !now.every(Number.isFinite) };
 }
 
-/** What supine.glsl multiplies by, for each lung: the weights, and those of the normal's modes, quadratic
- * in the weights, three to a word: modes j, j + words and j + 2 words. */
+/** What supine.glsl multiplies by: the weights, three gains of each lung, and the weights of the normal's
+ * modes, quadratic in gain times weights, three to a word: modes j, j + words and j + 2 words. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
-  const room = 4 * Math.ceil(k / 4);
-  const weights = new Float32Array(room);
-  const gains = new Float32Array(3 * lungs).fill(1); // the weights have the gain in them
+  const weights = new Float32Array(4 * Math.ceil(k / 4));
   const turns = new Float32Array(3 * words * lungs);
-  const q = [1, ...moment.weights];
   weights.set(moment.weights);
   for (let lung = 0, at = 0; lung < lungs; ++lung) {
+    const q = [1, ...moment.weights.map((w) => w * moment.gains[3 * lung])];
     for (let j = 0; j < normalModes; ++j) {
       let sum = 0;
       for (let a = 0; a <= k; ++a) {
@@ -248,14 +274,22 @@ function uniformsOf(basis, moment) {
       turns[3 * (lung * words + (j % words)) + Math.floor(j / words)] = sum;
     }
   }
-  return { weights, gains, turns };
+  return { weights, gains: Float32Array.from(moment.gains), turns };
+}
+
+/** The lung of a vertex. */
+function lungOf({ lungBegin }, vertex) {
+  let lung = 0;
+  while (vertex >= lungBegin[lung + 1]) ++lung;
+  return lung;
 }
 
 /** Where a vertex is. */
-function placeOf(basis, moment, vertex) {
+function placeOf(basis, { weights, gains }, vertex) {
+  const lung = lungOf(basis, vertex);
   let amount = 0;
-  for (let k = 0; k < basis.modes; ++k) amount += moment.weights[k] * basis.coefficients[vertex * basis.modes + k];
-  return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + amount * basis.direction[3 * vertex + axis]);
+  for (let k = 0; k < basis.modes; ++k) amount += weights[k] * basis.coefficients[vertex * basis.modes + k];
+  return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
 /** A few thousand triangles, for the range of the colours: the places of their corners. */

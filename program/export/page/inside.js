@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What is inside the lungs: named points and meshes, which move by the lungs' own weights along
-// displacements of their own, [vertex][axis][mode].
+// What is inside the lungs: named points and meshes, which move by the weights and gains of their lung
+// along displacements of their own, [vertex][axis][mode].
 
 const BALL_RADIUS = 4; // mm, of a point
 
@@ -16,24 +16,24 @@ function takeInside(inside) {
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
   inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
-  inside.rest = new Float32Array(3 * n);
+  inside.rest = new Float32Array(4 * n); // and the lung
   inside.fields = new Float32Array(3 * k * n);
   inside.part = new Float32Array(n);
   inside.members = inside.names.map(() => []); // vertices of each part
   order.forEach((from, to) => {
-    inside.rest.set(places.subarray(3 * from, 3 * from + 3), 3 * to);
+    inside.rest.set([...places.subarray(3 * from, 3 * from + 3), lungOf(inside, from)], 4 * to);
     inside.fields.set(fields.subarray(3 * k * from, 3 * k * (from + 1)), 3 * k * to);
     inside.part[to] = of[from];
     inside.members[of[from]].push(to);
   });
   inside.corners = corners.map((corner) => rank[corner]);
-  inside.normals = normalsOf(inside.rest, inside.corners);
+  inside.normals = normalsOf(inside);
 }
 
 /** Unit normals of a surface as it lies in the file. */
-function normalsOf(xyz, corners) {
-  const normals = new Float32Array(xyz.length);
-  const at = (v) => [xyz[3 * v], xyz[3 * v + 1], xyz[3 * v + 2]];
+function normalsOf({ rest, vertices, corners }) {
+  const normals = new Float32Array(3 * vertices);
+  const at = (v) => [...rest.subarray(4 * v, 4 * v + 3)];
   for (let t = 0; t < corners.length; t += 3) {
     const [a, b, c] = [at(corners[t]), at(corners[t + 1]), at(corners[t + 2])];
     const n = cross(b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i]));
@@ -47,11 +47,11 @@ function normalsOf(xyz, corners) {
 }
 
 /** Where a vertex inside is. */
-function insidePlace({ rest, fields, units: { length: k } }, { weights }, vertex) {
+function insidePlace({ rest, fields, units: { length: k } }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
-    let sum = rest[3 * vertex + axis];
+    let sum = 0;
     for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
-    return sum;
+    return rest[4 * vertex + axis] + gains[3 * rest[4 * vertex + 3] + axis] * sum;
   });
 }
 

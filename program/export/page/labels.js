@@ -85,9 +85,6 @@ class Letters {
   }
 }
 
-/** The lung of a vertex. */
-const lungOf = (basis, vertex) => basis.lungBegin.findLastIndex((begin) => vertex >= begin);
-
 /** The vertex nearest a place. */
 function nearestVertex(basis, xyz, place) {
   let best = -1;

@@ -4,9 +4,9 @@
 const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // what is shown or not
 const VIEW_ANGLE = 0.5; // radians, of the camera from top to bottom
 const KIND_TEXT = {
-  displacement: 'How far each place is from where it was at rest.',
-  difference: 'How far each place is from where it is in the reference posture at the same breath.',
-  expansion: 'How much the surface has grown around each place since rest, in area.',
+  displacement: 'How far each place is from where it is FROM.',
+  difference: 'How far each place is from where it is in the other posture at the same breath.',
+  expansion: 'How much larger the surface is around each place than FROM, in area.',
   height: 'How high each place is above the lowest one, along gravity.',
 };
 
@@ -42,6 +42,8 @@ function start() {
   const { centre, radius } = body;
   const letters = new Letters($('letters'), 2);
   const { inside } = basis;
+  const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
+  const restOrScan = basis.resting ? 'rest' : 'scan';
   const look = () => { unseen = true; }; // the picture is to be drawn again
   const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // vertices are not where the state says
@@ -68,14 +70,17 @@ function start() {
    * enough to know where to draw gravity. */
   function lowest(moment) {
     const { rest, direction, coefficients, modes } = basis;
-    const { weights, gravity: [x, y, z] } = moment;
+    const { weights, gains, gravity } = moment;
+    const [x, y, z] = gravity;
+    const along = basis.references.map((_, lung) => gravity.map((g, axis) => g * gains[3 * lung + axis]));
     const stride = state.kind === 'height' ? 1 : Math.ceil(basis.vertices / 400);
     let reach = -Infinity;
     for (let i = 0; i < basis.vertices; i += stride) {
       let amount = 0;
       for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[i * modes + k];
       const at = 3 * i;
-      reach = Math.max(reach, x * (rest[at] + amount * direction[at]) + y * (rest[at + 1] + amount * direction[at + 1]) + z * (rest[at + 2] + amount * direction[at + 2]));
+      const [u, v, w] = along[lungOf(basis, i)];
+      reach = Math.max(reach, x * rest[at] + y * rest[at + 1] + z * rest[at + 2] + amount * (u * direction[at] + v * direction[at + 1] + w * direction[at + 2]));
     }
     return reach;
   }
@@ -101,7 +106,7 @@ function start() {
     const { axis, at } = state.cut;
     const kind = KINDS[state.kind];
     return {
-      name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'ghost', box, canvasHeight: canvas.height,
+      name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'from', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
@@ -158,7 +163,7 @@ function start() {
     const { range } = state;
     if (found.part === undefined) {
       tip.firstChild.textContent = valueText(found.value);
-      tip.lastChild.textContent = `${basis.lungNames[found.lung]} lung   ${placeText(found.at)}`;
+      tip.lastChild.textContent = `${basis.lungNames[found.lung]}   ${placeText(found.at)}`;
     } else {
       Object.assign(found, insideAt(found));
       tip.firstChild.textContent = `${inside.names[found.part]}  ${found.move.toFixed(2)} mm`;
@@ -171,7 +176,7 @@ function start() {
   }
 
   /* Probes: places of the tissue that stay marked. */
-  const originMoment = () => (state.kind === 'difference' ? state.pinned : state.ghostMoment);
+  const originMoment = () => (state.kind === 'difference' ? state.pinned : state.from);
   function probeValue(vertex) {
     const at = placeOf(basis, state.moment, vertex);
     if (state.kind === 'height') return pane_lowest('now', state.moment) - dot(state.gravity, at);
@@ -209,7 +214,7 @@ function start() {
     }
     state.probes.forEach((vertex, i) => {
       const value = probeValue(vertex);
-      const text = `${i + 1}  ${basis.lungNames[lungOf(basis, vertex)]} lung${value === null ? '' : `  ${valueText(value)}`}  ${placeText(placeOf(basis, state.moment, vertex))}`;
+      const text = `${i + 1}  ${basis.lungNames[lungOf(basis, vertex)]}${value === null ? '' : `  ${valueText(value)}`}  ${placeText(placeOf(basis, state.moment, vertex))}`;
       const line = list.children[i].firstChild;
       if (line.textContent !== text) line.textContent = text;
     });
@@ -217,7 +222,7 @@ function start() {
       const places = (moment) => state.probes.slice(-2).map((vertex) => placeOf(basis, moment, vertex));
       const apart = ([a, b]) => Math.hypot(...a.map((x, i) => x - b[i]));
       const n = state.probes.length;
-      return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm, at rest ${apart(places(state.ghostMoment)).toFixed(1)} mm`;
+      return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm; ${fromWhere} ${apart(places(state.from)).toFixed(1)} mm`;
     };
     write('probes-text', state.probes.length === 0 ? 'Click or tap the lungs to keep a probe; two measure the distance between them.' : state.probes.length === 1 ? 'A second probe measures the distance.' : between());
     $('probes-clear').hidden = state.probes.length === 0;
@@ -290,38 +295,38 @@ function start() {
     const digits = basis.hasVolume ? 0 : 1;
     setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
     setSlider('depth', state.depth, amount(state.depth), digits);
-    write('depth-value', basis.hasVolume ? `rest + ${amount(state.depth)}` : amount(state.depth));
+    write('depth-value', basis.hasVolume ? `${restOrScan} + ${amount(state.depth)}` : amount(state.depth));
     setSlider('tidal', state.tidal, amount(state.tidal), digits);
     setSlider('rate', state.rate, `${state.rate} per minute`);
     changed('playing', state.playing, () => {
       $('play').setAttribute('aria-pressed', String(state.playing));
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
     });
-    const gains = state.moment?.gains?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
-    const rest = restFor(basis, gravity) - state.firstRest;
+    const gains = state.moment?.gained?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
+    const rest = restFor(basis, gravity) - state.supineRest;
     write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
     changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
     if (state.beside) {
-      write('left-name', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
-      write('right-name', name);
+      write('left-name', postureWords(gravityOf(state.pinnedQ)));
+      write('right-name', postureWords(gravityOf(state.goal)));
     }
   }
 
   function legendTitle() {
-    const rest = basis.resting ? 'rest, supine' : 'rest';
-    return { displacement: `Displacement from ${rest}`, difference: `Difference from ${postureText(gravityOf(state.pinnedQ))}`, expansion: `Growth of area from ${rest}`, height: 'Height above the lowest point' }[state.kind];
+    const { name } = basis.from;
+    return { displacement: `Displacement from ${name}`, difference: `Difference from ${postureWords(gravityOf(state.pinnedQ))}`, expansion: `Growth of area from ${name}`, height: 'Height above the lowest point' }[state.kind];
   }
 
   function showLegend() {
     drawLegend(state.kind, state.range, legendTitle(), basis.colours[KINDS[state.kind].map]);
-    write('kind-text', KIND_TEXT[state.kind]);
-    write('pinned', `reference: ${postureText(gravityOf(state.pinnedQ))}`);
+    write('kind-text', KIND_TEXT[state.kind].replace('FROM', fromWhere));
+    write('pinned', `other posture: ${postureWords(gravityOf(state.pinnedQ))}`);
     for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
     for (const id of SHOWN) $(id).checked = state[id];
     if (inside) {
-      const from = state.kind === 'difference' ? `${postureText(gravityOf(state.pinnedQ))} at the same breath` : basis.resting ? 'rest, supine' : 'rest';
+      const from = state.kind === 'difference' ? `${postureWords(gravityOf(state.pinnedQ))} at the same breath` : basis.from.name;
       write('inside-text', `Move from ${from}${inside.corners.length ? '; of a mesh, the mean' : ''}`);
       $('inside-legend').hidden = !state.inside;
       write('inside-legend', state.kind === 'expansion' ? 'inside, grey: points have no area' : 'balls and meshes inside: the same colours');
@@ -383,11 +388,11 @@ function start() {
     idle = setTimeout(keepLink, 400);
   }
 
-  let kept = null; // the rest that the graphics card holds
+  let kept = null; // the graphics card that holds what displacements count from
   function deform() {
     if (!state.moment) return;
     if (kept !== picture) {
-      picture.deform('ghost', state.ghostMoment);
+      picture.deform('from', state.from);
       kept = picture;
     }
     picture.deform('now', state.moment);
@@ -584,7 +589,7 @@ function start() {
     const choice = document.createElement('div');
     choice.className = 'choice';
     choice.setAttribute('role', 'radiogroup');
-    choice.setAttribute('aria-label', `${name} lung`);
+    choice.setAttribute('aria-label', name);
     for (const [words, opacity] of [['Whole', 1], ['Faded', FADED], ['Hidden', 0]]) {
       const label = document.createElement('label');
       const input = document.createElement('input');
@@ -606,7 +611,7 @@ function start() {
   $('full').hidden = !document.fullscreenEnabled;
   $('full').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
   const picturePng = () => savePicture(canvas, draw, document.title,
-    [`${state.beside ? `left ${postureText(gravityOf(state.pinnedQ))}, right ` : ''}${postureText(gravityOf(state.goal))}, ${$('depth-value').textContent}`, 'computed, not for diagnosis'],
+    [`${state.beside ? `${postureWords(gravityOf(state.pinnedQ))} and beside it ` : ''}${postureWords(gravityOf(state.goal))}, ${$('depth-value').textContent}`, 'computed, not for diagnosis'],
     { ...state.range, title: `${legendTitle()}, ${KINDS[state.kind].unit}` }, basis.colours[KINDS[state.kind].map],
     [...$('letters').querySelectorAll(':not([hidden])')].map((element) => {
       const [box, stage] = [element.getBoundingClientRect(), canvas.getBoundingClientRect()];
@@ -656,10 +661,12 @@ function start() {
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
   if (!basis.hasVolume) {
     document.querySelector('[for="tidal"]').textContent = 'Depth';
-    document.querySelector('[for="depth"]').textContent = 'Largest displacement';
+    write('depth-name', 'Largest displacement');
     write('depth-unit', 'mm');
     write('tidal-unit', 'mm');
   }
+  else write('depth-name', `Above ${basis.resting ? 'rest' : 'the scan'}`);
+  write('ghost-name', `${basis.from.name.replace(/^./, (c) => c.toUpperCase())} as a ghost`);
   showFacts(basis);
 
   const resize = () => {
@@ -693,7 +700,7 @@ function start() {
     normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
     /** What is inside, likewise; its vertices are in the page's own order. */
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
-    /** Weights with the breath scale in them, and the scale. */
+    /** Weights, gains and volumes. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio(), plates()); showState(); },

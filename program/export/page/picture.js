@@ -116,10 +116,7 @@ class Picture {
       return this.array(attributes);
     };
     const rest = new Float32Array(4 * basis.vertices);
-    for (let i = 0, lung = 0; i < basis.vertices; ++i) {
-      while (i >= basis.lungBegin[lung + 1]) ++lung;
-      rest.set([basis.rest[3 * i], basis.rest[3 * i + 1], basis.rest[3 * i + 2], lung], 4 * i);
-    }
+    for (let i = 0; i < basis.vertices; ++i) rest.set([...basis.rest.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
     const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
     this.fewCount = Math.ceil(basis.vertices / every);
     const few = (values, size) => values.constructor.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
@@ -134,7 +131,7 @@ class Picture {
     this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
     this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
     const fields = this.buffer(inside.fields);
-    const attributes = [[this.buffer(inside.rest), 3, 12, 0]];
+    const attributes = [[this.buffer(inside.rest), 4, 16, 0]];
     for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([fields, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
     this.insideInputs = this.array(attributes);
     this.insideParts = this.buffer(inside.part);
@@ -261,7 +258,7 @@ class Picture {
     gl.useProgram(moving.program);
     const { weights, gains, turns } = this.uniforms(moment);
     gl.uniform4fv(moving.at.supine_weights, weights);
-    if (moving.at.supine_gains) gl.uniform3fv(moving.at.supine_gains, gains);
+    gl.uniform3fv(moving.at.supine_gains, gains);
     if (moving.at.supine_normal_weights) gl.uniform3fv(moving.at.supine_normal_weights, turns);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
     gl.bindVertexArray(array);
@@ -370,7 +367,7 @@ class Picture {
       for (const { lung } of lungs) this.drawLung(lung, gl.LINES);
     }
     if (pane.ghost) {
-      gl.bindVertexArray(this.shown('ghost', 'ghost'));
+      gl.bindVertexArray(this.shown('from', 'from'));
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
       set('ghost', 1);
       set('flatly', 0);

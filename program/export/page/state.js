@@ -36,6 +36,9 @@ function postureText(gravity) {
   return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
+/** The same for people. */
+const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
+
 /** {q, tilt} of what postureText writes and the program reads; null where it is neither. */
 function postureFrom(text) {
   const word = text.trim().replaceAll('\u2212', '-');
@@ -75,9 +78,8 @@ class State {
     this.unit = basis.hasVolume ? 'mL' : 'mm';
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
     this.depth = this.tidal;
-    this.firstGravity = gravityOf(POSTURES[0].q);  // whose rest is the ghost
-    this.firstRest = restFor(basis, this.firstGravity);
-    this.depthMax = Math.max(2 * this.tidal, -this.firstRest);
+    this.supineRest = restFor(basis, gravityOf(POSTURES[0].q));
+    this.depthMax = Math.max(2 * this.tidal, -this.supineRest);
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
@@ -98,7 +100,7 @@ class State {
     this.roomBlend = 0; // 0: the patient stands still; 1: the room does
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    this.ghostMoment = momentFor(basis, this.firstGravity, 0);
+    this.from = basis.from;                        // what displacements count from: weights and gains
     this.measure();
   }
 
@@ -151,11 +153,11 @@ class State {
   /** Weights for now; false, and the old ones stay, where the surface would fold. */
   compute() {
     const moment = momentFor(this.basis, this.gravity, this.depth);
-    if (!Number.isFinite(moment.scale)) return false;
+    if (moment.folds) return false;
     this.moment = moment;
     if (this.needsPinned) {
       const pinned = momentFor(this.basis, gravityOf(this.pinnedQ), this.depth);
-      this.pinned = Number.isFinite(pinned.scale) ? pinned : moment;
+      this.pinned = pinned.folds ? moment : pinned;
     }
     return true;
   }
@@ -173,7 +175,7 @@ class State {
     if (deepest === this.measured) return;
     this.measured = deepest;
     const at95 = (values) => values.sort((a, b) => a - b)[Math.floor(0.95 * values.length)];
-    const rest = samplePlaces(this.basis, this.ghostMoment);
+    const rest = samplePlaces(this.basis, this.from);
     const areas = (places) => Float64Array.from({ length: places.length / 3 }, (_, i) => {
       const [a, b, c] = places.slice(3 * i, 3 * i + 3);
       return Math.hypot(...cross(b.map((x, j) => x - a[j]), c.map((x, j) => x - a[j])));
@@ -187,7 +189,7 @@ class State {
     };
     const restAreas = areas(rest);
     const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
-      .filter((m) => Number.isFinite(m.scale)).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
+      .filter((m) => !m.folds).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
     states.forEach(({ gravity, places }, i) => {
       take('displacement', far(places, rest));
       take('expansion', Array.from(areas(places), (area, j) => 100 * (area / restAreas[j] - 1)));
