@@ -274,6 +274,8 @@ function start() {
 
   const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
 
+  const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
+
   const last = {};
   /** Acts where a value is another than the last time: asking the page takes longer than remembering. */
   const changed = (what, value, act) => {
@@ -295,7 +297,7 @@ function start() {
     const digits = basis.hasVolume ? 0 : 1;
     setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
     setSlider('depth', state.depth, amount(state.depth), digits);
-    write('depth-value', basis.hasVolume ? `${restOrScan} + ${amount(state.depth)}` : amount(state.depth));
+    write('depth-value', basis.hasVolume ? volumeWords() : amount(state.depth));
     setSlider('tidal', state.tidal, amount(state.tidal), digits);
     setSlider('rate', state.rate, `${state.rate} per minute`);
     changed('playing', state.playing, () => {
