@@ -13,12 +13,27 @@
 
 #include <supine/status.h>
 
-/** The axes that a file's coordinates are in. */
+/** The axes that a file's coordinates are in: any of the 48 ways to name them by three letters,
+ * each saying which way a coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior),
+ * as Slicer and nibabel do. Those without a name here come from supine_mesh_axes_parse. */
 typedef enum supine_axes {
   SUPINE_AXES_AUTO = 0, /**< the file's SPACE tag, LPS where it has none */
-  SUPINE_AXES_LPS,
-  SUPINE_AXES_RAS
+  SUPINE_AXES_LPS = 1,
+  SUPINE_AXES_RAS = 4,
+  SUPINE_AXES_COUNT = 49
 } supine_axes;
+
+/** Reads three letters, as "RAI"; false for anything else. */
+bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
+void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
+/** The signed permutation that takes coordinates in these axes to LPS; AUTO is LPS. */
+void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
+/** Takes a point or vector to LPS, times `scale`. */
+void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
+/** The axes whose matrix is that of `then` times that of `first`. */
+supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
+/** True where the axes are left-handed: triangles read in them are inside out. */
+bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; supine_mesh_free releases what load or make put there. */
 typedef struct supine_mesh {
@@ -41,7 +56,7 @@ typedef struct supine_mesh_report {
   size_t welded_vertices;       /**< vertices that joined an earlier one at the same position */
   size_t degenerate_faces;      /**< faces dropped: two corners at one vertex, or not a triangle */
   size_t unreferenced_vertices; /**< vertices dropped: no triangle names them */
-  supine_axes axes;             /**< axes that were assumed for the file: LPS or RAS */
+  supine_axes axes;             /**< axes that were assumed for the file */
   bool axes_from_tag;           /**< the file said so itself, with a SPACE tag */
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
   double odd_side;              /**< longest side, mm, where no lungs are of that size; else 0 */

@@ -259,7 +259,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     add(&list, "assumed", "%s", content->assumed);
   }
   if (content->frame.millimetres_per_unit > 0.0) {
-    add(&list, "scan_axes", "%s", content->frame.axes == SUPINE_AXES_RAS ? "RAS" : "LPS");
+    char letters[4];
+    supine_mesh_axes_letters(content->frame.axes, letters);
+    add(&list, "scan_axes", "%s", letters);
     add(&list, "scan_unit_mm", "%.17g", content->frame.millimetres_per_unit);
   }
   status = find_normals(content, vertices, directions, &normals, error);

@@ -28,9 +28,9 @@ typedef struct request {
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error; what is "
-                         "inside also goes into .csv, images into .nrrd, .nii or .nii.gz",
+                         "inside also goes into .csv, images into .nrrd, .nii, .nii.gz or .mha",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
-     .endings = SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii or .nii.gz"},
+     .endings = SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",

@@ -21,13 +21,15 @@ const supine_option supine_command_deform_content_options[] = {
     {.help =
          "What is inside ('supine embed'): -o FILE.csv writes moved points by name; of a grid:"},
     {"field-out", 0, "FILE",
-     ".nrrd: displacements in mm, LPS, from each node of the scan (or of --from) to where its "
-     "tissue goes; they fade out within 60 mm of the lungs",
-     SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT, .endings = ".nrrd"},
+     ".nrrd, .nii, .nii.gz or .mha: displacements in mm, LPS (in NIfTI too, as ITK and ANTs have "
+     "it; NiftyReg wants x and y negated), from each node of the scan (or of "
+     "--from) to where its tissue goes; they fade out within 60 mm of the lungs",
+     SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
+     .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
      "from each node of the moved lungs to where its tissue was, as resampling an image takes it",
      SUPINE_FILLS(supine_deform_content, inverse)},
-    {"image", 0, "FILE", "image to move, into -o: .nrrd, .nii or .nii.gz, linear",
+    {"image", 0, "FILE", "image to move, into -o: .nrrd, .nii, .nii.gz or .mha, linear",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {"labels", 0, "FILE", "label map to move, into -o: nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
@@ -42,12 +44,13 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
   const bool image = wanted->image != NULL || wanted->labels != NULL;
   if (wanted->path == NULL && (image || wanted->field == NULL)) {
     return supine_options_usage(command, "-o FILE is missing; its name must end in %s",
-                                image ? ".nrrd, .nii or .nii.gz" : SUPINE_MESH_ENDINGS);
+                                image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
   }
   if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
     return supine_options_usage(command,
-                                image ? "%s: --image and --labels write .nrrd, .nii or .nii.gz"
-                                      : "%s: which image? Give --image FILE or --labels FILE",
+                                image
+                                    ? "%s: --image and --labels write .nrrd, .nii, .nii.gz or .mha"
+                                    : "%s: which image? Give --image FILE or --labels FILE",
                                 wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {

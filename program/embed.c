@@ -7,12 +7,14 @@
 #include "sh/base/text.h"
 
 #include "mesh/image/image.h"
+#include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/embed.h"
 #include "precompute/inside/grid.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "embed";
 
@@ -37,8 +39,6 @@ typedef struct request {
   bool clamp;
   supine_mesh_load_options load;
 } request;
-
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
 
 /* "all", "7", "7=nodule,8=vessels" */
 static int read_labels(const char *command, const char *text, void *field) {
@@ -84,8 +84,7 @@ static const supine_option table[] = {
      "what lies outside the lungs moves as the nearest point of their surface, instead of as the "
      "inside would if it went on",
      SUPINE_FILLS(request, clamp)},
-    {"axes", 0, "LPS|RAS", "axes of points and meshes; default: their SPACE tag, else LPS (DICOM)",
-     SUPINE_FILLS(request, load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
 /* The nodes of a grid: of its own, or of an image's voxels. */
@@ -145,7 +144,7 @@ static supine_status read_content(const supine_inside_shells *shells, const requ
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     status = supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-             : supine_text_ends_in_any_case(paths[i], ".csv")
+             : supine_mesh_points_named(paths[i])
                  ? supine_inside_content_points(paths[i], &wanted->load, content, error)
                  : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
   }
@@ -231,8 +230,9 @@ static int run(void *chosen, const supine_arguments *given) {
     image = image || supine_image_is_named(given->operand[i]);
   }
   if (given->count == 1 && !wanted->has_grid) {
-    return supine_options_usage(name, "which content? Name points (.csv), meshes or an image, or "
-                                      "give --grid MM");
+    return supine_options_usage(
+        name, "which content? Name points (.csv, .fcsv, .mrk.json), meshes or an image, or "
+              "give --grid MM");
   }
   if (wanted->labels.given && (!image || wanted->has_grid)) {
     return supine_options_usage(name, image ? "--labels takes surfaces, --grid voxels: one of the "
@@ -263,7 +263,8 @@ const supine_command supine_command_embed = {
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
     .about =
-        "Makes a basis of what is inside the lungs of a basis: points (a CSV file with the columns "
+        "Makes a basis of what is inside the lungs of a basis: points (3D Slicer's .mrk.json or "
+        ".fcsv, or a CSV file with the columns "
         "x, y, z and name), meshes (airways, vessels, nodules), the parts of a label map, or the "
         "nodes of a grid, of its own or of an image (.nrrd, .nii, .nii.gz). It moves with the "
         "lungs' own weights and breath, "

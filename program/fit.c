@@ -6,11 +6,13 @@
 
 #include "sh/base/text.h"
 
+#include "precompute/lungs/gate.h"
 #include "precompute/patient/gain.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
 #include "program/options/command.h"
 #include "program/options/posture_list.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "fit";
 
@@ -50,8 +52,6 @@ static int read_scan(const char *command, const char *text, void *field) {
   memcpy(scan->gravity, list.item[0].gravity, sizeof scan->gravity);
   return SUPINE_EXIT_OK;
 }
-
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
 
 /* "prone:PAIRS.csv", "prone:rest:PRONE.ply", into the whole request. */
 static int read_state(const char *command, const char *text, void *field) {
@@ -110,8 +110,7 @@ static const supine_option table[] = {
      .wants = "(at most 8) a posture, perhaps :full, :rest or :ML, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
-    {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
-     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {.table = supine_options_surface_frame, FILLS(load)},
     {"reach", 0, "MM",
      "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
      .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
@@ -292,6 +291,7 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
                                 supine_error *error) {
   enum { FILES_MAX = 2 };
   supine_mesh meshes[FILES_MAX] = {0};
+  supine_mesh_report report = {0};
   size_t count = 0;
   char *names = strdup(operand);
   char *rest = names;
@@ -302,11 +302,17 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
     status =
         count == FILES_MAX
             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s': two lungs at most", operand)
-            : supine_mesh_load(path, &wanted->load, &meshes[count++], NULL, error);
+            : supine_mesh_load(path, &wanted->load, &meshes[count++], &report, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_lungs_create(meshes, count, wanted->has_midline ? &wanted->midline : NULL,
-                                 lungs, error);
+    supine_findings findings = {""};
+    const supine_lungs_source source = {.name = operand,
+                                        .axes = report.axes,
+                                        .axes_given = wanted->load.axes != SUPINE_AXES_AUTO,
+                                        .units_given = wanted->load.millimetres_per_unit != 0.0,
+                                        .midline = wanted->has_midline ? &wanted->midline : NULL};
+    status = supine_lungs_gate(meshes, count, &source, lungs, NULL, &findings, error);
+    supine_options_say_findings(name, &findings);
   }
   for (size_t i = 0; i < FILES_MAX; ++i) {
     supine_mesh_free(&meshes[i]);

@@ -11,7 +11,8 @@
 #define FILLS(member) SUPINE_FILLS(supine_label_options, member)
 
 const supine_option supine_command_label_options[] = {
-    {.help = "Label maps (.nrrd, .nii, .nii.gz) in place of surfaces, one map or a mask a file:"},
+    {.help =
+         "Label maps (.nrrd, .nii, .nii.gz, .mha) in place of surfaces, one map or a mask a file:"},
     {"labels", 0, "WHICH",
      "which labels are lungs; default: by those that are there, where they leave no doubt. "
      "lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), totalsegmentator (10 to 14), "
@@ -49,43 +50,25 @@ static const char *side_name(const supine_labels_lung *lung) {
   return lung->side > 0 ? "left" : "right";
 }
 
-/* Things that may be wrong with the map. */
-static void warn(const char *command, const char *path, const supine_labels_report *report) {
+/* What may be wrong with the map. */
+static void find(const char *path, const supine_labels_report *report, supine_findings *findings) {
   if (report->frames_differ) {
-    supine_options_say(command,
-                       "%s: warning: its qform and sform do not agree; the sform was taken", path);
-  }
-  if (report->apex < 0) {
-    supine_options_say(command,
-                       "%s: warning: by its header the lungs' narrow end is at the feet: it is "
-                       "upside down, or holds a part of the lungs alone",
-                       path);
-  }
-  if (report->back < 0) {
-    supine_options_say(command,
-                       "%s: warning: by its header the lungs reach deepest at the front: is it "
-                       "turned round?",
-                       path);
-  }
-  if (report->lung_count == 2 && report->lung[0].surface > report->lung[1].surface) {
-    supine_options_say(command,
-                       "%s: note: the left lung is the larger, which is rare: is the header "
-                       "mirrored?",
-                       path);
+    supine_findings_add(findings,
+                        "%s: warning: its qform and sform do not agree; the sform was taken", path);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
     if (lung->cut > 0) {
-      supine_options_say(command,
-                         "%s: warning: the %s lung is cut off at the image's border (%zu voxels)",
-                         path, side_name(lung), lung->cut);
+      supine_findings_add(findings,
+                          "%s: warning: the %s lung is cut off at the image's border (%zu voxel%s)",
+                          path, side_name(lung), lung->cut, lung->cut == 1 ? "" : "s");
     }
     if (lung->tunnels > 0) {
-      supine_options_say(command,
-                         "%s: note: %ld %s lead through the %s lung, or hollows in it to the "
-                         "outside; --close MM closes narrow ones",
-                         path, lung->tunnels, lung->tunnels == 1 ? "channel" : "channels",
-                         side_name(lung));
+      supine_findings_add(findings,
+                          "%s: note: %ld %s lead%s through the %s lung, or hollows in it to the "
+                          "outside; --close MM closes narrow ones",
+                          path, lung->tunnels, lung->tunnels == 1 ? "channel" : "channels",
+                          lung->tunnels == 1 ? "s" : "", side_name(lung));
     }
   }
 }
@@ -110,10 +93,6 @@ static void tell(const char *path, const supine_labels_report *report,
     (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL), at most %.2g mm from the mask\n",
                  surfaces[i].vertex_count, lung->surface, lung->surface - lung->mask,
                  lung->farthest);
-  }
-  if (report->apex > 0 && report->back > 0) {
-    (void)printf("narrow at the head and deepest at the back, as lungs are: the header's axes "
-                 "hold\n");
   }
 }
 
@@ -148,10 +127,10 @@ static supine_status save(const char *path, const supine_mesh *surfaces, size_t 
 }
 
 int supine_command_labels_load(const supine_label_options *options, const char *command,
-                               char **paths, size_t path_count, supine_mesh *surfaces,
-                               size_t *count, int *sides) {
+                               char **paths, size_t path_count, supine_command_maps *maps) {
   supine_progress progress = supine_options_progress_begin("label map");
   const supine_labels_options wanted = {.labels = options->labels,
+                                        .axes = maps->axes,
                                         .edge = options->edge,
                                         .close = options->close,
                                         .progress = supine_options_progress_step,
@@ -159,17 +138,18 @@ int supine_command_labels_load(const supine_label_options *options, const char *
   supine_labels_report report;
   supine_error error;
   supine_status status = supine_labels_surfaces((const char *const *)paths, path_count, &wanted,
-                                                surfaces, &report, &error);
+                                                maps->surfaces, &report, &error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK) {
-    *count = report.lung_count;
+    maps->count = report.lung_count;
+    maps->axes = report.coordinates;
     for (size_t i = 0; i < report.lung_count; ++i) {
-      sides[i] = report.lung[i].side;
+      maps->sides[i] = report.lung[i].side;
     }
-    warn(command, paths[0], &report);
-    tell(paths[0], &report, surfaces);
+    find(paths[0], &report, maps->findings);
+    tell(paths[0], &report, maps->surfaces);
     if (options->surfaces != NULL) {
-      status = save(options->surfaces, surfaces, *count, &error);
+      status = save(options->surfaces, maps->surfaces, maps->count, &error);
     }
   }
   return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(command, &error);

@@ -3,6 +3,8 @@
 #ifndef SUPINE_LABEL_OPTIONS_H
 #define SUPINE_LABEL_OPTIONS_H
 
+#include "sh/base/findings.h"
+
 #include "mesh/mesh.h"
 
 #include "program/options/command.h"
@@ -21,10 +23,17 @@ typedef struct supine_label_options {
 int supine_command_labels_check(const supine_label_options *options, const char *command,
                                 char **paths, size_t count, bool *maps);
 
-/* The lungs' surfaces [2], of which `count` are written; says what was found. An exit code.
- * @param sides  [2] written: +1 left, -1 right */
+/* What loading label maps gives. */
+typedef struct supine_command_maps {
+  supine_axes axes;      /* in: of the headers' coordinates, AUTO: as they say; out: those taken */
+  supine_mesh *surfaces; /* [2], of which `count` are written */
+  size_t count;
+  int sides[2]; /* +1 left, -1 right */
+  supine_findings *findings;
+} supine_command_maps;
+
+/* The lungs' surfaces; prints what the maps hold. An exit code. */
 int supine_command_labels_load(const supine_label_options *options, const char *command,
-                               char **paths, size_t path_count, supine_mesh *surfaces,
-                               size_t *count, int *sides);
+                               char **paths, size_t path_count, supine_command_maps *maps);
 
 #endif

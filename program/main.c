@@ -13,6 +13,7 @@
 
 #include "program/options/command.h"
 #include "sh/base/output.h"
+#include "sh/base/parallel.h"
 
 static void print_help(void) {
   (void)puts("supine - lungs that deform with gravity, in real time\n"
@@ -115,6 +116,10 @@ int main(int argc, char **argv) {
     char option[] = "--help";
     char *arguments[] = {argv[2], option, NULL};
     return supine_options_run(command, 2, arguments);
+  }
+  if (!supine_thread_count_sound()) {
+    return supine_options_usage(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",
+                                getenv("SUPINE_THREADS")); /* NOLINT(concurrency-mt-unsafe) */
   }
   return supine_options_run(command, argc - 1, argv + 1);
 }

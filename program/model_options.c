@@ -9,8 +9,10 @@
 #include "sh/base/text.h"
 
 #include "precompute/inside/surface.h"
+#include "precompute/lungs/gate.h"
 #include "program/model_options.h"
 #include "program/options/posture_list.h"
+#include "program/options/surface_options.h"
 
 void supine_command_model_options_begin(supine_model_options *options) {
   options->model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -124,22 +126,6 @@ static int read_resting(const char *command, const char *text, void *field) {
   return SUPINE_EXIT_OK;
 }
 
-static int read_units(const char *command, const char *text, void *field) {
-  double *millimetres = field;
-  (void)command;
-  static const struct {
-    const char *name;
-    double millimetres;
-  } units[] = {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}};
-  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
-    if (strcmp(text, units[i].name) == 0) {
-      *millimetres = units[i].millimetres;
-      return SUPINE_EXIT_OK;
-    }
-  }
-  return supine_options_fits(supine_options_parse_number(text, millimetres) && *millimetres > 0.0);
-}
-
 /* A model's name; anything with a dot or a slash is a file of vectors. */
 static int read_direction(const char *command, const char *text, void *field) {
   supine_model_options *options = field;
@@ -219,8 +205,6 @@ static int read_lung(const char *command, const char *text, void *field) {
   return SUPINE_EXIT_OK;
 }
 
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
-
 /* The laws' help, and the constants of each for the options that change one. */
 #define LAW_HELP(id, name, base, gain, box, constants, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) " " name " " #base
@@ -232,11 +216,7 @@ static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axe
 
 const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
-    {"axes", 0, "LPS|RAS", "axes of the files; default: their SPACE tag, else LPS (DICOM)",
-     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
-    {"units", 0, "UNIT", "mm, cm, m, um or in, or millimetres per unit; default mm",
-     FILLS(load.millimetres_per_unit), .read = read_units,
-     .wants = "mm, cm, m, um, in or millimetres per unit"},
+    {.table = supine_options_surface_frame, FILLS(load)},
     {"midline", 0, "X",
      "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
      "the inner face of a single lung's",
@@ -321,6 +301,7 @@ typedef struct load_work {
   char **paths;
   supine_mesh *meshes;
   supine_mesh_report *reports;
+  supine_axes axes;     /* of the files' coordinates, or of a map's header */
   supine_error *errors; /* status SUPINE_OK where loading went well */
 } load_work;
 
@@ -333,23 +314,19 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* What a careful colleague would mention about a file. */
-static void mention(const char *command, const char *path, const supine_mesh_report *report) {
+/* What reading a file found. */
+static void find(const char *path, const supine_mesh_report *report, supine_findings *findings) {
   if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
-    supine_options_say(command, "%s: dropped %zu degenerate faces and %zu unreferenced vertices",
-                       path, report->degenerate_faces, report->unreferenced_vertices);
+    supine_findings_add(
+        findings, "%s: note: dropped %zu degenerate face%s and %zu unreferenced vert%s", path,
+        report->degenerate_faces, report->degenerate_faces == 1 ? "" : "s",
+        report->unreferenced_vertices, report->unreferenced_vertices == 1 ? "ex" : "ices");
   }
   if (report->comment_names_ras) {
-    supine_options_say(command,
-                       "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
-                       "the right, add --axes RAS",
-                       path);
-  }
-  if (report->odd_side > 0.0) {
-    const char *unit = report->likely_unit;
-    supine_options_say(
-        command, "%s: warning: %.3g mm long, which no lung is: %s%s", path, report->odd_side,
-        unit == NULL ? "check its units" : "its unit is likely --units ", unit == NULL ? "" : unit);
+    supine_findings_add(findings,
+                        "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
+                        "the right, add --axes RAS",
+                        path);
   }
 }
 
@@ -513,13 +490,15 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
   const supine_reference *reference = &options->reference;
   const size_t size = sizeof options->assumed;
   char *text = options->assumed;
+  char letters[4];
+  supine_mesh_axes_letters(report->axes, letters);
   text[0] = '\0';
-  supine_text_add(
-      text, size, "%s axes (%s), %g mm a unit", report->axes == SUPINE_AXES_RAS ? "RAS" : "LPS",
-      options->load.axes != SUPINE_AXES_AUTO ? "as told"
-      : report->axes_from_tag                ? "the file's tag"
-                                             : "assumed",
-      options->load.millimetres_per_unit == 0.0 ? 1.0 : options->load.millimetres_per_unit);
+  supine_text_add(text, size, "%s axes (%s), %g mm a unit", letters,
+                  options->load.axes != SUPINE_AXES_AUTO ? "as told"
+                  : report->axes_from_tag                ? "the file's tag"
+                                                         : "assumed",
+                  options->load.millimetres_per_unit == 0.0 ? 1.0
+                                                            : options->load.millimetres_per_unit);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_text_add(text, size, "; %s lung in", supine_lungs_name(lungs, lung));
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -553,28 +532,31 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
 }
 
 /* Surfaces from files, all at once; an exit code. */
-static int load_meshes(const char *command, load_work *work, size_t count) {
+static int load_meshes(const char *command, load_work *work, size_t count,
+                       supine_findings *findings) {
   supine_parallel_for(count, 1, count, load_range, work);
   for (size_t i = 0; i < count; ++i) {
     if (work->errors[i].status != SUPINE_OK) {
       return supine_options_fail(command, &work->errors[i]);
     }
-    mention(command, work->paths[i], &work->reports[i]);
+    find(work->paths[i], &work->reports[i], findings);
   }
+  work->axes = work->reports[0].axes;
   return SUPINE_EXIT_OK;
 }
 
-/* Surfaces from label maps, whose headers say axes and units. A lung alone has its inner face for a
- * midline. */
+/* Surfaces from label maps. A lung alone has its inner face for a midline. */
 static int load_maps(supine_model_options *options, const char *command, load_work *work,
                      size_t *count) {
-  int sides[2];
-  if (options->load.axes != SUPINE_AXES_AUTO || options->load.millimetres_per_unit != 0.0) {
-    return supine_options_usage(command, "--axes and --units are of surfaces: a label map's header "
-                                         "says both");
+  supine_command_maps maps = {
+      .axes = options->load.axes, .surfaces = work->meshes, .findings = &options->findings};
+  if (options->load.millimetres_per_unit != 0.0) {
+    return supine_options_usage(command, "--units is for surfaces: a label map's header says them");
   }
-  const int result = supine_command_labels_load(&options->maps, command, work->paths, *count,
-                                                work->meshes, count, sides);
+  const int result =
+      supine_command_labels_load(&options->maps, command, work->paths, *count, &maps);
+  *count = maps.count;
+  work->axes = maps.axes;
   for (size_t i = 0; i < *count && result == SUPINE_EXIT_OK; ++i) {
     work->reports[i] = (supine_mesh_report){.axes = SUPINE_AXES_LPS, .axes_from_tag = true};
   }
@@ -582,10 +564,33 @@ static int load_maps(supine_model_options *options, const char *command, load_wo
     double low[3];
     double high[3];
     supine_mesh_box(&work->meshes[0], low, high);
-    options->midline = sides[0] > 0 ? low[0] : high[0];
+    options->midline = maps.sides[0] > 0 ? low[0] : high[0];
     options->has_midline = true;
   }
   return result;
+}
+
+/* Checks and joins what was loaded. */
+static int make_lungs(supine_model_options *options, const char *command, const load_work *work,
+                      size_t count, bool maps, supine_lungs *lungs) {
+  const supine_lungs_source source = {.name = work->paths[0],
+                                      .axes = work->axes,
+                                      .axes_given = options->load.axes != SUPINE_AXES_AUTO,
+                                      .units_given = options->load.millimetres_per_unit != 0.0,
+                                      .midline = options->has_midline ? &options->midline : NULL};
+  supine_error error;
+  bool hold = false;
+  const supine_status status =
+      supine_lungs_gate(work->meshes, count, &source, lungs, &hold, &options->findings, &error);
+  supine_options_say_findings(command, &options->findings);
+  if (status != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  if (maps && hold) {
+    (void)printf("narrow at the head, deepest at the back, the heart on the left, as in people: "
+                 "the header's axes hold\n");
+  }
+  return SUPINE_EXIT_OK;
 }
 
 /* Over 60 lines: one step after another, each with its message. */
@@ -598,33 +603,23 @@ int supine_command_model_load(supine_model_options *options, const char *command
     return result;
   }
   const size_t most = count > 2 ? count : 2; /* a map holds two lungs */
-  load_work work = {&options->load, paths, calloc(most, sizeof(supine_mesh)),
-                    calloc(most, sizeof(supine_mesh_report)), calloc(most, sizeof(supine_error))};
+  load_work work = {&options->load,
+                    paths,
+                    calloc(most, sizeof(supine_mesh)),
+                    calloc(most, sizeof(supine_mesh_report)),
+                    SUPINE_AXES_AUTO,
+                    calloc(most, sizeof(supine_error))};
   if (work.meshes == NULL || work.reports == NULL || work.errors == NULL) {
     result = supine_options_fail(command, &error);
     goto cleanup;
   }
-  result = maps ? load_maps(options, command, &work, &count) : load_meshes(command, &work, count);
+  result = maps ? load_maps(options, command, &work, &count)
+                : load_meshes(command, &work, count, &options->findings);
+  if (result == SUPINE_EXIT_OK) {
+    result = make_lungs(options, command, &work, count, maps, lungs);
+  }
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
-  }
-  if (supine_lungs_create(work.meshes, count, options->has_midline ? &options->midline : NULL,
-                          lungs, &error) != SUPINE_OK) {
-    result = supine_options_fail(command, &error);
-    goto cleanup;
-  }
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->turned[lung]) {
-      supine_options_say(command, "note: the triangles of the %s lung faced inwards: turned round",
-                         supine_lungs_name(lungs, lung));
-    }
-  }
-  if (!lungs->topology.closed) {
-    supine_options_say(command,
-                       "note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
-                       "inconsistent edges): no volumes, only --scale",
-                       lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
-                       lungs->topology.inconsistent_edges);
   }
   if (keep) {
     options->scan.kind = SUPINE_SCAN_NONE;

@@ -28,6 +28,7 @@ typedef struct supine_model_options {
   supine_resting resting;
   supine_reference reference; /* what loading found */
   char assumed[512];          /* likewise, in a sentence */
+  supine_findings findings;   /* and what was found wrong with them */
   supine_scan_frame frame;
   const char *expandability; /* a file, or NULL: the law */
   supine_expandability_law law;

@@ -8,6 +8,7 @@
 
 #include "sh/base/text.h"
 
+#include "program/options/surface_options.h"
 #include "program/validation.h"
 
 static const char name[] = "validate";
@@ -22,8 +23,6 @@ typedef struct request {
   double scale;
   bool has_scale, reverse, json;
 } request;
-
-static const char *const axes[] = {"auto", "LPS", "RAS", NULL}; /* as supine_axes */
 
 /* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
 static int read_posture(const char *command, const char *text, supine_command_state *state) {
@@ -85,8 +84,7 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
      .wants = "a number", .rivals = "breath"},
-    {"axes", 0, "LPS|RAS", "axes of the surfaces; default: their SPACE tag, else LPS",
-     FILLS(load.axes), .choices = axes, .wants = "LPS or RAS"},
+    {.table = supine_options_surface_frame, FILLS(load)},
     {"output", 'o', "FILE",
      "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
      "the first with the way to the state's surface as its displacement (mm)",

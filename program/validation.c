@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/lungs/gate.h"
+#include "program/options/surface_options.h"
 #include "program/validation.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -384,6 +386,29 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
   return status;
 }
 
+/* The lungs of a state as one surface. */
+static supine_status load_state(const char *path, const supine_mesh_load_options *load,
+                                supine_mesh *mesh, supine_error *error) {
+  supine_mesh_report report;
+  supine_mesh read = {0};
+  supine_lungs lungs = {0};
+  supine_findings findings = {""};
+  supine_status status = supine_mesh_load(path, load, &read, &report, error);
+  if (status == SUPINE_OK) {
+    const supine_lungs_source source = {.name = path,
+                                        .axes = report.axes,
+                                        .axes_given = load->axes != SUPINE_AXES_AUTO,
+                                        .units_given = load->millimetres_per_unit != 0.0};
+    status = supine_lungs_gate(&read, 1, &source, &lungs, NULL, &findings, error);
+    supine_options_say_findings("validate", &findings);
+  }
+  *mesh = lungs.mesh;
+  lungs.mesh = (supine_mesh){0};
+  supine_lungs_free(&lungs);
+  supine_mesh_free(&read);
+  return status;
+}
+
 supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
                                             const supine_mesh_load_options *load,
                                             const char *landmarks, bool reverse,
@@ -394,7 +419,7 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   supine_mesh mesh = {0};
   supine_status status = SUPINE_OK;
   if (state->path != NULL) {
-    status = supine_mesh_load(state->path, load, &mesh, NULL, error);
+    status = load_state(state->path, load, &mesh, error);
   }
   if (status == SUPINE_OK && s->basis != NULL) {
     status = predict_surface(s, state, &mesh, outcome, error);

@@ -9,4 +9,7 @@ set_tests_properties(image labels PROPERTIES
 # Orientation as nibabel and VTK have it, where Debian's python has both.
 add_test(NAME labels_orientation COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/test_labels_orientation.py $<TARGET_FILE:supine>)
+add_test(NAME foreign_tools COMMAND /usr/bin/python3
+  ${CMAKE_CURRENT_SOURCE_DIR}/test_foreign_tools.py $<TARGET_FILE:supine>)
+set_tests_properties(foreign_tools PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 set_tests_properties(labels_orientation PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)

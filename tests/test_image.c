@@ -238,10 +238,26 @@ static void test_nifti_bad_files_refused(void **state) {
   }
 }
 
+/* A checksum that is wrong is found, although every voxel could be read. */
+static void test_image_gzip_checksum_wrong_refused(void **state) {
+  (void)state;
+  static const char *const names[] = {"c.nrrd", "c.nii.gz", "c.mha"};
+  for (size_t i = 0; i < 3; ++i) {
+    unsigned char bytes[4096];
+    supine_image image = made(SUPINE_VOXEL_F64, 5);
+    assert_int_equal(supine_image_write(in_folder(names[i]), &image, NULL, NULL), SUPINE_OK);
+    const size_t size = read_bytes(in_folder(names[i]), bytes, sizeof bytes);
+    bytes[size - (i == 2 ? 1 : 5)] ^= 0x55; /* zlib ends in it, gzip in it and four bytes more */
+    write_bytes(in_folder(names[i]), bytes, size);
+    check_refused(names[i], SUPINE_ERROR_FORMAT, "damaged");
+    supine_image_free(&image);
+  }
+}
+
 static void test_image_truncated_gzip_refused(void **state) {
   (void)state;
-  static const char *const names[] = {"d.nrrd", "d.nii.gz"};
-  for (size_t i = 0; i < 2; ++i) {
+  static const char *const names[] = {"d.nrrd", "d.nii.gz", "d.mha"};
+  for (size_t i = 0; i < 3; ++i) {
     unsigned char bytes[4096];
     supine_image image = made(SUPINE_VOXEL_F64, 5);
     assert_int_equal(supine_image_write(in_folder(names[i]), &image, NULL, NULL), SUPINE_OK);
@@ -258,13 +274,13 @@ static void test_image_names_and_places_refused(void **state) {
   supine_error error;
   assert_true(supine_image_supports("x.NII.GZ") && supine_image_supports("x.nrrd"));
   assert_true(supine_image_is_named("x.nii") && supine_image_is_named("x.MHA"));
-  assert_false(supine_image_is_named("x.ply") || supine_image_supports("x.mha"));
+  assert_false(supine_image_is_named("x.ply") || supine_image_supports("x.mhd"));
   assert_false(supine_image_supports("x.gz") || supine_image_supports(".nrrd"));
-  check_refused("image.mha", SUPINE_ERROR_FORMAT, ".nrrd");
+  check_refused("image.mhd", SUPINE_ERROR_FORMAT, ".nrrd");
   check_refused("absent.nrrd", SUPINE_ERROR_READ, "absent");
-  assert_int_equal(supine_image_write(in_folder("x.mha"), &image, NULL, &error),
+  assert_int_equal(supine_image_write(in_folder("x.mhd"), &image, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
-  image.channels = 3;
+  image.channels = 2;
   assert_int_equal(supine_image_write(in_folder("x.nii"), &image, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   image.channels = 1;
@@ -293,6 +309,7 @@ int main(void) {
       cmocka_unit_test(test_nifti_other_endianness_and_slope),
       cmocka_unit_test(test_nrrd_bad_files_refused),
       cmocka_unit_test(test_nifti_bad_files_refused),
+      cmocka_unit_test(test_image_gzip_checksum_wrong_refused),
       cmocka_unit_test(test_image_truncated_gzip_refused),
       cmocka_unit_test(test_image_names_and_places_refused),
       cmocka_unit_test(test_image_set_rounds_and_clips),

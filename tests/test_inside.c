@@ -610,7 +610,7 @@ static void test_content_points_bad_files_refused(void **state) {
                                     "x,y,z\n",
                                     "x,y,z\n1,2\n",
                                     "x,y,z\n1,2,nan\n",
-                                    "x,y,z,colour\n1,2,3,red\n",
+                                    "x,y,z,name\n1,2,3,\"red\n",
                                     "name,x,y,z\na,1,2,3mm\n"};
   char path[80];
   (void)snprintf(path, sizeof path, "%s/bad.csv", folder);

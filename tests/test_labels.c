@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
@@ -142,8 +143,9 @@ static void test_labels_phantom_comes_back(void **state) {
     made out = surfaces_of_image(&image, "phantom.nii.gz", &options);
     assert_int_equal(out.report.lung_count, 2);
     assert_int_equal(out.report.lung[0].side, 1);
-    assert_int_equal(out.report.apex, 1);
-    assert_int_equal(out.report.back, 1);
+    const supine_mesh_anatomy anatomy = supine_mesh_anatomy_find(out.surface, 2);
+    assert_int_equal(anatomy.axes, SUPINE_AXES_LPS);
+    assert_true(anatomy.certain);
     for (size_t lung = 0; lung < 2; ++lung) {
       const supine_mesh part = {phantom.vertex_count, phantom.vertices, half,
                                 phantom.triangles + (lung == 0 ? 0 : 3 * half)};
@@ -374,8 +376,15 @@ static void test_labels_islands_cavities_gaps_counted(void **state) {
 /* Every flip of the axes says what it is, and a map that lies about them is found out. */
 static void test_labels_anatomy_against_the_header(void **state) {
   (void)state;
-  supine_image image = helper_two_lungs(4.0);
+  static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
+  supine_mesh phantom = {0};
+  assert_int_equal(supine_phantom_create(2000, 6000.0, &phantom, NULL), SUPINE_OK);
+  const size_t half = phantom.triangle_count / 2; /* the left lung's come first */
+  supine_image image = helper_image_over(&phantom, spacing);
+  helper_voxelise(&phantom, 0, half, 2, &image);
+  helper_voxelise(&phantom, half, phantom.triangle_count, 1, &image);
+  supine_mesh_free(&phantom);
   for (int flips = 0; flips < 8; ++flips) {
     static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
     char wanted[64];
@@ -390,10 +399,11 @@ static void test_labels_anatomy_against_the_header(void **state) {
                    ways[0][flips & 1], ways[1][flips >> 1 & 1], ways[2][flips >> 2 & 1]);
     assert_string_equal(out.report.axes, wanted);
     assert_string_equal(out.report.source, "space directions");
-    assert_int_equal(out.report.apex, (flips & 4) != 0 ? -1 : 1);
-    /* deepest at the back: turned round by one of the two flips, as upside down is */
-    assert_int_equal(out.report.back, (flips >> 1 & 1) != (flips >> 2 & 1) ? -1 : 1);
-    assert_int_equal(out.report.lung[0].surface > out.report.lung[1].surface, flips & 1);
+    const char letters[4] = {"LR"[flips & 1], "PA"[flips >> 1 & 1], "SI"[flips >> 2 & 1], '\0'};
+    char found[4];
+    const supine_mesh_anatomy anatomy = supine_mesh_anatomy_find(out.surface, 2);
+    supine_mesh_axes_letters(anatomy.axes, found);
+    assert_string_equal(found, letters);
     for (size_t lung = 0; lung < 2; ++lung) {
       check_closed(&out.surface[lung]); /* outwards in left-handed maps too */
     }
@@ -409,7 +419,7 @@ static void test_labels_anatomy_against_the_header(void **state) {
   assert_int_equal(supine_image_write(path, &map, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                    SUPINE_ERROR_MESH);
-  assert_non_null(strstr(error.message, "mirrored"));
+  assert_non_null(strstr(error.message, "--axes RPS"));
   supine_image_free(&image);
 }
 
@@ -663,7 +673,7 @@ static void test_labels_bad_maps_refused(void **state) {
       {"left=0", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
-      {"left=1,right=2", SUPINE_ERROR_MESH, "mirrored"},
+      {"left=1,right=2", SUPINE_ERROR_MESH, "the other way round"},
       {"left=2,right=3", SUPINE_ERROR_MESH, "no voxel of the right lung"},
       {"totalsegmentator", SUPINE_ERROR_MESH, "are 1, 2: by --labels none"},
       {"left=9", SUPINE_ERROR_MESH, "none of them is a lung"},
@@ -679,7 +689,7 @@ static void test_labels_bad_maps_refused(void **state) {
     refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "an edge is");
   }
   refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
-  refused("map.mha", &plain, SUPINE_ERROR_FORMAT, ".nrrd");
+  refused("map.mhd", &plain, SUPINE_ERROR_FORMAT, ".nrrd");
 
   at[0] = 3; /* which three are lungs? */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);

@@ -300,7 +300,7 @@ static void test_load_axes_tag_option_and_comment(void **state) {
       {"# left lung, RAS+ mm\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
       {"# left lung, RAS+ mm\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
       {"# grass, rasp\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
-      {"# SPACE=LAS\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
+      {"# SPACE=XYZ\n", SUPINE_AXES_RAS, -120.0, SUPINE_AXES_RAS, false, false},
       {"# AIRSPACE=RAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
       {"# 2SPACE=RAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, true},
       {"# RAS2, terRAS\n", SUPINE_AXES_AUTO, 120.0, SUPINE_AXES_LPS, false, false},
@@ -337,7 +337,7 @@ static void test_load_axes_tag_in_stl_header(void **state) {
 }
 
 static void test_load_axes_foreign_tag_refused(void **state) {
-  refuse_text(state, "a.obj", "# SPACE=LAS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+  refuse_text(state, "a.obj", "# SPACE=LLS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
   refuse_text(state, "a.obj", "# SPACE=RASP\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
@@ -419,7 +419,7 @@ static void test_load_unknown_kind_format(void **state) {
   refuse_text(state, "empty.ply", "", SUPINE_ERROR_FORMAT, "empty");
   refuse_text(state, "a.jpg", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
   refuse_text(state, "none", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
-  refuse_text(state, "a.vtp", "<VTKFile/>", SUPINE_ERROR_FORMAT, "written but not read");
+  refuse_text(state, "a.vtp", "<VTKFile/>", SUPINE_ERROR_FORMAT, "no VTKFile of type PolyData");
   refuse_text(state, "a.gltf", "{", SUPINE_ERROR_FORMAT, "malformed");
   refuse_text(state, "a.dae", "\n<a>\n\n</b>\n", SUPINE_ERROR_FORMAT, "malformed");
 }

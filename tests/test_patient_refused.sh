@@ -106,8 +106,8 @@ moved far 'z += 400'
 refused 2 'do not overlap along z' rest.obj far.obj
 refused 2 'do not overlap along x' rest.obj other.obj
 moved cm 'x /= 10; y /= 10; z /= 10'
-refused 2 'different units' rest.obj cm.obj
-refused 2 'different units' cm.obj rest.obj
+refused 2 'add --units mm' rest.obj cm.obj
+refused 2 'add --units mm' cm.obj rest.obj
 moved turned 'x = -x; y = -y'
 refused 2 'do not overlap along' rest.obj turned.obj
 moved left 'x = -x'

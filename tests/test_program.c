@@ -362,11 +362,11 @@ static void test_mesh_open_surface_explains_volume(void **state) {
   EXPECT(0, "displacement 5.000 mm", "deform open.safetensors --posture prone --scale 5 -o g.ply");
 }
 
-static void test_mesh_wrong_units_warned(void **state) {
+static void test_mesh_wrong_units_refused(void **state) {
   (void)state;
   write_text("metres.obj",
              "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.25\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
-  EXPECT(0, "--units m", "solve metres.obj --posture prone -o h.ply");
+  EXPECT(2, "--units m", "solve metres.obj --posture prone -o h.ply");
   EXPECT(0, "largest displacement", "solve metres.obj --units m --posture prone -o h.ply");
   assert_null(strstr(printed, "warning"));
 }
@@ -455,7 +455,7 @@ int main(void) {
       cmocka_unit_test(test_basis_damaged_or_foreign_refused),
       cmocka_unit_test(test_mesh_bad_input_named_and_nothing_left),
       cmocka_unit_test(test_mesh_open_surface_explains_volume),
-      cmocka_unit_test(test_mesh_wrong_units_warned),
+      cmocka_unit_test(test_mesh_wrong_units_refused),
       cmocka_unit_test(test_mesh_inward_lung_turned_round_and_told),
       cmocka_unit_test(test_direction_file_moves_vertices_along_it),
       cmocka_unit_test(test_solve_unit_force_writes_column),

@@ -87,8 +87,8 @@ static void test_samples_load_malformed_names_the_line(void **state) {
   } bad[] = {
       {"", "empty"},
       {"# nothing\n\n", "empty"},
-      {"1,2\n3,4\n", ":1: unknown column \"1\""},
-      {"pressure_cmH2O,volume_mL,flow\n", ":1: unknown column \"flow\""},
+      {"1,2\n3,4\n", ":1: the header has no column \"pressure_cmH2O\""},
+      {"pressure_cmH2O,\"volume_mL\n", ":1: a quote is not closed"},
       {"pressure_cmH2O,pressure_cmH2O\n", ":1: repeated column"},
       {"#\npressure_cmH2O,limb\n", ":2: the header has no column \"volume_mL\""},
       {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 fields where the header has 2"},

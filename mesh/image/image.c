@@ -95,6 +95,33 @@ SUPINE_CLONES void supine_image_put(supine_image *image, size_t begin, size_t co
   }
 }
 
+void supine_image_widen(void *values, size_t count, bool is_signed) {
+  unsigned char *at = values;
+  for (size_t i = 0; i < count; ++i, at += 8) {
+    int64_t number = 0;
+    memcpy(&number, at, sizeof number);
+    const double value = is_signed ? (double)number : (double)(uint64_t)number;
+    memcpy(at, &value, sizeof value);
+  }
+}
+
+void supine_image_set_axes(supine_image *image, supine_axes axes) {
+  if (axes == SUPINE_AXES_AUTO) {
+    return;
+  }
+  double from[3][3];
+  double *vectors[4] = {image->step[0], image->step[1], image->step[2], image->origin};
+  supine_mesh_axes_matrix(image->axes, from);
+  for (int v = 0; v < 4; ++v) {
+    const double p[3] = {vectors[v][0], vectors[v][1], vectors[v][2]};
+    for (int k = 0; k < 3; ++k) { /* as in the header */
+      vectors[v][k] = from[0][k] * p[0] + from[1][k] * p[1] + from[2][k] * p[2];
+    }
+    supine_mesh_axes_apply(axes, 1.0, vectors[v]);
+  }
+  image->axes = axes;
+}
+
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
   const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
   double from[3];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Images in files: which format a name asks for, and what is checked of both. */
+/* Images in files: which format a name asks for, and what is checked of all. */
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -10,17 +10,35 @@
 
 #include "mesh/image/formats.h"
 
-static bool is_nifti(const char *path) {
-  return supine_text_ends_in_any_case(path, ".nii") ||
-         supine_text_ends_in_any_case(path, ".nii.gz");
+/* Endings, and who reads and writes them. */
+static const struct {
+  const char *ending;
+  supine_status (*read)(const char *path, size_t file_size, supine_image *image,
+                        supine_error *error);
+  supine_status (*write)(const char *path, const supine_image *image, const char *note,
+                         supine_error *error);
+} formats[] = {{".nrrd", supine_image_read_nrrd, supine_image_write_nrrd},
+               {".nii", supine_image_read_nifti, supine_image_write_nifti},
+               {".nii.gz", supine_image_read_nifti, supine_image_write_nifti},
+               {".mha", supine_image_read_mha, supine_image_write_mha}};
+
+enum { FORMATS = sizeof formats / sizeof *formats };
+
+/* FORMATS where it is none. */
+static size_t format_of(const char *path) {
+  size_t f = 0;
+  while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
+    ++f;
+  }
+  return f;
 }
 
 bool supine_image_supports(const char *path) {
-  return supine_text_ends_in_any_case(path, ".nrrd") || is_nifti(path);
+  return format_of(path) < FORMATS;
 }
 
 bool supine_image_is_named(const char *path) {
-  static const char *const others[] = {".mha", ".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
+  static const char *const others[] = {".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
   bool is = supine_image_supports(path);
   for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
     is = is || supine_text_ends_in_any_case(path, others[i]);
@@ -47,18 +65,17 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   struct stat file = {0};
   supine_image read = {.channels = 1};
   if (!supine_image_supports(path)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: an image's name must end in .nrrd, .nii or .nii.gz; others are "
-                            "to be converted, as by 3D Slicer or 'plastimatch convert'",
-                            path);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; others are "
+        "to be converted, as by 3D Slicer or 'plastimatch convert'",
+        path);
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
                             strerror(errno == 0 ? EISDIR : errno)); /* NOLINT */
   }
-  supine_status status = is_nifti(path)
-                             ? supine_image_read_nifti(path, (size_t)file.st_size, &read, error)
-                             : supine_image_read_nrrd(path, (size_t)file.st_size, &read, error);
+  supine_status status = formats[format_of(path)].read(path, (size_t)file.st_size, &read, error);
   if (status == SUPINE_OK && !is_frame(&read)) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: the header's directions are no three axes", path);
@@ -75,9 +92,7 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
                                  supine_error *error) {
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: an image's name must end in .nrrd, .nii or .nii.gz", path);
+                            "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha", path);
   }
-  return is_nifti(path) ? supine_image_write_nifti(path, supine_text_ends_in_any_case(path, ".gz"),
-                                                   image, note, error)
-                        : supine_image_write_nrrd(path, image, note, error);
+  return formats[format_of(path)].write(path, image, note, error);
 }

@@ -11,6 +11,7 @@
 #include <zlib.h>
 
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
 #include "mesh/image/formats.h"
@@ -47,16 +48,17 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
   const nifti_dmat44 *m = nifti->sform_code > 0 ? &nifti->sto_xyz : &nifti->qto_xyz;
   const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
   size_t type = 0;
-  if (nifti->ndim != 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
+  if (nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %d axes; one number a voxel and three axes are wanted", path,
-                            (int)nifti->ndim);
+                            "%s: %d axes; one number a voxel, three axes and one volume are wanted",
+                            path, (int)nifti->ndim);
   }
   if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: the header has no orientation (qform and sform are 0)", path);
   }
-  while (type < SUPINE_VOXEL_COUNT && types[type] != nifti->datatype) {
+  const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
+  while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
     ++type;
   }
   if (type == SUPINE_VOXEL_COUNT) {
@@ -64,6 +66,7 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
                             nifti_datatype_string(nifti->datatype));
   }
   image->voxel = (supine_image_voxel)type;
+  image->axes = SUPINE_AXES_RAS;
   image->frame_source = nifti->sform_code > 0 ? "sform" : "qform";
   image->frames_differ = forms_differ(nifti);
   for (int k = 0; k < 3; ++k) {
@@ -113,12 +116,19 @@ supine_status supine_image_read_nifti(const char *path, size_t file_size, supine
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no NIfTI header", path);
   }
   supine_status status = check(path, nifti, file_size, image, error);
+  if (status == SUPINE_OK && nifti_is_gzfile(path)) {
+    status = supine_image_check_gzip(path, 0, error);
+  }
   if (status == SUPINE_OK && nifti_image_load(nifti) != 0) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: truncated or damaged", path);
   }
   if (status == SUPINE_OK) {
     image->values = nifti->data;
     nifti->data = NULL;
+    if (nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64) {
+      supine_image_widen(image->values, image->size[0] * image->size[1] * image->size[2],
+                         nifti->datatype == DT_INT64);
+    }
     status = rescale(path, nifti, image, error);
   }
   nifti_image_free(nifti);
@@ -151,10 +161,28 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
     }
     rows[a][3] = (float)(a < 2 ? -image->origin[a] : image->origin[a]);
   }
+  if (image->channels == 3) { /* the fifth axis is the vector's, as the format has it */
+    h.dim[0] = 5;
+    h.dim[5] = 3;
+    h.pixdim[4] = h.pixdim[5] = 1.0F;
+    h.intent_code = NIFTI_INTENT_VECTOR;
+  }
   (void)snprintf(h.descrip, sizeof h.descrip, "%.79s", note != NULL ? note : "");
   memcpy(h.magic, "n+1", 4);
   memset(header, 0, 352);
   memcpy(header, &h, sizeof h);
+}
+
+/* Each component of the vectors by itself, in LPS: ITK and ANTs, which made such files common, do
+ * not turn vectors of this intent (of DISPVECT before ITK 5.3 they read the first component alone).
+ * NULL without memory. */
+static float *planes(const supine_image *image) {
+  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  float *made = malloc(3 * count * sizeof *made);
+  for (size_t i = 0; made != NULL && i < 3 * count; ++i) {
+    made[i % 3 * count + i / 3] = (float)supine_image_get(image, i);
+  }
+  return made;
 }
 
 /* Deflates `bytes` more bytes into the file; `flush` is Z_FINISH for the last. */
@@ -194,30 +222,40 @@ static bool write_gzip(FILE *file, const unsigned char *header, const unsigned c
   return well;
 }
 
-supine_status supine_image_write_nifti(const char *path, bool compressed, const supine_image *image,
+supine_status supine_image_write_nifti(const char *path, const supine_image *image,
                                        const char *note, supine_error *error) {
   unsigned char header[352];
   supine_output output = {0};
-  if (image->channels != 1 || image->size[0] > INT16_MAX || image->size[1] > INT16_MAX ||
-      image->size[2] > INT16_MAX) {
+  const bool vectors = image->channels == 3 && image->voxel == SUPINE_VOXEL_F32;
+  if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
+      image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: NIfTI-1 has one number a voxel and at most %d voxels a side: "
-                            "write .nrrd",
+                            "%s: NIfTI-1 has one number or a vector of three a voxel and at most "
+                            "%d voxels a side: write .nrrd",
                             path, INT16_MAX);
   }
+  float *planar = vectors ? planes(image) : NULL;
+  if (vectors && planar == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
   supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
+  if (status == SUPINE_OK) {
+    make_header(image, note, header);
+    const size_t bytes = image->size[0] * image->size[1] * image->size[2] * image->channels *
+                         supine_image_voxel_size(image->voxel);
+    const unsigned char *values = vectors ? (const unsigned char *)planar : image->values;
+    const bool well = supine_text_ends_in_any_case(path, ".gz")
+                          ? write_gzip(output.file, header, values, bytes)
+                          : fwrite(header, 1, sizeof header, output.file) == sizeof header &&
+                                fwrite(values, 1, bytes, output.file) == bytes;
+    if (well) {
+      status = supine_output_commit(&output, error);
+    } else {
+      supine_output_abandon(&output);
+      status =
+          supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: is the disk full?", path);
+    }
   }
-  make_header(image, note, header);
-  const size_t bytes =
-      image->size[0] * image->size[1] * image->size[2] * supine_image_voxel_size(image->voxel);
-  const bool well = compressed ? write_gzip(output.file, header, image->values, bytes)
-                               : fwrite(header, 1, sizeof header, output.file) == sizeof header &&
-                                     fwrite(image->values, 1, bytes, output.file) == bytes;
-  if (!well) {
-    supine_output_abandon(&output);
-    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: is the disk full?", path);
-  }
-  return supine_output_commit(&output, error);
+  free(planar);
+  return status;
 }

@@ -28,6 +28,10 @@ static supine_status teem_fails(const char *path, supine_status status, supine_e
   return status;
 }
 
+static bool is_wide(const Nrrd *nrrd) {
+  return nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
+}
+
 static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState *io,
                            size_t file_size, supine_image *image, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
@@ -56,7 +60,8 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             path);
   }
   size_t type = 0;
-  while (type < SUPINE_VOXEL_COUNT && types[type] != nrrd->type) {
+  while (type < SUPINE_VOXEL_COUNT &&
+         types[type] != (is_wide(nrrd) ? nrrdTypeDouble : nrrd->type)) {
     ++type;
   }
   if (type == SUPINE_VOXEL_COUNT) {
@@ -64,6 +69,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             airEnumStr(nrrdType, nrrd->type));
   }
   image->voxel = (supine_image_voxel)type;
+  image->axes = turn > 0.0 ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
   image->frame_source = "space directions";
   for (unsigned a = 0; a < 3; ++a) {
     image->size[a] = nrrd->axis[a].size;
@@ -78,6 +84,24 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             image->size[0], image->size[1], image->size[2], file_size);
   }
   return SUPINE_OK;
+}
+
+/* Bytes before the voxels: the header ends in an empty line. */
+static long header_length(const char *path) {
+  FILE *file = fopen(path, "rb");
+  int before = 0;
+  long length = 0;
+  for (int c; file != NULL && (c = fgetc(file)) != EOF;) {
+    ++length;
+    if (c == '\n' && before == '\n') {
+      break;
+    }
+    before = c == '\r' ? before : c;
+  }
+  if (file != NULL) {
+    (void)fclose(file);
+  }
+  return length;
 }
 
 supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_image *image,
@@ -98,6 +122,12 @@ supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_
   if (status != SUPINE_OK) {
     goto cleanup;
   }
+  if (io->encoding == nrrdEncodingGzip) {
+    status = supine_image_check_gzip(path, header_length(path), error);
+    if (status != SUPINE_OK) {
+      goto cleanup;
+    }
+  }
   nrrdIoStateInit(io);
   if (nrrdLoad(nrrd, path, io) != 0) {
     status = teem_fails(path, SUPINE_ERROR_FORMAT, error);
@@ -105,6 +135,10 @@ supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_
   }
   image->values = nrrd->data; /* malloc's: teem allocates with calloc */
   nrrd->data = NULL;
+  if (is_wide(nrrd)) {
+    supine_image_widen(image->values, image->size[0] * image->size[1] * image->size[2],
+                       nrrd->type == nrrdTypeLLong);
+  }
 cleanup:
   if (io != NULL) {
     (void)nrrdIoStateNix(io);

@@ -29,7 +29,10 @@ static bool format_of_ending(const char *ending, mesh_format *format) {
   static const struct {
     const char *ending;
     mesh_format format;
-  } known[] = {{".ply", MESH_FORMAT_PLY}, {".stl", MESH_FORMAT_STL}, {".obj", MESH_FORMAT_OBJ}};
+  } known[] = {{".ply", MESH_FORMAT_PLY},
+               {".vtp", MESH_FORMAT_VTP},
+               {".stl", MESH_FORMAT_STL},
+               {".obj", MESH_FORMAT_OBJ}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     if (strcasecmp(ending, known[i].ending) == 0) {
       *format = known[i].format;
@@ -106,12 +109,10 @@ supine_status supine_mesh_file_read(const char *path, mesh_file *file, supine_er
   const char *ending = ending_of(path);
   if (!format_of_ending(ending, &file->format) &&
       !format_of_bytes(file->bytes, file->size, &file->format)) {
-    status = supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        strcasecmp(ending, ".vtp") == 0
-            ? "%s: VTP files are written but not read; give the mesh as PLY, OBJ or STL"
-            : "%s: no importer for this ending; give the mesh as PLY, OBJ or STL",
-        path);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: no importer for this ending; give the mesh as PLY, OBJ, STL or "
+                              "VTP",
+                              path);
     goto cleanup;
   }
   if (file->format != MESH_FORMAT_OTHER) {

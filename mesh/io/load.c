@@ -10,6 +10,8 @@ static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dr
   switch (file->format) {
   case MESH_FORMAT_PLY:
     return supine_mesh_read_ply(file, mesh, dropped, error);
+  case MESH_FORMAT_VTP:
+    return supine_mesh_read_vtp(file, mesh, dropped, error);
   case MESH_FORMAT_STL:
     return supine_mesh_read_stl(file, mesh, error);
   case MESH_FORMAT_OBJ:
@@ -25,38 +27,50 @@ static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dr
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
                                  supine_mesh_report *report, supine_error *error) {
-  const mesh_space tag = file->space;
   if (asked != SUPINE_AXES_AUTO) {
     report->axes = asked;
     return SUPINE_OK;
   }
-  if (tag == MESH_SPACE_FOREIGN) {
+  if (file->tagged && file->space == SUPINE_AXES_AUTO) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its SPACE tag names axes that are neither LPS nor RAS; say which "
-                            "of the two to assume",
+                            "%s: its SPACE tag is not three letters such as LPS or RAS; name "
+                            "them, as --axes LPS",
                             file->path);
   }
-  report->axes = tag == MESH_SPACE_RAS ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
-  report->axes_from_tag = tag != MESH_SPACE_NONE;
-  report->comment_names_ras = tag == MESH_SPACE_NONE && file->mentions_ras;
+  report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
+  report->axes_from_tag = file->tagged;
+  report->comment_names_ras = !file->tagged && file->mentions_ras;
   return SUPINE_OK;
 }
 
-/* To millimetres, LPS. RAS has -x and -y: a half turn, so that triangles keep their sense. */
-static supine_status convert(const char *path, double scale, bool ras, supine_mesh *mesh,
+/* Farthest coordinate that can be of a patient, mm; single precision is good for 1 mm there. */
+static const double farthest = 1e7;
+
+/* Converts to millimetres and LPS. Left-handed axes turn triangles inside out: they are turned
+ * back. */
+static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,
                              supine_error *error) {
-  const double factor[3] = {ras ? -scale : scale, ras ? -scale : scale, scale};
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     double *vertex = mesh->vertices + 3 * i;
-    for (int axis = 0; axis < 3; ++axis) {
-      vertex[axis] = vertex[axis] * factor[axis] + 0.0; /* + 0: no -0, for the weld */
-    }
+    const double largest = fmax(fabs(vertex[0]), fmax(fabs(vertex[1]), fabs(vertex[2])));
     if (!isfinite(vertex[0]) || !isfinite(vertex[1]) || !isfinite(vertex[2])) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "%s: vertex %zu of %zu has a coordinate that is not finite; repair "
                               "the mesh",
                               path, i, mesh->vertex_count);
     }
+    if (!(largest * scale <= farthest)) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: vertex %zu of %zu lies %.3g mm from the origin; repair the "
+                              "mesh, or give its --units",
+                              path, i, mesh->vertex_count, largest * scale);
+    }
+    supine_mesh_axes_apply(axes, scale, vertex);
+  }
+  for (size_t t = 0; supine_mesh_axes_mirrored(axes) && t < mesh->triangle_count; ++t) {
+    const uint32_t second = mesh->triangles[3 * t + 1];
+    mesh->triangles[3 * t + 1] = mesh->triangles[3 * t + 2];
+    mesh->triangles[3 * t + 2] = second;
   }
   return SUPINE_OK;
 }
@@ -90,7 +104,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   }
   if ((status = read_surface(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
       (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
-      (status = convert(path, scale, found.axes == SUPINE_AXES_RAS, &loaded, error)) != SUPINE_OK) {
+      (status = convert(path, scale, found.axes, &loaded, error)) != SUPINE_OK) {
     goto cleanup;
   }
   found.file_vertices = loaded.vertex_count;

@@ -36,17 +36,10 @@ bool supine_mesh_text_position(mesh_text *text, double position[3]);
 typedef enum mesh_format {
   MESH_FORMAT_OTHER = 0, /**< an ending that assimp knows, but no check of ours */
   MESH_FORMAT_PLY,
+  MESH_FORMAT_VTP,
   MESH_FORMAT_STL,
   MESH_FORMAT_OBJ
 } mesh_format;
-
-/** The axes that a SPACE tag names. */
-typedef enum mesh_space {
-  MESH_SPACE_NONE = 0, /**< no tag */
-  MESH_SPACE_LPS,
-  MESH_SPACE_RAS,
-  MESH_SPACE_FOREIGN /**< a tag of other axes */
-} mesh_space;
 
 /** A file on its way in. */
 typedef struct mesh_file {
@@ -54,7 +47,8 @@ typedef struct mesh_file {
   mesh_format format;
   unsigned char *bytes; /**< all of PLY, STL and OBJ, the head of others; then a 0 */
   size_t size;
-  mesh_space space;
+  bool tagged;       /**< a SPACE tag is there, */
+  supine_axes space; /**< and names these axes; AUTO: none that are known */
   bool mentions_ras; /**< the word RAS stands in a comment */
 } mesh_file;
 
@@ -64,8 +58,8 @@ void supine_mesh_file_free(mesh_file *file);
 
 /* ---- space.c ---- */
 
-/** Looks for SPACE=LPS, SPACE=RAS and the word RAS in the first `size` bytes, and sets space and
- * mentions_ras. */
+/** Looks for SPACE= with three letters and the word RAS in the first `size` bytes, and sets tagged,
+ * space and mentions_ras. */
 void supine_mesh_space_note(mesh_file *file, size_t size);
 
 /* ---- faces.c: faces on their way into a mesh that has its vertices. ---- */
@@ -95,6 +89,8 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
  * yet. ---- */
 
 supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error);
+supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error);
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error);
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,

@@ -17,10 +17,12 @@ typedef struct mesh_writer {
   const unsigned char *lung;   /**< NULL: none */
   const supine_mesh_field *fields;
   size_t field_count;
-  double factor[3];  /**< of x, y, z: the sign of the file's axes over its unit */
-  double quantum;    /**< of lengths in the file's units, a power of two; 0: exact */
-  const char *space; /**< "LPS" or "RAS" */
-  char comment[256]; /**< one printable line, "" where there is none */
+  unsigned char source[3]; /**< which of x, y, z each coordinate of the file is */
+  double factor[3];        /**< and its sign over the file's unit */
+  bool mirrored;           /**< left-handed axes: triangles are written in the other sense */
+  double quantum;          /**< of lengths in the file's units, a power of two; 0: exact */
+  char space[4];           /**< "LPS", "RAS", ... */
+  char comment[256];       /**< one printable line, "" where there is none */
 } mesh_writer;
 
 /** Vertex i in the file's axes and units. */
@@ -30,6 +32,9 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
 
 /** Normal of vertex i in the file's axes. */
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]);
+
+/** Corners of triangle t, in the file's sense. */
+void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]);
 
 /** Fills a writer, but for `out`, from what supine_mesh_save is given. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,

@@ -15,7 +15,8 @@ supine_status supine_mesh_save_obj(const mesh_writer *writer) {
                   (double)position[2]);
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *corner = mesh->triangles + 3 * t;
+    uint32_t corner[3];
+    supine_mesh_writer_triangle(writer, t, corner);
     (void)fprintf(writer->out, "f %lu %lu %lu\n", corner[0] + 1UL, corner[1] + 1UL,
                   corner[2] + 1UL);
   }

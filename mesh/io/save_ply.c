@@ -42,7 +42,9 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     unsigned char bytes[13] = {3};
     unsigned char *at = bytes + 1;
-    supine_mesh_put_u32(&at, mesh->triangles + 3 * t, 3);
+    uint32_t corner[3];
+    supine_mesh_writer_triangle(writer, t, corner);
+    supine_mesh_put_u32(&at, corner, 3);
     (void)fwrite(bytes, 1, sizeof bytes, writer->out);
   }
   return SUPINE_OK;

@@ -43,8 +43,10 @@ supine_status supine_mesh_save_stl(const mesh_writer *writer) {
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     float corners[3][3];
     float normal[3];
+    uint32_t corner[3];
+    supine_mesh_writer_triangle(writer, t, corner);
     for (size_t k = 0; k < 3; ++k) {
-      supine_mesh_writer_position(writer, mesh->triangles[3 * t + k], corners[k]);
+      supine_mesh_writer_position(writer, corner[k], corners[k]);
     }
     facet_normal(corners, normal);
     unsigned char bytes[FACET] = {0};

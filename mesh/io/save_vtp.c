@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* VTK XML PolyData: what surrounds the arrays, and one surface as a whole. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,7 +60,7 @@ static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE 
 static void write_field_data(const vtp *file, FILE *out) {
   const mesh_writer *writer = &file->writer;
   char units[64];
-  const double unit = 1.0 / writer->factor[2];
+  const double unit = fabs(1.0 / writer->factor[2]);
   (void)snprintf(units, sizeof units, unit == 1.0 ? "mm, mL, s" : "%g mm, mL, s", unit);
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);

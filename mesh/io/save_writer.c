@@ -44,9 +44,8 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
                               mesh_writer *writer) {
   const supine_mesh_save_options chosen =
       options == NULL ? (supine_mesh_save_options){0} : *options;
-  const bool ras = chosen.axes == SUPINE_AXES_RAS;
   const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
-  const double horizontal = (ras ? -1.0 : 1.0) / unit;
+  double matrix[3][3];
   *writer = (mesh_writer){.mesh = mesh,
                           .rest = chosen.rest,
                           .expected_error = chosen.expected_error,
@@ -54,8 +53,15 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
                           .lung = chosen.lung,
                           .fields = chosen.fields,
                           .field_count = chosen.field_count,
-                          .factor = {horizontal, horizontal, 1.0 / unit},
-                          .space = ras ? "RAS" : "LPS"};
+                          .mirrored = supine_mesh_axes_mirrored(chosen.axes)};
+  supine_mesh_axes_letters(chosen.axes, writer->space);
+  supine_mesh_axes_matrix(chosen.axes, matrix);
+  for (unsigned i = 0; i < 9; ++i) {
+    if (matrix[i / 3][i % 3] != 0.0) {
+      writer->source[i % 3] = (unsigned char)(i / 3);
+      writer->factor[i % 3] = matrix[i / 3][i % 3] / unit;
+    }
+  }
   if (chosen.rounding > 0.0) {
     writer->quantum = exp2(floor(log2(chosen.rounding / unit)));
   }
@@ -70,8 +76,8 @@ static double rounded(const mesh_writer *writer, double length) {
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
   static const double steps = 256.0; /* a grid for normals, where lengths have one: 0.1 degrees */
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double turned = copysign((double)writer->normals[3 * i + axis],
-                                   (double)writer->normals[3 * i + axis] * writer->factor[axis]);
+    const double value = (double)writer->normals[3 * i + writer->source[axis]];
+    const double turned = copysign(value, value * writer->factor[axis]);
     normal[axis] = (float)((writer->quantum > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
   }
 }
@@ -79,19 +85,29 @@ void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
   for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
     position[axis] =
-        (float)(rounded(writer, writer->factor[axis] * writer->mesh->vertices[3 * i + axis]) + 0.0);
+        (float)(rounded(writer, writer->factor[axis] *
+                                    writer->mesh->vertices[3 * i + writer->source[axis]]) +
+                0.0);
   }
 }
 
 void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double d = writer->mesh->vertices[3 * i + axis] - writer->rest[3 * i + axis];
+    const size_t from = 3 * i + writer->source[axis];
+    const double d = writer->mesh->vertices[from] - writer->rest[from];
     const double scaled = rounded(writer, writer->factor[axis] * d);
     displacement[axis] = (float)(scaled + 0.0);
     square += scaled * scaled;
   }
   displacement[3] = (float)rounded(writer, sqrt(square));
+}
+
+void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]) {
+  const uint32_t *from = writer->mesh->triangles + 3 * t;
+  corner[0] = from[0];
+  corner[1] = from[writer->mirrored ? 2 : 1];
+  corner[2] = from[writer->mirrored ? 1 : 2];
 }
 
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {

@@ -22,20 +22,20 @@ static bool ends_word(const unsigned char *at, const unsigned char *end) {
   return at == end || !isalnum(*at);
 }
 
-static bool is_axes(const unsigned char *at, const unsigned char *end, const char *axes) {
-  return end - at >= 3 && strncasecmp((const char *)at, axes, 3) == 0 && ends_word(at + 3, end);
-}
-
-static mesh_space find_space(const unsigned char *begin, const unsigned char *end) {
+static bool find_space(const unsigned char *begin, const unsigned char *end, supine_axes *axes) {
   static const char tag[] = "SPACE=";
   const unsigned char *at = find_word(begin, end, begin, tag);
+  *axes = SUPINE_AXES_AUTO;
   if (at == NULL) {
-    return MESH_SPACE_NONE;
+    return false;
   }
   at += sizeof tag - 1;
-  return is_axes(at, end, "LPS")   ? MESH_SPACE_LPS
-         : is_axes(at, end, "RAS") ? MESH_SPACE_RAS
-                                   : MESH_SPACE_FOREIGN;
+  if (end - at >= 3 && ends_word(at + 3, end)) {
+    const char letters[4] = {(char)toupper(at[0]), (char)toupper(at[1]), (char)toupper(at[2]),
+                             '\0'};
+    (void)supine_mesh_axes_parse(letters, axes);
+  }
+  return true;
 }
 
 static bool mentions_ras(const unsigned char *begin, const unsigned char *end) {
@@ -48,6 +48,6 @@ static bool mentions_ras(const unsigned char *begin, const unsigned char *end) {
 
 void supine_mesh_space_note(mesh_file *file, size_t size) {
   const unsigned char *end = file->bytes + (size < file->size ? size : file->size);
-  file->space = find_space(file->bytes, end);
+  file->tagged = find_space(file->bytes, end, &file->space);
   file->mentions_ras = mentions_ras(file->bytes, end);
 }

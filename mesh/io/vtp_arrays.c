@@ -22,7 +22,11 @@ static void fill_points(const vtp *file, size_t begin, size_t end, unsigned char
 }
 
 static void fill_connectivity(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  supine_mesh_put_u32(&at, file->writer.mesh->triangles + 3 * begin, 3 * (end - begin));
+  for (size_t t = begin; t < end; ++t) {
+    uint32_t corner[3];
+    supine_mesh_writer_triangle(&file->writer, t, corner);
+    supine_mesh_put_u32(&at, corner, 3);
+  }
 }
 
 static void fill_offsets(const vtp *file, size_t begin, size_t end, unsigned char *at) {

@@ -196,9 +196,9 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Both are there where both are named, and beside each other, the left one on the left. */
+/* Both are there where both are named; `doubted` unless the left one lies left of the other. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
-                           const uint8_t *side, supine_error *error) {
+                           const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};
   static const uint8_t sides[] = {LABELS_LEFT, LABELS_RIGHT};
   double centre[2][3];
@@ -228,30 +228,19 @@ static supine_status check(const char *path, const supine_image *image, const la
     return SUPINE_OK;
   }
   const double apart = centre[0][0] - centre[1][0];
-  if (apart < 0.0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: by its header the left lung lies %.0f mm to the right of the "
-                            "right one: the header is mirrored, or the labels are the other way "
-                            "round (--labels left=...,right=...)",
-                            path, -apart);
-  }
-  if (apart < fabs(centre[0][1] - centre[1][1]) || apart < fabs(centre[0][2] - centre[1][2])) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: labels %s do not lie beside each other, as two lungs do: name "
-                            "them with --labels left=...,right=..., or --labels one",
-                            path, present);
-  }
+  *doubted = apart < fabs(centre[0][1] - centre[1][1]) || apart < fabs(centre[0][2] - centre[1][2]);
   return SUPINE_OK;
 }
 
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
-                                   char taken[256], supine_error *error) {
+                                   labels_choice *choice, supine_error *error) {
+  char *taken = choice->taken;
   const char *name = NULL;
   char list[3][96];
   memset(side, 0, LABELS_MAX);
   supine_status status = choose(path, image, tally, wanted, side, &name, error);
-  status = status == SUPINE_OK ? check(path, image, tally, side, error) : status;
+  status = status == SUPINE_OK ? check(path, image, tally, side, &choice->doubted, error) : status;
   if (status != SUPINE_OK) {
     return status;
   }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
 static const double least_edge = 0.2; /* mm: a hundredth of it would be a billion vertices */
@@ -21,6 +22,7 @@ typedef struct work {
   labels_mask both;
   size_t from[3]; /* voxel of the image that the mask's first is */
   size_t cut[2];  /* voxels of either side at the image's border */
+  bool doubted;   /* the header does not put the left lung left of the right one */
 } work;
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
@@ -55,6 +57,14 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
   return true;
 }
 
+/* In the axes that were asked for. */
+static supine_status read_image(const work *w, const char *path, supine_image *image,
+                                supine_error *error) {
+  const supine_status status = supine_image_read(path, image, error);
+  supine_image_set_axes(image, status == SUPINE_OK ? w->options->axes : SUPINE_AXES_AUTO);
+  return status;
+}
+
 /* Several masks as one map, whose labels are their numbers from 1; earlier ones go first. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
@@ -67,7 +77,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   for (size_t f = 0; f < count && status == SUPINE_OK; ++f) {
     supine_image next = {0};
     const supine_image *image = f == 0 ? &w->image : &next;
-    status = f == 0 ? SUPINE_OK : supine_image_read(paths[f], &next, error);
+    status = f == 0 ? SUPINE_OK : read_image(w, paths[f], &next, error);
     if (status == SUPINE_OK && !same_frame(&w->image, image)) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: its voxels are not those of %s: masks of one scan are wanted",
@@ -127,7 +137,7 @@ static void count_cut(work *w, const size_t image_size[3]) {
 static supine_status read_map(work *w, const char *const *paths, size_t count,
                               supine_error *error) {
   supine_labels_report *report = w->report;
-  supine_status status = supine_image_read(paths[0], &w->image, error);
+  supine_status status = read_image(w, paths[0], &w->image, error);
   if (status == SUPINE_OK && count > 1) {
     status = join_images(w, paths, count, error);
   }
@@ -142,6 +152,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   supine_labels_axes((const double(*)[3])w->image.step, report->axes, sizeof report->axes);
   report->source = w->image.frame_source;
   report->frames_differ = w->image.frames_differ;
+  report->coordinates = w->image.axes;
   labels_tally *tally = malloc(LABELS_MAX * sizeof *tally);
   uint8_t *side = malloc(LABELS_MAX);
   if (tally == NULL || side == NULL) {
@@ -150,8 +161,10 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   status = status == SUPINE_OK ? advance(w, 0.2, error) : status;
   status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
   if (status == SUPINE_OK) {
-    status = supine_labels_choose(w->path, &w->image, tally, w->options->labels, side,
-                                  report->taken, error);
+    labels_choice choice = {.taken = report->taken};
+    status =
+        supine_labels_choose(w->path, &w->image, tally, w->options->labels, side, &choice, error);
+    w->doubted = choice.doubted;
   }
   status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
   status = status == SUPINE_OK ? make_mask(w, tally, side, error) : status;
@@ -273,6 +286,45 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, value == LABELS_LEFT ? "left" : "right", w->edge);
 }
 
+/* Do the two surfaces' boxes lie beside each other, whichever is left? */
+static bool beside(const supine_mesh *surfaces) {
+  double low[2][3];
+  double high[2][3];
+  double apart[3];
+  supine_mesh_box(&surfaces[0], low[0], high[0]);
+  supine_mesh_box(&surfaces[1], low[1], high[1]);
+  for (int k = 0; k < 3; ++k) {
+    apart[k] = fabs(low[0][k] + high[0][k] - low[1][k] - high[1][k]);
+  }
+  return apart[0] > apart[1] && apart[0] > apart[2];
+}
+
+/* The left lung does not lie left of the other: are the labels named wrongly, or is the header
+ * wrong? The shape of the lungs knows. */
+static supine_status settle_doubt(const work *w, const supine_mesh *surfaces, supine_error *error) {
+  const supine_labels_report *report = w->report;
+  const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
+  char letters[4];
+  supine_mesh_axes_letters(supine_mesh_axes_after(report->coordinates, found.axes), letters);
+  if (!beside(surfaces)) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: labels %s do not lie beside each other, as two lungs do: name "
+                            "them with --labels left=...,right=... or --labels one, or add --axes "
+                            "%s if the header's are wrong",
+                            w->path, report->taken, letters);
+  }
+  return found.axes == SUPINE_AXES_LPS
+             ? supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: by its header the left lung lies right of the other (labels "
+                                "%s): name them the other way round, --labels left=...,right=..., "
+                                "or the header's axes, --axes ABC",
+                                w->path, report->taken)
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: by its header the left lung lies right of the other (labels "
+                                "%s), and its shape fits other axes: add --axes %s",
+                                w->path, report->taken, letters);
+}
+
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error) {
@@ -297,9 +349,12 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   }
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);
+  if (status == SUPINE_OK && w.doubted) {
+    status = settle_doubt(&w, surfaces, error);
+  }
+  status = status == SUPINE_OK ? advance(&w, 1.0, error) : status;
   if (status == SUPINE_OK) {
-    supine_labels_anatomy(surfaces, report);
-    return advance(&w, 1.0, error);
+    return status;
   }
   supine_mesh_free(&surfaces[0]);
   supine_mesh_free(&surfaces[1]);

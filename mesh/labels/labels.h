@@ -17,8 +17,9 @@ typedef struct supine_labels_options {
    * into two lungs; "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1"; or one's own,
    * "left=10+11,right=12+13+14", of which either may be missing. */
   const char *labels;
-  double edge;  /**< mm, about, between vertices; 0: SUPINE_LABELS_EDGE */
-  double close; /**< mm: gaps and channels narrower than twice this are closed first */
+  supine_axes axes; /**< of the header's coordinates, in place of what it says; AUTO: as it says */
+  double edge;      /**< mm, about, between vertices; 0: SUPINE_LABELS_EDGE */
+  double close;     /**< mm: gaps and channels narrower than twice this are closed first */
   /** 0 to 1; false stops. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -51,8 +52,7 @@ typedef struct supine_labels_report {
   double parted; /**< two lungs in one piece were parted at necks up to this wide, mm; 0: not */
   size_t lung_count;
   supine_labels_lung lung[2]; /**< the left first, where both are there */
-  int apex; /**< 1: the narrow end is at the head, -1: at the feet, 0: cannot be told */
-  int back; /**< likewise: the deepest part at the back, or the front */
+  supine_axes coordinates;    /**< that the header's were taken to be in */
 } supine_labels_report;
 
 /** Makes the surfaces of the lungs of a label map (.nrrd, .nii, .nii.gz), or of several of one

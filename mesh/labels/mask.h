@@ -48,10 +48,15 @@ bool supine_labels_row(const supine_image *image, size_t row, uint16_t *labels, 
 /** @param tally  [LABELS_MAX], written */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
+typedef struct labels_choice {
+  char *taken;  /**< [256] "labels 1 right, 2 left", written */
+  bool doubted; /**< the header does not put the lungs beside each other, left on the left */
+} labels_choice;
+
 /** @param side  [LABELS_MAX], written: 0, LABELS_LEFT, ... */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
-                                   char taken[256], supine_error *error);
+                                   labels_choice *choice, supine_error *error);
 
 /** The box of voxels low to high of an image that was counted, with LABELS_MARGIN around it; at
  * NULL and SUPINE_ERROR_MEMORY where there is no memory.
@@ -155,7 +160,5 @@ supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, b
 
 /** "i to the left, j to the back, k to the head" */
 void supine_labels_axes(const double step[3][3], char *text, size_t size);
-/** Sets apex and back of the report from the surfaces. */
-void supine_labels_anatomy(const supine_mesh *surfaces, supine_labels_report *report);
 
 #endif

@@ -242,7 +242,7 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
                             path, displacement->shape[1], n);
   }
   const size_t count = gravity->shape[0];
-  const bool ras = options != NULL && options->axes == SUPINE_AXES_RAS;
+  const supine_axes axes = options != NULL ? options->axes : SUPINE_AXES_AUTO;
   const double unit =
       options != NULL && options->millimetres_per_unit > 0.0 ? options->millimetres_per_unit : 1.0;
   supine_status status = grow(fields, count, error);
@@ -258,15 +258,17 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
       fields->directions[3 * d + k] = element(gravity, 3 * d + k);
     }
     status = check_direction(fields, d, path, "row", rows, error);
-    for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-      const double sign = ras && i % 3 < 2 ? -1.0 : 1.0;
-      const double value = sign * unit * element(displacement, 3 * n * d + i);
-      fields->displacement[3 * n * d + i] = value;
-      if (!isfinite(value)) {
+    for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+      double *u = fields->displacement + 3 * (n * d + i);
+      for (size_t k = 0; k < 3; ++k) {
+        u[k] = element(displacement, 3 * (n * d + i) + k);
+      }
+      if (!isfinite(u[0]) || !isfinite(u[1]) || !isfinite(u[2])) {
         status = supine_error_set(error, SUPINE_ERROR_FORMAT,
                                   "%s: row %zu: the displacement of vertex %zu is not finite", path,
-                                  d, i / 3);
+                                  d, i);
       }
+      supine_mesh_axes_apply(axes, unit, u);
     }
   }
   free(rows);

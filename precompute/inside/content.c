@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/csv.h"
-
+#include "mesh/io/points.h"
 #include "precompute/inside/content.h"
 
 static supine_status no_memory(const char *path, supine_error *error) {
@@ -54,46 +53,27 @@ static bool add_name(supine_inside_content *content, const char *name, size_t le
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error) {
-  static const char *const columns[] = {"x", "y", "z", "name"};
-  enum { NAME = 3 };
-  const double scale =
-      options != NULL && options->millimetres_per_unit > 0.0 ? options->millimetres_per_unit : 1.0;
-  const double turn = options != NULL && options->axes == SUPINE_AXES_RAS ? -scale : scale;
-  const double factor[3] = {turn, turn, scale};
-  const size_t before = content->count;
   size_t capacity = content->count;
   size_t used = content->names != NULL ? strlen(content->names) : 0;
   size_t room = used;
-  supine_csv csv;
-  supine_status status = supine_csv_open(path, columns, 4, NAME, &csv, error);
+  supine_mesh_points read = {0};
+  supine_status status = supine_mesh_points_read(path, options, &read, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  bool more = true;
-  while ((status = supine_csv_next(&csv, &more, error)) == SUPINE_OK && more) {
-    char number[24];
-    (void)snprintf(number, sizeof number, "%zu", content->count - before + 1);
-    const char *given = supine_csv_text(&csv, NAME);
-    const char *name = given != NULL && *given != '\0' ? given : number;
+  if (!reserve(content, &capacity, read.count)) {
+    status = no_memory(path, error);
+  }
+  for (size_t i = 0; i < read.count && status == SUPINE_OK; ++i) {
     const uint32_t part = (uint32_t)content->part_count;
-    if (!reserve(content, &capacity, 1) || !add_name(content, name, strlen(name), &used, &room)) {
+    if (!add_name(content, read.names[i], strlen(read.names[i]), &used, &room)) {
       status = no_memory(path, error);
       break;
     }
-    double *point = content->points + 3 * content->count;
-    for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
-      status = supine_csv_number(&csv, k, columns[k], &point[k], error);
-      point[k] *= factor[k];
-    }
-    if (status != SUPINE_OK) {
-      break;
-    }
+    memcpy(content->points + 3 * content->count, read.at + 3 * i, 3 * sizeof *read.at);
     content->part[content->count++] = part;
   }
-  supine_csv_close(&csv);
-  if (status == SUPINE_OK && content->count == before) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points below the header", path);
-  }
+  supine_mesh_points_free(&read);
   return status;
 }
 

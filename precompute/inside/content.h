@@ -27,11 +27,8 @@ typedef struct supine_inside_content {
   supine_inside_grid grid;
 } supine_inside_content;
 
-/** Appends the points of a CSV file with the columns x, y, z and, where given, name (else they are
- * numbered from 1), each a part of its own.
- * @param options  axes and units of the numbers; AUTO: LPS
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT  with the line; no point
- * @retval SUPINE_ERROR_MEMORY */
+/** Appends the points of a file, each a part of its own; options and statuses as
+ * supine_mesh_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);

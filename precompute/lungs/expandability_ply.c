@@ -38,11 +38,11 @@ static void assign(const supine_lungs *lungs, const placed *order, const double 
   }
 }
 
-/* rows: x, y, z and expandability of the file's vertices. Nine parameters: the file's rows, and
+/* rows: x, y, z and expandability of the file's vertices. Ten parameters: the file's rows, and
  * the lungs' vertices in the order that finds them. */
 static supine_status assign_all(const char *path, const char *property, const double *rows,
                                 size_t count, const supine_lungs *lungs, const placed *order,
-                                const double scale[3], double *a, supine_error *error) {
+                                supine_axes axes, double unit, double *a, supine_error *error) {
   double reach = 0.0; /* positions went through single precision */
   for (size_t k = 0; k < 3; ++k) {
     reach = fmax(reach, 1e-6 * fmax(fabs(lungs->minimum[k]), fabs(lungs->maximum[k])));
@@ -55,7 +55,8 @@ static supine_status assign_all(const char *path, const char *property, const do
                               "finite",
                               path, property, v, row[3]);
     }
-    const double p[3] = {scale[0] * row[0], scale[1] * row[1], scale[2] * row[2]};
+    double p[3] = {row[0], row[1], row[2]};
+    supine_mesh_axes_apply(axes, unit, p);
     assign(lungs, order, p, reach, row[3], a);
   }
   return SUPINE_OK;
@@ -67,8 +68,6 @@ supine_status supine_tissue_expandability_load_ply(const char *path, const char 
                                                    supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double unit = millimetres_per_unit > 0.0 ? millimetres_per_unit : 1.0;
-  const double turn = axes == SUPINE_AXES_RAS ? -unit : unit; /* x and y point the other way */
-  const double scale[3] = {turn, turn, unit};
   double *rows = NULL;
   size_t count = 0;
   supine_status status = supine_mesh_load_property(path, property, &rows, &count, error);
@@ -83,7 +82,7 @@ supine_status supine_tissue_expandability_load_ply(const char *path, const char 
       order[i] = (placed){lungs->mesh.vertices[3 * i], i};
     }
     qsort(order, n, sizeof *order, compare_placed);
-    status = assign_all(path, property, rows, count, lungs, order, scale, a, error);
+    status = assign_all(path, property, rows, count, lungs, order, axes, unit, a, error);
   }
   free(order);
   free(rows);

@@ -27,11 +27,10 @@ int supine_options_basis_frame(const supine_basis *basis, const char *command, b
   }
   if (axes == NULL || unit == NULL ||
       !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
-      !(save->millimetres_per_unit > 0.0)) {
+      !(save->millimetres_per_unit > 0.0) || !supine_mesh_axes_parse(axes, &save->axes)) {
     supine_options_say(command, "the file does not say in which axes and units its scan came");
     return SUPINE_EXIT_INPUT;
   }
-  save->axes = strcmp(axes, "RAS") == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS;
   return SUPINE_EXIT_OK;
 }
 

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "sh/base/csv.h"
 
@@ -51,6 +52,38 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
+/* Takes the field at *rest, which then follows it, or is NULL after the last. A field in quotes may
+ * hold the separator, and "" for a quote. NULL where a quote does not end. */
+static char *csv_field(char **rest, char separator) {
+  char *field = *rest + strspn(*rest, " ");
+  char *end = field;
+  if (*field != '"') {
+    end = strchr(field, separator);
+    *rest = end != NULL ? end + 1 : NULL;
+    if (end != NULL) {
+      *end = '\0';
+    }
+    return trim(field);
+  }
+  char *to = field++;
+  char *begin = to;
+  for (end = field; *end != '"' || end[1] == '"'; ++end) {
+    if (*end == '\0') {
+      return NULL;
+    }
+    end += *end == '"';
+    *to++ = *end;
+  }
+  *to = '\0';
+  ++end;
+  end += strspn(end, " \t");
+  if (*end != separator && *end != '\0') {
+    return NULL;
+  }
+  *rest = *end == separator ? end + 1 : NULL;
+  return begin;
+}
+
 static supine_status csv_split(supine_csv *csv, char *text, supine_error *error) {
   csv->field_count = 0;
   for (char *rest = text; rest != NULL;) {
@@ -58,12 +91,12 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
       return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: more than %d fields", csv->path,
                               csv->line, (int)SUPINE_CSV_FIELDS_MAX);
     }
-    char *comma = strchr(rest, ',');
-    if (comma != NULL) {
-      *comma = '\0';
+    char *field = csv_field(&rest, csv->separator);
+    if (field == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a quote is not closed",
+                              csv->path, csv->line);
     }
-    csv->field[csv->field_count++] = trim(rest);
-    rest = comma != NULL ? comma + 1 : NULL;
+    csv->field[csv->field_count++] = field;
   }
   return SUPINE_OK;
 }
@@ -76,21 +109,23 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
   }
   for (size_t f = 0; f < csv->field_count && names != NULL; ++f) {
     size_t c = 0;
-    while (c < count && strcmp(csv->field[f], names[c]) != 0) {
+    while (c < count && strcasecmp(csv->field[f], names[c]) != 0) {
       ++c;
     }
-    if (c == count || csv->column[c] != SIZE_MAX) {
+    if (c < count && csv->column[c] != SIZE_MAX) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: %s column \"%s\" in the header; expected %s,%s,...",
-                              csv->path, csv->line, c == count ? "unknown" : "repeated",
-                              csv->field[f], names[0], names[1]);
+                              "%s:%zu: repeated column \"%s\" in the header", csv->path, csv->line,
+                              csv->field[f]);
     }
-    csv->column[c] = f;
+    if (c < count) { /* others are no concern of ours */
+      csv->column[c] = f;
+    }
   }
   for (size_t c = 0; c < required; ++c) {
     if (csv->column[c] == SIZE_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: the header has no column \"%s\"",
-                              csv->path, csv->line, names[c]);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s:%zu: the header has no column \"%s\"; expected %s,%s,...",
+                              csv->path, csv->line, names[c], names[0], names[1]);
     }
   }
   csv->column_count = csv->field_count;
@@ -112,6 +147,10 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
                               names != NULL ? ",..." : "");
   }
   if (status == SUPINE_OK) {
+    csv->separator = strchr(text, ',') != NULL    ? ','
+                     : strchr(text, ';') != NULL  ? ';'
+                     : strchr(text, '\t') != NULL ? '\t'
+                                                  : ',';
     status = csv_split(csv, text, error);
   }
   if (status == SUPINE_OK) {
@@ -145,8 +184,12 @@ const char *supine_csv_text(const supine_csv *csv, size_t column) {
 
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
                                 double *number, supine_error *error) {
-  const char *text = supine_csv_text(csv, column);
+  char *text = csv->field[csv->column[column]];
   char *end = NULL;
+  char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
+  if (comma != NULL) { /* as spreadsheets have it where ';' separates */
+    *comma = '.';
+  }
   *number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(*number)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %s \"%s\" is not a finite number",

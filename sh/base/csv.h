@@ -9,23 +9,26 @@
 
 #include <supine/status.h>
 
-enum { SUPINE_CSV_FIELDS_MAX = 16 };
+enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A strict reader of small CSV files: comments, blank lines, one header; no quotes. Zeroed at
- * first. */
+/* A reader of small CSV files: comments, blank lines, one header, fields in quotes. Fields are
+ * separated by what the header has: ',', ';' (numbers may then have a decimal comma) or tabs.
+ * Zeroed at first. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
   char *text;
   size_t capacity;
   size_t line;
+  char separator;
   size_t field_count;
   char *field[SUPINE_CSV_FIELDS_MAX]; /* of the row read last */
   size_t column_count;
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
 } supine_csv;
 
-/* Opens and reads the header; each of the first `required` of `names` must be there. Without names
+/* Opens and reads the header; each of the first `required` of `names` must be there, in any case;
+ * others may be there too, and are passed over. Without names
  * (NULL) any header will do; it stays in `field` until the first row, and columns are in its order.
  */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,

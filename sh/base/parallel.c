@@ -21,14 +21,25 @@ static void *piece_run(void *argument) {
   return NULL;
 }
 
+/* 0 where SUPINE_THREADS is not set, -1 where it is no count. */
+static long asked_threads(void) {
+  const char *text = getenv("SUPINE_THREADS"); /* NOLINT(concurrency-mt-unsafe) */
+  if (text == NULL) {
+    return 0;
+  }
+  char *end = NULL;
+  const long value = strtol(text, &end, 10);
+  return end != text && *end == '\0' && value >= 1 && value <= THREADS_MAX ? value : -1;
+}
+
+bool supine_thread_count_sound(void) {
+  return asked_threads() >= 0;
+}
+
 size_t supine_thread_count(void) {
-  const char *text = getenv("SUPINE_THREADS");
-  if (text != NULL) {
-    char *end = NULL;
-    const long value = strtol(text, &end, 10);
-    if (end != text && *end == '\0' && value >= 1 && value <= THREADS_MAX) {
-      return (size_t)value;
-    }
+  const long asked = asked_threads();
+  if (asked > 0) {
+    return (size_t)asked;
   }
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {

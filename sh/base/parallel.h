@@ -4,6 +4,7 @@
 #ifndef SUPINE_PARALLEL_H
 #define SUPINE_PARALLEL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /** Works on items begin <= i < end; `thread` is 0 to threads - 1 and names per-thread space. */
@@ -12,6 +13,9 @@ typedef void supine_range_function(void *context, size_t begin, size_t end, size
 /** How many threads to use where the caller gives 0: the processors that this process may run on,
  * or the environment variable SUPINE_THREADS (1 to 256). */
 size_t supine_thread_count(void);
+
+/** False where SUPINE_THREADS is set to anything else. */
+bool supine_thread_count_sound(void);
 
 /** Calls `function` on consecutive pieces of 0 <= i < count, one piece a thread, and waits.
  *

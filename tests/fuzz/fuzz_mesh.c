@@ -70,6 +70,24 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
                "0 1 0\r\n0 0 1\r\n"},
       {".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e2 0 0\n"
                "vertex 0 -.5 0\nendloop\nendfacet\nendsolid a\n"},
+      {".vtp",
+       "<?xml version=\"1.0\"?><VTKFile type=\"PolyData\" byte_order=\"LittleEndian\">"
+       "<PolyData><FieldData><Array type=\"String\" Name=\"SPACE\" format=\"ascii\">82 65 83 "
+       "0</Array></FieldData><Piece NumberOfPoints=\"4\" NumberOfPolys=\"2\" "
+       "NumberOfStrips=\"1\"><Points><DataArray type=\"Float64\" Name=\"Points\" "
+       "NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1e2</DataArray>"
+       "</Points><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 "
+       "2 0 1 3 2</DataArray><DataArray type=\"UInt8\" Name=\"offsets\" format=\"ascii\">3 7"
+       "</DataArray></Polys><Strips><DataArray type=\"Int32\" Name=\"connectivity\" "
+       "format=\"ascii\">0 1 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\" "
+       "format=\"ascii\">4</DataArray></Strips></Piece></PolyData></VTKFile>"},
+      {".vtp", "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" header_type=\"UInt32\">"
+               "<PolyData><Piece NumberOfPoints=\"3\" NumberOfPolys=\"1\"><Points><DataArray "
+               "type=\"Int8\" format=\"binary\">CQAAAAAAAAEAAAABAA==</DataArray></Points><Polys>"
+               "<DataArray type=\"Int8\" Name=\"connectivity\" format=\"appended\" offset=\"0\"/>"
+               "<DataArray type=\"UInt8\" Name=\"offsets\" format=\"appended\" offset=\"12\"/>"
+               "</Polys></Piece></PolyData><AppendedData encoding=\"base64\">_AwAAAAABAg==AQAAAAM="
+               "</AppendedData></VTKFile>"},
       {".obj", "# SPACE=LPS\nmtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0.5\nvt 0 0\n"
                "vn 0 0 1\nusemtl a\ns 1\nf 1//1 2/1/1 3\nf -1 -2 -3 -4\nl 1 2\np 3\n"}};
   size_t seen = 0;

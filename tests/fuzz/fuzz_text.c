@@ -6,8 +6,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "precompute/physics/force.h"
 #include "precompute/lungs/expandability.h"
+#include "precompute/physics/force.h"
 #include "program/breath/pv.h"
 
 #include "fuzz.h"

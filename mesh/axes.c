@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: MIT */
+/* The 48 ways in which a file's coordinates can lie along the patient's axes. */
+#include <math.h>
+#include <string.h>
+
+#include "mesh/mesh.h"
+
+enum { CODES = 48, SIGNS = 8 };
+
+/* The patient axis (0 left-right, 1 front-back, 2 feet-head) of each coordinate. */
+static const unsigned char orders[CODES / SIGNS][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
+                                                       {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+
+void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]) {
+  const unsigned code = axes == SUPINE_AXES_AUTO ? 0 : (unsigned)axes - 1;
+  memset(matrix, 0, 9 * sizeof(double));
+  for (int k = 0; k < 3; ++k) {
+    matrix[orders[code / SIGNS][k]][k] = (code % SIGNS) >> k & 1 ? -1.0 : 1.0;
+  }
+}
+
+void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]) {
+  double matrix[3][3];
+  const double from[3] = {point[0], point[1], point[2]};
+  supine_mesh_axes_matrix(axes, matrix);
+  for (int k = 0; k < 3; ++k) { /* the products with 0 are exact; + 0: no -0 */
+    point[k] =
+        scale * (matrix[k][0] * from[0] + matrix[k][1] * from[1] + matrix[k][2] * from[2]) + 0.0;
+  }
+}
+
+void supine_mesh_axes_letters(supine_axes axes, char letters[4]) {
+  double matrix[3][3];
+  supine_mesh_axes_matrix(axes, matrix);
+  for (int k = 0; k < 3; ++k) {
+    for (int a = 0; a < 3; ++a) {
+      if (matrix[a][k] != 0.0) {
+        letters[k] = (matrix[a][k] > 0.0 ? "LPS" : "RAI")[a];
+      }
+    }
+  }
+  letters[3] = '\0';
+}
+
+bool supine_mesh_axes_parse(const char *letters, supine_axes *axes) {
+  for (unsigned code = 1; code <= CODES; ++code) {
+    char of_code[4];
+    supine_mesh_axes_letters((supine_axes)code, of_code);
+    if (strcmp(letters, of_code) == 0) {
+      *axes = (supine_axes)code;
+      return true;
+    }
+  }
+  return false;
+}
+
+supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then) {
+  double a[3][3];
+  double b[3][3];
+  supine_mesh_axes_matrix(first, a);
+  supine_mesh_axes_matrix(then, b);
+  for (unsigned code = 1; code <= CODES; ++code) {
+    double c[3][3];
+    bool same = true;
+    supine_mesh_axes_matrix((supine_axes)code, c);
+    for (int i = 0; i < 9; ++i) {
+      const double product =
+          b[i / 3][0] * a[0][i % 3] + b[i / 3][1] * a[1][i % 3] + b[i / 3][2] * a[2][i % 3];
+      same = same && fabs(product - c[i / 3][i % 3]) < 0.5;
+    }
+    if (same) {
+      return (supine_axes)code;
+    }
+  }
+  return SUPINE_AXES_AUTO;
+}
+
+bool supine_mesh_axes_mirrored(supine_axes axes) {
+  double m[3][3];
+  supine_mesh_axes_matrix(axes, m);
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+             m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
+         0.0;
+}

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: MIT */
+/* Whether a compressed stream is whole: readers of voxels stop where they have enough. */
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <zlib.h>
+
+#include "mesh/image/formats.h"
+
+supine_status supine_image_check_gzip(const char *path, long offset, supine_error *error) {
+  enum { PIECE = 1 << 16 };
+  unsigned char piece[PIECE];
+  const int descriptor = open(path, O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0 || lseek(descriptor, offset, SEEK_SET) < 0) {
+    if (descriptor >= 0) {
+      (void)close(descriptor);
+    }
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read", path);
+  }
+  gzFile file = gzdopen(descriptor, "rb");
+  if (file == NULL) {
+    (void)close(descriptor);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  int count;
+  do {
+    count = gzread(file, piece, PIECE);
+  } while (count > 0);
+  const int closed = gzclose(file); /* Z_BUF_ERROR where the stream ends early */
+  return count == 0 && closed == Z_OK
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: damaged: its compressed data or their checksum are wrong; "
+                                "fetch or write the file anew",
+                                path);
+}

@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: MIT */
+/* Points of CSV files and of 3D Slicer's markups. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include "sh/base/csv.h"
+#include "sh/base/text.h"
+
+#include "mesh/io/points.h"
+
+typedef struct reading {
+  const char *path;
+  const supine_mesh_load_options *options;
+  supine_mesh_points points;
+  size_t room;
+  supine_error *error;
+} reading;
+
+static supine_status no_memory(const reading *r) {
+  return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
+}
+
+/* Adds a point that the file has in axes of its own. */
+static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
+                         double unit) {
+  supine_mesh_points *p = &r->points;
+  char number[24];
+  if (p->count == r->room) {
+    const size_t room = 2 * r->room + 64;
+    double *more = realloc(p->at, 3 * room * sizeof *more);
+    p->at = more != NULL ? more : p->at;
+    char **names = realloc(p->names, room * sizeof *names);
+    p->names = names != NULL ? names : p->names;
+    if (more == NULL || names == NULL) {
+      return no_memory(r);
+    }
+    r->room = room;
+  }
+  (void)snprintf(number, sizeof number, "%zu", p->count + 1);
+  const supine_mesh_load_options none = {.axes = SUPINE_AXES_AUTO};
+  const supine_mesh_load_options *given = r->options != NULL ? r->options : &none;
+  memcpy(p->at + 3 * p->count, at, 3 * sizeof *at);
+  supine_mesh_axes_apply(given->axes != SUPINE_AXES_AUTO ? given->axes : axes,
+                         given->millimetres_per_unit > 0.0 ? given->millimetres_per_unit : unit,
+                         p->at + 3 * p->count);
+  p->names[p->count] = strdup(name != NULL && name[0] != '\0' ? name : number);
+  if (p->names[p->count] == NULL) {
+    return no_memory(r);
+  }
+  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names become lines of lists */
+    *c = (unsigned char)*c < ' ' ? ' ' : *c;
+  }
+  ++p->count;
+  return SUPINE_OK;
+}
+
+/* "LPS", "RAS", and the numbers that older versions of Slicer wrote. */
+static supine_axes slicer_axes(const char *text) {
+  supine_axes axes = SUPINE_AXES_LPS;
+  if (strncmp(text, "0", 1) == 0) {
+    return SUPINE_AXES_RAS;
+  }
+  char letters[4];
+  (void)snprintf(letters, sizeof letters, "%.3s", text);
+  (void)supine_mesh_axes_parse(letters, &axes);
+  return axes;
+}
+
+static supine_status read_csv(reading *r) {
+  static const char *const columns[] = {"x", "y", "z", "name", "label"};
+  enum { NAME = 3, LABEL, COLUMNS };
+  supine_csv csv;
+  bool more = true;
+  supine_status status = supine_csv_open(r->path, columns, COLUMNS, NAME, &csv, r->error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  while ((status = supine_csv_next(&csv, &more, r->error)) == SUPINE_OK && more) {
+    double at[3] = {0.0, 0.0, 0.0};
+    for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
+      status = supine_csv_number(&csv, k, columns[k], &at[k], r->error);
+    }
+    const char *name = supine_csv_text(&csv, NAME);
+    name = name != NULL ? name : supine_csv_text(&csv, LABEL);
+    status = status == SUPINE_OK ? add(r, at, name, SUPINE_AXES_LPS, 1.0) : status;
+    if (status != SUPINE_OK) {
+      break;
+    }
+  }
+  supine_csv_close(&csv);
+  return status;
+}
+
+/* Lines "id,x,y,z,...,label at 11,..."; what is not data begins with a hash. */
+static supine_status read_fcsv(reading *r) {
+  enum { LABEL = 11 };
+  FILE *file = fopen(r->path, "rb");
+  char *line = NULL;
+  size_t room = 0;
+  size_t number = 0;
+  supine_axes axes = SUPINE_AXES_RAS; /* what Slicer wrote before it named them */
+  supine_status status = SUPINE_OK;
+  if (file == NULL) {
+    return supine_error_set(r->error, SUPINE_ERROR_READ, "%s: cannot open", r->path);
+  }
+  while (status == SUPINE_OK && getline(&line, &room, file) > 0) {
+    static const char system[] = "# CoordinateSystem =";
+    double at[3];
+    char *rest = line;
+    char *label = NULL;
+    bool good = true;
+    ++number;
+    line[strcspn(line, "\r\n")] = '\0';
+    if (strncmp(line, system, sizeof system - 1) == 0) {
+      axes = slicer_axes(line + sizeof system - 1 + strspn(line + sizeof system - 1, " "));
+    }
+    if (line[0] == '#' || line[0] == '\0') {
+      continue;
+    }
+    for (int field = 0; rest != NULL && field <= LABEL; ++field) {
+      char *text = strsep(&rest, ",");
+      char *end = text;
+      if (field >= 1 && field <= 3) {
+        at[field - 1] = strtod(text, &end);
+        good = good && end != text && *end == '\0' && isfinite(at[field - 1]);
+      }
+      good = good && (rest != NULL || field >= 3);
+      label = field == LABEL ? text : label;
+    }
+    status = good ? add(r, at, label, axes, 1.0)
+                  : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
+                                     "%s:%zu: no point: id,x,y,z,... is expected", r->path, number);
+  }
+  free(line);
+  (void)fclose(file);
+  return status;
+}
+
+/* The control points of one list. */
+static supine_status read_markup(reading *r, const json_t *markup) {
+  const json_t *system = json_object_get(markup, "coordinateSystem");
+  const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));
+  const supine_axes axes = json_is_string(system) ? slicer_axes(json_string_value(system))
+                           : json_is_integer(system)
+                               ? json_integer_value(system) == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS
+                               : SUPINE_AXES_LPS;
+  const double scale = unit != NULL && strcmp(unit, "um") == 0   ? 1e-3
+                       : unit != NULL && strcmp(unit, "cm") == 0 ? 10.0
+                       : unit != NULL && strcmp(unit, "m") == 0  ? 1000.0
+                                                                 : 1.0;
+  const json_t *list = json_object_get(markup, "controlPoints");
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < json_array_size(list) && status == SUPINE_OK; ++i) {
+    const json_t *point = json_array_get(list, i);
+    const char *placed = json_string_value(json_object_get(point, "positionStatus"));
+    const json_t *position = json_object_get(point, "position");
+    double at[3] = {NAN, NAN, NAN};
+    if (placed != NULL && strcmp(placed, "defined") != 0) {
+      continue;
+    }
+    for (size_t k = 0; k < 3 && json_array_size(position) == 3; ++k) {
+      const json_t *number = json_array_get(position, k);
+      at[k] = json_is_number(number) ? json_number_value(number) : NAN;
+    }
+    status = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2])
+                 ? add(r, at, json_string_value(json_object_get(point, "label")), axes, scale)
+                 : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
+                                    "%s: control point %zu has no position of three numbers",
+                                    r->path, i + 1);
+  }
+  return status;
+}
+
+static supine_status read_markups(reading *r) {
+  json_error_t why;
+  json_t *root = json_load_file(r->path, 0, &why);
+  if (root == NULL) {
+    return supine_error_set(r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
+                            "%s:%d: %s", r->path, why.line < 0 ? 0 : why.line, why.text);
+  }
+  const json_t *markups = json_object_get(root, "markups");
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < json_array_size(markups) && status == SUPINE_OK; ++i) {
+    status = read_markup(r, json_array_get(markups, i));
+  }
+  json_decref(root);
+  return status;
+}
+
+bool supine_mesh_points_named(const char *path) {
+  return supine_text_ends_in_any_case(path, ".csv") ||
+         supine_text_ends_in_any_case(path, ".fcsv") || supine_text_ends_in_any_case(path, ".json");
+}
+
+supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
+                                      supine_mesh_points *points, supine_error *error) {
+  reading r = {.path = path, .options = options, .error = error};
+  supine_status status = supine_text_ends_in_any_case(path, ".fcsv")   ? read_fcsv(&r)
+                         : supine_text_ends_in_any_case(path, ".json") ? read_markups(&r)
+                                                                       : read_csv(&r);
+  if (status == SUPINE_OK && r.points.count == 0) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points in it", path);
+  }
+  if (status == SUPINE_OK) {
+    *points = r.points;
+  } else {
+    supine_mesh_points_free(&r.points);
+  }
+  return status;
+}
+
+void supine_mesh_points_free(supine_mesh_points *points) {
+  for (size_t i = 0; i < points->count; ++i) {
+    free(points->names[i]);
+  }
+  free(points->names);
+  free(points->at);
+  *points = (supine_mesh_points){0};
+}

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Axes and units of surfaces as people write them. */
+#include <ctype.h>
+#include <string.h>
+
+#include "program/options/surface_options.h"
+
+static int read_axes(const char *command, const char *text, void *field) {
+  char letters[4] = "";
+  (void)command;
+  for (size_t k = 0; k < 3 && strlen(text) == 3; ++k) {
+    letters[k] = (char)toupper((unsigned char)text[k]);
+  }
+  return supine_options_fits(supine_mesh_axes_parse(letters, field));
+}
+
+static int read_units(const char *command, const char *text, void *field) {
+  double *millimetres = field;
+  (void)command;
+  static const struct {
+    const char *name;
+    double millimetres;
+  } units[] = {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}};
+  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
+    if (strcmp(text, units[i].name) == 0) {
+      *millimetres = units[i].millimetres;
+      return SUPINE_EXIT_OK;
+    }
+  }
+  return supine_options_fits(supine_options_parse_number(text, millimetres) && *millimetres > 0.0);
+}
+
+const supine_option supine_options_surface_frame[] = {
+    {"axes", 0, "ABC",
+     "axes of the files' coordinates, in place of what the files say: three letters that name "
+     "which "
+     "way each coordinate grows (Left or Right, Posterior or Anterior, Superior or Inferior), as "
+     "LPS in DICOM and RAS in 3D Slicer and nibabel; ITK's RAI codes name where each begins, so "
+     "that its RAI is LPS here. Default: the files' SPACE tag or header, else LPS",
+     SUPINE_FILLS(supine_mesh_load_options, axes), .read = read_axes,
+     .wants = "three letters, one each of L or R, P or A, S or I, as LPS"},
+    {"units", 0, "UNIT", "mm, cm, m, um or in, or millimetres per unit; default mm",
+     SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
+     .wants = "mm, cm, m, um, in or millimetres per unit"},
+    {.name = NULL}};
+
+void supine_options_say_findings(const char *command, const supine_findings *findings) {
+  const char *at = findings->text;
+  size_t length;
+  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
+    supine_options_say(command, "%.*s", (int)length, line);
+  }
+}

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The options of every command that reads surfaces: their axes and units. */
+#ifndef SUPINE_SURFACE_OPTIONS_H
+#define SUPINE_SURFACE_OPTIONS_H
+
+#include "sh/base/findings.h"
+
+#include "mesh/mesh.h"
+
+#include "program/options/command.h"
+
+/* --axes and --units, a table that fills a supine_mesh_load_options. */
+extern const supine_option supine_options_surface_frame[];
+
+/* Prints what was found of an input, a line each. */
+void supine_options_say_findings(const char *command, const supine_findings *findings);
+
+#endif

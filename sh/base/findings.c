@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* Lines that an input gave cause for. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "sh/base/findings.h"
+
+void supine_findings_add(supine_findings *findings, const char *format, ...) {
+  const size_t used = strlen(findings->text);
+  const size_t room = sizeof findings->text - used;
+  va_list arguments;
+  va_start(arguments, format);
+  const int length = vsnprintf(findings->text + used, room, format, arguments);
+  va_end(arguments);
+  if (length < 0 || (size_t)length + 1 >= room) {
+    findings->text[used] = '\0';
+    return;
+  }
+  for (char *c = findings->text + used; *c != '\0'; ++c) { /* a file's name may hold anything */
+    *c = *c == '\n' ? ' ' : *c;
+  }
+  (void)strcat(findings->text, "\n");
+}
+
+const char *supine_findings_next(const char **at, size_t *length) {
+  const char *line = *at;
+  const char *end = strchr(line, '\n');
+  if (end == NULL) {
+    return NULL;
+  }
+  *length = (size_t)(end - line);
+  *at = end + 1;
+  return line;
+}

@@ -1,0 +1,332 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The checks that every surface of lungs passes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "mesh/anatomy.h"
+#include "mesh/repair.h"
+#include "precompute/lungs/gate.h"
+#include "precompute/lungs/phantom.h"
+
+static supine_mesh phantom(void) {
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_phantom_create(3000, 6000.0, &mesh, NULL), SUPINE_OK);
+  return mesh;
+}
+
+/* The left half of it, whose triangles come first. */
+static supine_mesh left_lung(void) {
+  supine_mesh mesh = phantom();
+  mesh.triangle_count /= 2;
+  mesh.vertex_count /= 2;
+  return mesh;
+}
+
+static void turn_triangle(supine_mesh *mesh, size_t t) {
+  const uint32_t second = mesh->triangles[3 * t + 1];
+  mesh->triangles[3 * t + 1] = mesh->triangles[3 * t + 2];
+  mesh->triangles[3 * t + 2] = second;
+}
+
+/* The surface as a file in other axes has it, read as if it were in LPS. */
+static void misread(supine_mesh *mesh, supine_axes axes) {
+  double matrix[3][3];
+  supine_mesh_axes_matrix(axes, matrix);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    double *p = mesh->vertices + 3 * i;
+    const double q[3] = {p[0], p[1], p[2]};
+    for (int k = 0; k < 3; ++k) {
+      p[k] = matrix[0][k] * q[0] + matrix[1][k] * q[1] + matrix[2][k] * q[2];
+    }
+  }
+  for (size_t t = 0; supine_mesh_axes_mirrored(axes) && t < mesh->triangle_count; ++t) {
+    turn_triangle(mesh, t);
+  }
+}
+
+/* Adds triangles, and vertices for them, counted from the first new one. */
+static void append(supine_mesh *mesh, size_t vertices, const double *at, size_t triangles,
+                   const uint32_t *corner, bool of_new) {
+  const size_t n = mesh->vertex_count;
+  const size_t m = mesh->triangle_count;
+  mesh->vertices = realloc(mesh->vertices, 3 * (n + vertices) * sizeof *mesh->vertices);
+  mesh->triangles = realloc(mesh->triangles, 3 * (m + triangles) * sizeof *mesh->triangles);
+  assert_true(mesh->vertices != NULL && mesh->triangles != NULL);
+  if (vertices > 0) {
+    memcpy(mesh->vertices + 3 * n, at, 3 * vertices * sizeof *at);
+  }
+  for (size_t i = 0; i < 3 * triangles; ++i) {
+    mesh->triangles[3 * m + i] = corner[i] + (of_new ? (uint32_t)n : 0);
+  }
+  mesh->vertex_count += vertices;
+  mesh->triangle_count += triangles;
+}
+
+static const uint32_t tetrahedron[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+typedef struct outcome {
+  supine_status status;
+  supine_lungs lungs;
+  supine_findings findings;
+  supine_error error;
+  bool hold;
+} outcome;
+
+static outcome pass(supine_mesh *mesh, const supine_lungs_source *given) {
+  outcome out = {.error = {SUPINE_OK, ""}};
+  const supine_lungs_source plain = {.name = "lungs.ply", .axes = SUPINE_AXES_LPS};
+  out.status = supine_lungs_gate(mesh, 1, given == NULL ? &plain : given, &out.lungs, &out.hold,
+                                 &out.findings, &out.error);
+  return out;
+}
+
+static void expect_said(const outcome *out, const char *words) {
+  if (strstr(out->findings.text, words) == NULL) {
+    fail_msg("'%s' does not say '%s'", out->findings.text, words);
+  }
+}
+
+static void test_axes_letters_all_48_come_back(void **state) {
+  (void)state;
+  for (int code = 1; code < SUPINE_AXES_COUNT; ++code) {
+    char letters[4];
+    supine_axes axes = SUPINE_AXES_AUTO;
+    supine_mesh_axes_letters((supine_axes)code, letters);
+    assert_true(supine_mesh_axes_parse(letters, &axes));
+    assert_int_equal(axes, code);
+  }
+  supine_axes axes = SUPINE_AXES_AUTO;
+  char letters[4];
+  supine_mesh_axes_letters(SUPINE_AXES_RAS, letters);
+  assert_string_equal(letters, "RAS");
+  assert_false(supine_mesh_axes_parse("LLS", &axes));
+  assert_false(supine_mesh_axes_parse("lps", &axes));
+  assert_false(supine_mesh_axes_parse("LPSX", &axes));
+}
+
+static void test_axes_apply_letters_say_which_way_each_grows(void **state) {
+  (void)state;
+  supine_axes axes = SUPINE_AXES_AUTO;
+  double p[3] = {1.5, -2.25, 4.0};
+  assert_true(supine_mesh_axes_parse("SRA", &axes)); /* up, right, front */
+  supine_mesh_axes_apply(axes, 2.0, p);
+  assert_true(p[0] == 4.5 && p[1] == -8.0 && p[2] == 3.0);
+}
+
+static void test_gate_clean_lungs_nothing_said(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  const supine_mesh before = phantom();
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  assert_string_equal(out.findings.text, "");
+  assert_true(out.hold);
+  assert_int_equal(out.lungs.lung_count, 2);
+  assert_memory_equal(mesh.vertices, before.vertices, 3 * mesh.vertex_count * sizeof(double));
+  assert_memory_equal(mesh.triangles, before.triangles, 3 * mesh.triangle_count * 4);
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+  supine_mesh_free((supine_mesh *)&before);
+}
+
+/* Each of the 47 other ways of reading a pair of lungs is found, and what mends it. */
+static void test_gate_any_other_axes_named(void **state) {
+  (void)state;
+  for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
+    supine_mesh mesh = phantom();
+    char wanted[32] = "add --axes ";
+    misread(&mesh, (supine_axes)code);
+    supine_mesh_axes_letters((supine_axes)code, wanted + strlen(wanted));
+    outcome out = pass(&mesh, NULL);
+    assert_int_equal(out.status, SUPINE_OK);
+    expect_said(&out, wanted);
+    expect_said(&out, "warning: the axes are doubtful");
+    assert_false(out.hold);
+    supine_lungs_free(&out.lungs);
+    supine_mesh_free(&mesh);
+  }
+}
+
+/* The option that mends it takes account of the axes that the file was read in. */
+static void test_gate_axes_given_wrongly_right_ones_named(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
+  misread(&mesh, SUPINE_AXES_RAS); /* an LPS file, read as RAS */
+  outcome out = pass(&mesh, &ras);
+  expect_said(&out, "add --axes LPS");
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
+static void test_gate_single_lung_side_by_shape(void **state) {
+  (void)state;
+  static const char *const said[] = {"taken for the left by its shape",
+                                     "taken for the right by its shape"};
+  for (int right = 0; right < 2; ++right) {
+    supine_mesh mesh = left_lung();
+    for (size_t i = 0; right != 0 && i < mesh.vertex_count; ++i) {
+      mesh.vertices[3 * i] *= -1.0; /* its mirror image is a right lung */
+    }
+    for (size_t i = 0; i < mesh.vertex_count; ++i) {
+      mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0; /* where the other one would be */
+    }
+    outcome out = pass(&mesh, NULL);
+    assert_int_equal(out.status, SUPINE_OK);
+    expect_said(&out, said[right]);
+    assert_int_equal(out.lungs.side[0], right != 0 ? -1 : 1);
+    assert_true(out.lungs.midline == (right != 0 ? out.lungs.maximum : out.lungs.minimum)[0]);
+    supine_lungs_free(&out.lungs);
+    supine_mesh_free(&mesh);
+  }
+}
+
+static void test_gate_specks_dropped_and_told(void **state) {
+  (void)state;
+  static const double at[4][3] = {
+      {300, -300, 300}, {301, -300, 300}, {300, -299, 300}, {300, -300, 301}};
+  supine_mesh mesh = phantom();
+  const size_t vertices = mesh.vertex_count;
+  append(&mesh, 4, at[0], 4, tetrahedron[0], true);
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  expect_said(&out, "dropped 1 speck, each below 1 % of the volume; 2 pieces are left");
+  assert_int_equal(out.lungs.mesh.vertex_count, vertices);
+  assert_true(out.lungs.topology.closed);
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
+static void test_gate_duplicate_loose_reversed_triangles_mended(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  const supine_mesh before = phantom();
+  uint32_t again[5][3];
+  memcpy(again, mesh.triangles + 3 * 100, sizeof again);
+  append(&mesh, 0, NULL, 5, again[0], false);
+  const uint32_t across[1][3] = {{mesh.triangles[0], mesh.triangles[900], mesh.triangles[1800]}};
+  append(&mesh, 0, NULL, 1, across[0], false);
+  for (size_t t = 40; t < 47; ++t) {
+    turn_triangle(&mesh, t);
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  expect_said(&out, "dropped 5 duplicate triangles");
+  expect_said(&out, "dropped 1 loose triangle\n");
+  expect_said(&out, "turned 7 reversed triangles");
+  assert_int_equal(out.lungs.mesh.triangle_count, before.triangle_count);
+  assert_memory_equal(out.lungs.mesh.triangles, before.triangles, 12 * before.triangle_count);
+  assert_true(out.lungs.topology.closed);
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+  supine_mesh_free((supine_mesh *)&before);
+}
+
+/* Two lungs that share one vertex are still two. */
+static void test_gate_lungs_that_touch_parted(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  const size_t half = mesh.vertex_count / 2;
+  size_t inner[2] = {0, half}; /* of the left lung, the lowest x, of the right the highest */
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    const double x = mesh.vertices[3 * i];
+    inner[0] = i < half && x < mesh.vertices[3 * inner[0]] ? i : inner[0];
+    inner[1] = i >= half && x > mesh.vertices[3 * inner[1]] ? i : inner[1];
+  }
+  for (size_t i = 0; i < 3 * mesh.triangle_count; ++i) {
+    mesh.triangles[i] = mesh.triangles[i] == inner[1] ? (uint32_t)inner[0] : mesh.triangles[i];
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  expect_said(&out, "surfaces touched at 1 point: parted there");
+  assert_int_equal(out.lungs.lung_count, 2);
+  assert_true(out.lungs.topology.closed);
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
+/* An ellipsoid with a waist, as wide as two lungs. */
+static void test_gate_both_lungs_in_one_piece_refused(void **state) {
+  (void)state;
+  supine_mesh mesh = left_lung();
+  double low[3];
+  double high[3];
+  supine_mesh_box(&mesh, low, high);
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    double *p = mesh.vertices + 3 * i;
+    double u[3];
+    for (int k = 0; k < 3; ++k) {
+      u[k] = 2.0 * (p[k] - low[k]) / (high[k] - low[k]) - 1.0;
+    }
+    const double length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    const double waist = 0.35 + 0.65 * fmin(1.0, 2.0 * fabs(u[0] / length));
+    p[0] = 150.0 * u[0] / length;
+    p[1] = 75.0 * waist * u[1] / length;
+    p[2] = 90.0 * waist * u[2] / length;
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_ERROR_MESH);
+  assert_non_null(strstr(out.error.message, "both lungs in one piece"));
+  const double midline = -151.0;
+  const supine_lungs_source one = {.name = "one.ply", .axes = SUPINE_AXES_LPS, .midline = &midline};
+  out = pass(&mesh, &one);
+  assert_int_equal(out.status, SUPINE_OK);
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
+static void test_gate_impossible_size_refused_unless_units_given(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+    mesh.vertices[i] *= 1e-3;
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_ERROR_MESH);
+  assert_non_null(strstr(out.error.message, "its unit is likely --units m."));
+  const supine_lungs_source given = {
+      .name = "small.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
+  out = pass(&mesh, &given);
+  assert_int_equal(out.status, SUPINE_OK);
+  expect_said(&out, "warning: 0.");
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
+/* Defects of closed surfaces one at a time: what is sound stays as it is. */
+static void test_repair_open_surface_left_alone(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  supine_mesh_repair_report report;
+  mesh.triangle_count -= 3; /* a hole */
+  const size_t count = mesh.triangle_count;
+  assert_int_equal(supine_mesh_repair(&mesh, &report), SUPINE_OK);
+  assert_int_equal(report.duplicates + report.loose + report.reversed + report.parted, 0);
+  assert_int_equal(mesh.triangle_count, count);
+  supine_mesh_free(&mesh);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_axes_letters_all_48_come_back),
+      cmocka_unit_test(test_axes_apply_letters_say_which_way_each_grows),
+      cmocka_unit_test(test_gate_clean_lungs_nothing_said),
+      cmocka_unit_test(test_gate_any_other_axes_named),
+      cmocka_unit_test(test_gate_axes_given_wrongly_right_ones_named),
+      cmocka_unit_test(test_gate_single_lung_side_by_shape),
+      cmocka_unit_test(test_gate_specks_dropped_and_told),
+      cmocka_unit_test(test_gate_duplicate_loose_reversed_triangles_mended),
+      cmocka_unit_test(test_gate_lungs_that_touch_parted),
+      cmocka_unit_test(test_gate_both_lungs_in_one_piece_refused),
+      cmocka_unit_test(test_gate_impossible_size_refused_unless_units_given),
+      cmocka_unit_test(test_repair_open_surface_left_alone),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
