@@ -98,9 +98,10 @@ static void test_samples_load_malformed_names_the_line(void **state) {
       {"pressure_cmH2O,volume_mL\n1e999,2\n", ":2: pressure_cmH2O \"1e999\""},
       {"pressure_cmH2O,volume_mL\n,2\n", ":2: pressure_cmH2O \"\""},
       {"pressure_cmH2O,volume_mL\n1,2 mL\n", ":2: volume_mL \"2 mL\""},
-      {"pressure_cmH2O,volume_mL\n1,\"2\"\n", ":2: volume_mL \"\"2\"\""},
+      {"pressure_cmH2O,volume_mL\n1,\"2\"3\n", ":2: a quote is not closed"},
       {"pressure_cmH2O,volume_mL,limb\n1,2,in\n", ":2: limb \"in\""},
-      {"pressure_cmH2O,volume_mL,,,,,,,,,,,,,,,,\n", ":1: more than 16 fields"},
+      {"pressure_cmH2O,volume_mL,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,\n",
+       ":1: more than 64 fields"},
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     expect_load(bad[i].text, strlen(bad[i].text), bad[i].expected);
