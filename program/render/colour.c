@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Colour maps: paths through OKLab in equal steps of its distance, lightness rising all the way, so
  * that they also read in grey and for the colour-blind. B. Ottosson, "A perceptual color space for
  * image processing", 2020. */

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* An OpenGL ES 3 context without a window, by EGL. */
 #include <string.h>
 

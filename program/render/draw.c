@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* One drawing of the lungs. */
 #include <math.h>
 #include <stdlib.h>

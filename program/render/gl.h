@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What the files that draw share: the context, the program, the buffers. */
 #ifndef SUPINE_RENDER_GL_H
 #define SUPINE_RENDER_GL_H

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: MIT
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Light and colour of the lungs.
 in vec3 v_normal;
 in vec3 v_eye;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: MIT
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where a vertex of the lungs stands in the picture.
 layout(location = 0) in vec4 rest;
 layout(location = 1) in vec3 direction;

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Postures side by side, composed by cairo. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Pictures of deformed lungs: drawn off screen by OpenGL ES 3, composed by cairo. Not part of the
  * run-time library. Where the build has no EGL or cairo, everything here answers

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A basis on the GPU. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: MIT */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The GPU's part: displacement, projection, light and colour. */
 #include <stdio.h>
 #include <string.h>
