@@ -14,7 +14,7 @@ build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libass
   libgl1-mesa-dri libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev
   help2man"
 tests="g++ poppler-utils libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
-  python3-vtk9 python3-dev python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
+  python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
   plastimatch elastix"
 
 install_missing() {

@@ -19,7 +19,7 @@ inside 'cd /root; supine phantom --vertices 2000 -o lungs.ply; supine precompute
   supine deform lungs.safetensors --posture prone -o prone.vtp
   gcc -o example example.c $(pkg-config --cflags --libs supine-runtime) && ./example lungs.safetensors prone 500
   gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone 500
-  python3 -c "import supine; lungs = supine.open(\"lungs.safetensors\"); print(lungs.deform(lungs.weights(\"prone\"), 1.0)[0])"
+  python3 -c "import supine; lungs = supine.open(\"lungs.safetensors\"); print(lungs.deform(lungs.pose(\"prone\"))[0])"
   man -w supine-deform 2>/dev/null || ls /usr/share/man/man1/supine-deform.1.gz /usr/share/bash-completion/completions/supine'
 inside 'apt-get purge -y -qq supine >/dev/null 2>&1'
 inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*" ! -path "/var/log/*"' >"$root/after"

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Builds the run-time library, by CMake, and the extension module around it.
+"""Builds the run-time library, by CMake, and puts it into the package.
 
-SUPINE_LIBRARY names a libsupine_runtime.a that is there already, of these very sources."""
+SUPINE_LIBRARY names a shared library that is there already, of these very sources."""
+import glob
 import os
 import re
+import shutil
 import subprocess
-import sys
 
-from setuptools import Extension, setup
-from setuptools.command.build_ext import build_ext
+from setuptools import Distribution, setup
+from setuptools.command.build_py import build_py
+from wheel.bdist_wheel import bdist_wheel
 
 here = os.path.dirname(os.path.abspath(__file__))
 os.chdir(here)
@@ -20,32 +22,27 @@ def version():
         return re.search(r'define SUPINE_VERSION "([0-9.]+)"', header.read())[1]
 
 
-class Build(build_ext):
+class Build(build_py):
     def run(self):
+        super().run()
         library = os.environ.get("SUPINE_LIBRARY")
         if not library:
-            folder = os.path.abspath(os.path.join(self.build_temp, "runtime"))
+            folder = os.path.abspath("build/runtime")
             subprocess.run(["cmake", "-S", top, "-B", folder, "-DSUPINE_RUNTIME_ONLY=ON"], check=True)
-            subprocess.run(["cmake", "--build", folder, "--parallel", "--target", "supine_runtime"],
-                           check=True)
-            library = os.path.join(folder, "runtime", "libsupine_runtime.a")
-        for extension in self.extensions:
-            extension.extra_objects = [library]
-            extension.depends = [library]
-        super().run()
+            subprocess.run(["cmake", "--build", folder, "--parallel", "--target", "supine_runtime_shared"], check=True)
+            library, = glob.glob(os.path.join(folder, "runtime", "*supine_runtime.[sd]*"))
+        shutil.copy(library, os.path.join(self.build_lib, "supine", "libsupine_runtime.so"))
 
 
-# Arrays can be asked of objects through Python's stable interface since 3.11: one wheel for all after.
-stable = sys.version_info >= (3, 11)
-setup(
-    version=version(),
-    ext_modules=[Extension(
-        "supine._supine",
-        sources=["module.c", "errors.c", "arguments.c", "block.c", "basis.c"],
-        include_dirs=[top, os.path.join(top, "runtime/include"), os.path.join(top, "sh/include")],
-        # The library's names stay inside, lest another version's in the same process take their place.
-        extra_link_args=["-Wl,--exclude-libs,ALL", "-Wl,-s"] if sys.platform == "linux" else [],
-        define_macros=[("Py_LIMITED_API", "0x030B0000")] if stable else [],
-        py_limited_api=stable)],
-    cmdclass={"build_ext": Build},
-    options={"bdist_wheel": {"py_limited_api": "cp311"}} if stable else {})
+class Wheel(bdist_wheel):
+    """One wheel for every Python of this system: nothing in it is compiled against Python."""
+    def get_tag(self):
+        return "py3", "none", super().get_tag()[2]
+
+
+class Binary(Distribution):
+    def has_ext_modules(self):
+        return True
+
+
+setup(version=version(), cmdclass={"build_py": Build, "bdist_wheel": Wheel}, distclass=Binary)

@@ -12,15 +12,15 @@ import supine
 
 reference, path = sys.argv[1:3]
 lungs = supine.open(path)
-weights, scale = lungs.weights("prone"), 0.5
+pose = lungs.pose("prone")
 points = np.empty((lungs.vertex_count, 3), np.float32)
 CALLS = 20000  # as the reference makes
-calls = {"deform into an array": lambda: lungs.deform(weights, scale, points),
-         "deform into a new one": lambda: lungs.deform(weights, scale)}
+calls = {"deform into an array": lambda: lungs.deform(pose, points),
+         "deform into a new one": lambda: lungs.deform(pose)}
 fastest = dict.fromkeys(calls, float("inf"))
 in_c = float("inf")
 for _ in range(int(sys.argv[3]) if len(sys.argv) > 3 else 9):
-    in_c = min(in_c, float(subprocess.run([reference, path, "prone", str(scale)], capture_output=True,
+    in_c = min(in_c, float(subprocess.run([reference, path, "prone"], capture_output=True,
                                           check=True, text=True).stdout))
     for name, call in calls.items():
         fastest[name] = min(fastest[name], timeit.timeit(call, number=CALLS) / CALLS)

@@ -2,6 +2,7 @@
 """What test_python.py runs inside the clean environment that the wheel was installed into.
 
     inside.py REFERENCE BASIS"""
+import ctypes
 import gc
 import os
 import subprocess
@@ -50,32 +51,33 @@ gc.collect()
 assert (kept == first).all()
 
 # Bit for bit as C, from a file, from memory, in ranges.
-weights = lungs.weights("prone")
-scale = lungs.scale(weights, lungs.resting_volume("prone") + 321.5)
-assert abs(lungs.volume(weights, scale) - lungs.resting_volume("prone") - 321.5) < 1e-6
-assert abs(sum(lungs.volume(weights, scale, i) for i in range(2)) - lungs.volume(weights, scale)) < 1e-9
+STATE = "prone:rest+321.5"
+pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")
+assert abs(lungs.volumes(pose).sum() - lungs.volumes(lungs.pose("prone:rest")).sum() - 321.5) < 1e-6
+assert lungs.weights(pose).shape == (k,) and lungs.gains(pose).shape == (2, 3)
 out = path + ".raw"
-subprocess.run([reference, path, "prone", repr(scale), out], check=True)
+subprocess.run([reference, path, STATE, out], check=True)
 raw = np.fromfile(out, np.float32).reshape(5, n, 3)
 assert np.ptp(raw[0] - lungs.vertices) > 1.0  # mm: something moves
 with open(path, "rb") as file:
     in_memory = supine.open(file.read())
 for basis in (lungs, in_memory):
-    points, normals = basis.deform_lit(weights, scale)
+    points, normals = basis.deform_lit(pose)
     assert points.tobytes() == raw[0].tobytes() and normals.tobytes() == raw[1].tobytes()
-    assert basis.deform(list(weights), [scale, scale]).tobytes() == raw[0].tobytes()
+    assert basis.deform(pose).tobytes() == raw[0].tobytes()
     assert basis.normals(points).tobytes() == raw[2].tobytes()
-    assert basis.deform_batch([weights, weights], [scale, -0.5 * scale]).tobytes() == raw[3:].tobytes()
+    assert basis.deform_batch([pose, supine_rest]).tobytes() == raw[3:].tobytes()
 part = np.empty((50, 3), np.float32)
-assert lungs.deform(weights, scale, part, 100, 150) is part and part.tobytes() == raw[0, 100:150].tobytes()
-moved = lungs.displace(weights, scale)
-assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(weights, scale)
+assert lungs.deform(pose, part, 100, 150) is part and part.tobytes() == raw[0, 100:150].tobytes()
+moved = lungs.displace(pose)
+assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
+assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
+assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
 # Directions.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
 assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
-assert (lungs.weights(np.float32([0, -2, 0])) == weights).all()
 
 # A breath.
 times = np.array([[0, 5 / 3], [5, 2]])
@@ -92,29 +94,27 @@ with open(path, "rb") as file:
     whole = file.read()
 with open(path + ".cut", "wb") as file:
     file.write(whole[:-1000])
-in_c = subprocess.run([reference, path + ".cut", "prone", "0", out], capture_output=True, text=True, check=False)
+in_c = subprocess.run([reference, path + ".cut", "prone", out], capture_output=True, text=True, check=False)
 assert in_c.returncode == 2 and in_c.stderr.startswith(path + ".cut: ")
 assert refused(ValueError, ".cut: ", supine.open, path + ".cut") == in_c.stderr.rstrip("\n")
 refused(supine.FormatError, "basis in memory: ", supine.open, whole[:-1000])
 refused(OSError, "missing.safetensors: cannot read", supine.open, "missing.safetensors")
-refused(supine.ArgumentError, "did you mean 'prone'", lungs.weights, "pron")
-refused(supine.ArgumentError, "gravity has no direction", lungs.weights, (0, 0, 0))
-refused(supine.ArgumentError, "gravity has no direction", lungs.resting_volume, (0, 0, float("nan")))
-refused(supine.NumericalError, "volume", lungs.scale, weights, -1e6)
-refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, weights, scale)
+refused(supine.ArgumentError, "did you mean 'prone'", lungs.pose, "pron")
+refused(supine.ArgumentError, "", lungs.pose, "prone:500")
+refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, 0))
+refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, float("nan")))
+refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
+refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
 # Python's own.
-refused(ValueError, "weights must be", lungs.deform, weights[:-1], scale)
-refused(ValueError, "scales must be 2 numbers", lungs.deform, weights, [scale] * 3)
-refused(ValueError, "float32", lungs.deform, weights, scale, np.empty((n, 3)))
-refused(ValueError, "float32", lungs.deform, weights, scale, np.empty((n - 1, 3), np.float32))
-refused(ValueError, "contiguous", lungs.deform, weights, scale, np.empty((n, 6), np.float32)[:, ::2])
-refused(IndexError, "vertices 0 to", lungs.deform, weights, scale, None, 0, n + 1)
-refused(IndexError, "lung 2 of 2", lungs.scale, weights, 0, 2)
-refused(ValueError, "scales must be", lungs.deform, weights, "deep")
-refused(TypeError, "", lungs.deform, weights, None)
+refused(ValueError, "float32", lungs.deform, pose, np.empty((n, 3)))
+refused(ValueError, "float32", lungs.deform, pose, np.empty((n - 1, 3), np.float32))
+refused(ValueError, "contiguous", lungs.deform, pose, np.empty((n, 6), np.float32)[:, ::2])
+refused(IndexError, "vertices 0 to", lungs.deform, pose, None, 0, n + 1)
+refused(ValueError, "gravity must be 3 numbers", lungs.pose, (0, 1))
+refused(ctypes.ArgumentError, "", lungs.deform, None)
 refused(ValueError, "", supine.open, path, storage="tiny")
-refused((ValueError, BufferError), "read-only", lungs.displace, weights, scale, lungs.vertices)
+refused(ValueError, "read-only", lungs.displace, pose, lungs.vertices)
 try:
     lungs.vertices[0] = 0
     raise AssertionError("an open basis was written to")
@@ -122,7 +122,7 @@ except ValueError:
     pass
 
 # The interpreter's lock is released while vertices are visited: with a switch interval that never ends
-# a waiting thread gets the lock only where a call gives it away. `weights` keeps it.
+# a waiting thread gets the lock only where a call gives it away. `repr` keeps it.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -144,12 +144,11 @@ def lets_others_run(call, *arguments, tries=None):
 
 
 sys.setswitchinterval(1000)
-assert not lets_others_run(lungs.weights, "left", weights.copy(), tries=2000), "the test proves nothing"
+assert not lets_others_run(repr, lungs, tries=2000), "the test proves nothing"
 points = np.empty((n, 3), np.float32)
-many = np.tile(weights, (100, 1)), np.full(100, scale), np.empty((100, n, 3), np.float32)
-for call, *arguments in ((lungs.deform, weights, scale, points), (lungs.displace, weights, scale, points),
-                         (lungs.deform_lit, weights, scale, points, points.copy()),
-                         (lungs.normals, raw[0], points), (lungs.deform_batch, *many), (supine.open, path)):
+for call, *arguments in ((lungs.deform, pose, points), (lungs.displace, pose, points),
+                         (lungs.deform_lit, pose, points, points.copy()), (lungs.normals, raw[0], points),
+                         (lungs.deform_batch, [pose] * 100), (supine.open, path)):
     assert lets_others_run(call, *arguments), f"{call} keeps the lock"
 sys.setswitchinterval(0.005)
 print("all as in C")

@@ -4,33 +4,35 @@
     import supine
 
     lungs = supine.open("lungs.safetensors")
-    weights = lungs.weights("prone")                               # once a posture
-    scale = lungs.scale(weights, lungs.resting_volume("prone") + 500)
-    points = lungs.deform(weights, scale)                          # float32 [N, 3], mm, LPS
+    pose = lungs.pose("prone:rest+500")        # a posture and a volume: once a state
+    points = lungs.deform(pose)                # float32 [N, 3], mm, LPS
 
 Lengths are millimetres, volumes millilitres, axes the DICOM patient axes (LPS: +x left, +y posterior,
-+z head). Gravity is a posture's name or three numbers that point where things fall. Arrays of an open
-basis are views of its memory, read-only. Calls that visit every vertex release the interpreter's
-lock, so that threads may share one basis, each with a range of vertices.
++z head). A state is a text as the program's options take it: POSTURE, VOLUME or POSTURE:VOLUME, where a
+volume is rest, full or scan with +ML or -ML, or absolute: 2600mL. Arrays of an open basis are views of its
+memory, read-only. Calls release the interpreter's lock, so that threads may share one basis, each with a
+range of vertices.
 """
 from __future__ import annotations
 
+import ctypes
 import os
-from typing import Optional, Sequence, Union
+from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _supine
-from ._supine import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
-                      OutOfMemoryError, ReadError, UnsupportedError)
+from . import _library as _c
+from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
+                       OutOfMemoryError, ReadError, UnsupportedError)
 
-__all__ = ["open", "Basis", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity", "Error",
-           "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
+__all__ = ["open", "Basis", "Pose", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+           "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
-__version__: str = _supine.version
+__version__: str = _c.string(_c.version())
 
 Gravity = Union[str, Sequence[float], NDArray[np.float64]]
+Source = Union[str, bytes, bytearray, memoryview, "os.PathLike[str]"]
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
@@ -38,26 +40,51 @@ _FLOAT = np.dtype(np.float32)
 STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512")
+_SUPINE = (0.0, 1.0, 0.0)
+
+
+def _three(gravity: Gravity) -> Any:
+    """Gravity as C has it: of a posture's name, or three numbers as they are."""
+    if isinstance(gravity, str):
+        state = _c.State()
+        _c.state_parse_posture(gravity.encode(), state)
+        return state.gravity
+    return _numbers(gravity, 3, "gravity")
+
+
+def _numbers(values: ArrayLike, count: int, name: str) -> Any:
+    flat = np.asarray(values, np.float64).ravel()
+    if flat.size != count:
+        raise ValueError(f"{name} must be {count} numbers")
+    return (ctypes.c_double * count)(*flat)
 
 
 def gravity(posture: Gravity) -> Doubles:
     """The unit vector, where things fall, of a posture: `gravity("prone")` is (0, -1, 0)."""
-    return np.array(_supine.gravity(posture))
+    return np.array(_three(posture))
 
 
 def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
     """Gravity of a body that W, X, Y, Z turns from its own axes into a world whose z points up."""
-    return np.array(_supine.quaternion(quaternion))
+    out = (ctypes.c_double * 3)()
+    status = _c.posture_quaternion(_numbers(quaternion, 4, "quaternion"), out)
+    if status != 0:
+        _c.fail(status)
+    return np.array(out)
 
 
 def tilt(posture: Gravity, degrees: float) -> Doubles:
     """Gravity turned in the sagittal plane: supine by +15 degrees is head down."""
-    return np.array(_supine.tilt(posture, degrees))
+    out = (ctypes.c_double * 3)()
+    status = _c.posture_tilt(_three(posture), degrees, out)
+    if status != 0:
+        _c.fail(status)
+    return np.array(out)
 
 
 def postures() -> tuple[str, ...]:
     """Every posture's name."""
-    return _supine.postures()
+    return tuple(_c.string(_c.posture_name(i)) for i in range(_c.posture_count()))
 
 
 def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale: float = 1 / 3,
@@ -75,10 +102,53 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
     volumes = np.empty_like(flat)
-    relation = None if pv is None else np.ascontiguousarray(pv, np.float64)
-    _supine.breath(tidal, rate, inhale, rest_pressure, COURSES.index(course), relation, flat.size, flat,
-                   volumes)
+    relation = _c.breath_normal() if pv is None else _numbers(pv, 18, "pv")
+    _c.breath_evaluate(relation, _c.Breath(tidal, rate, inhale, rest_pressure, COURSES.index(course)), flat.size,
+                       flat.ctypes.data, volumes.ctypes.data, None)
     return volumes.reshape(times.shape)
+
+
+class Pose(_c.CPose):
+    """Weights and gains of one state of a basis; `Basis.pose` makes it."""
+
+    def fill(self, gain: float) -> Pose:
+        """Sets every gain to one number, free of volumes: for open surfaces and fields."""
+        np.ctypeslib.as_array(self.gains)[:] = gain
+        return self
+
+
+def _address(array: Floats, count: int, name: str, writable: bool = True) -> int:
+    """Where the numbers of an array are that C reads or writes."""
+    if array.dtype is not _FLOAT and array.dtype != _FLOAT or array.size != count:
+        raise ValueError(f"{name} must be an array of {count} numbers of type float32")
+    if not array.flags.c_contiguous:
+        raise ValueError(f"{name} must be contiguous")
+    if writable and not array.flags.writeable:
+        raise ValueError(f"{name} is read-only")
+    return array.__array_interface__["data"][0]
+
+
+class _Owner:
+    """The open basis; arrays that are views of its memory hold it."""
+
+    def __init__(self, source: Source, options: _c.Options) -> None:
+        self.pointer = ctypes.c_void_p()
+        if isinstance(source, (bytes, bytearray, memoryview)):
+            self.bytes = np.frombuffer(source, np.uint8)  # held as long as the basis is
+            _c.basis_open_memory(self.bytes.ctypes.data, self.bytes.size, options, self.pointer)
+        else:
+            _c.basis_open(os.fsencode(source), options, self.pointer)
+
+    def __del__(self) -> None:
+        _c.basis_close(self.pointer)
+
+    def view(self, data: int, kind: Any, shape: Sequence[int]) -> NDArray[Any]:
+        """Memory of the basis as an array, read-only."""
+        block = (kind * int(np.prod(shape, dtype=np.int64))).from_address(data or ctypes.addressof(self.pointer))
+        block.owner = self
+        array = np.frombuffer(block, np.dtype(kind)).reshape(shape)
+        array.flags.writeable = False
+        return array
 
 
 class Basis:
@@ -95,41 +165,49 @@ class Basis:
     storage_error mm, the bound on what compact storage costs a breath of 500 mL
     """
 
-    def __init__(self, source: Union[str, bytes, bytearray, memoryview, os.PathLike[str]], *,
-                 storage: str = "auto", simd: str = "auto", normals: bool = True) -> None:
-        self._c = _supine.Basis(source, STORAGES.index(storage), SIMDS.index(simd), normals)
-        info = self._c.info()
-        self.vertex_count: int = info["vertex_count"]
-        self.triangle_count: int = info["triangle_count"]
-        self._shape = (self.vertex_count, 3)
-        self.mode_count: int = info["mode_count"]
-        self.band: int = info["band"]
-        self.vector: bool = info["vector"]
-        self.has_volume: bool = info["has_volume"]
-        self.has_normals: bool = info["normal_count"] > 0
-        self.scan_volume: float = info["scan_volume"]
-        self.storage: str = STORAGES[info["storage"]]
-        self.simd: str = SIMDS[info["simd"]]
-        self.storage_error: float = info["storage_error"]
-        begin = info["lung_begin"]
-        self.lungs: dict[str, slice] = {name: slice(begin[i], begin[i + 1])
-                                        for i, name in enumerate(info["lung_names"])}
-        self.metadata: dict[str, str] = self._c.metadata()
-        self.vertices: Floats = np.asarray(self._c.tensor("vertices"))
-        self.triangles: NDArray[np.uint32] = np.asarray(self._c.tensor("triangles"))
-        self.coefficients: Floats = np.asarray(self._c.tensor("coefficients"))
-        self.direction: Optional[Floats] = None if self.vector else self.tensor("direction")
-        self.modes: Doubles = np.asarray(self._c.tensor("modes"))
-        self.bounds: Floats = np.asarray(self._c.bounds())
+    def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> None:
+        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals)
+        self._owner = _Owner(source, options)
+        self._c = self._owner.pointer
+        info = _c.basis_get_info(self._c).contents
+        self.vertex_count: int = info.vertex_count
+        self.triangle_count: int = info.triangle_count
+        self._size = 3 * self.vertex_count
+        self.mode_count: int = info.mode_count
+        self.band: int = info.band
+        self.vector: bool = info.vector
+        self.has_volume: bool = info.has_volume
+        self.has_rest: bool = info.has_rest
+        self.has_normals: bool = info.normal_count > 0
+        self.storage: str = STORAGES[info.storage]
+        self.simd: str = SIMDS[info.simd]
+        self.storage_error: float = info.storage_error
+        count: int = info.lung_count
+        self.lungs: dict[str, slice] = {_c.string(info.lung_names[i]): slice(info.lung_begin[i], info.lung_begin[i + 1])
+                                        for i in range(count)}
+        size = ctypes.c_size_t()
+        all_metadata = _c.basis_all_metadata(self._c, size)
+        self.metadata: dict[str, str] = {_c.string(all_metadata[i].key): _c.string(all_metadata[i].value)
+                                         for i in range(size.value)}
+        self.vertices: Floats = self._tensor("vertices")
+        self.triangles: NDArray[np.uint32] = self._tensor("triangles")
+        self.coefficients: Floats = self._tensor("coefficients")
+        self.direction: Optional[Floats] = None if self.vector else self._tensor("direction")
+        self.modes: Doubles = self._tensor("modes")
+        self.bounds: Floats = self._owner.view(ctypes.cast(info.bounds, ctypes.c_void_p).value or 0, ctypes.c_float,
+                                               (count, 2, 3))
 
     def __repr__(self) -> str:
         return (f"<supine.Basis: {self.vertex_count} vertices, {self.triangle_count} triangles, "
                 f"{self.mode_count} modes, {', '.join(self.lungs)}>")
 
-    def tensor(self, name: str) -> Optional[NDArray[np.generic]]:
+    def _tensor(self, name: str) -> NDArray[Any]:
+        tensor = _c.basis_tensor(self._c, name.encode()).contents
+        return self._owner.view(tensor.data, _c.DTYPES[tensor.dtype], tensor.shape[:tensor.rank])
+
+    def tensor(self, name: str) -> Optional[NDArray[Any]]:
         """Any tensor of the file as a view; None where it has none of that name."""
-        block = self._c.tensor(name)
-        return None if block is None else np.asarray(block)
+        return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
 
     @property
     def faces(self) -> NDArray[np.int64]:
@@ -140,86 +218,89 @@ class Basis:
         faces[:, 1:] = self.triangles
         return faces.ravel()
 
-    def weights(self, gravity: Gravity, out: Optional[Doubles] = None) -> Doubles:
-        """Weights [K] of the modes: once a posture."""
-        if out is None:
-            out = np.empty(self.mode_count)
-        self._c.weights(gravity, out)
+    def pose(self, state: Gravity, volume: str = "", out: Optional[Pose] = None) -> Pose:
+        """Weights and gains of a state, once a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
+        `pose((0, 0.6, -0.8), "rest")`. Without a volume: rest where it is known."""
+        wanted = _c.State(_SUPINE)
+        if isinstance(state, str):
+            _c.state_parse(state.encode(), wanted)
+        else:
+            wanted.gravity = _numbers(state, 3, "gravity")
+        if volume:
+            _c.state_parse(volume.encode(), wanted)
+        out = Pose() if out is None else out
+        _c.basis_pose(self._c, wanted, out)
         return out
 
-    def resting_volume(self, gravity: Gravity) -> float:
-        """mL beyond the file's surface at the end of a quiet expiration in that posture."""
-        return self._c.resting_volume(gravity)
+    def weights(self, pose: Pose) -> Doubles:
+        """The weights [K] of a pose: a view of it."""
+        return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
-    def scale(self, weights: ArrayLike, volume: float, lung: Optional[int] = None) -> float:
-        """The breath scale at which the lungs, or one of them, hold `volume` mL beyond the file's
-        surface."""
-        return self._c.scale(weights, volume, lung)
+    def gains(self, pose: Pose) -> Doubles:
+        """The gains [G, 3] of a pose, of each lung along x, y and z: a view of it."""
+        return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
-    def volume(self, weights: ArrayLike, scale: float, lung: Optional[int] = None) -> float:
-        """mL beyond the file's surface at a breath scale: the inverse of `scale`."""
-        return self._c.volume(weights, scale, lung)
+    def volumes(self, pose: Pose) -> Doubles:
+        """What each lung holds in a pose, gas and tissue, mL [G]."""
+        if not self.has_volume:
+            raise OpenSurfaceError("the surface is open and encloses no volume")
+        volumes = np.empty(len(self.lungs))
+        _c.basis_volumes(self._c, pose, volumes.ctypes.data)
+        return volumes
 
-    def error(self, weights: ArrayLike, scales: Union[float, ArrayLike]) -> float:
+    def error(self, pose: Pose) -> float:
         """Bound, mm, on what storage and rounding cost any vertex there."""
-        return self._c.error(weights, scales)
+        return _c.basis_error(self._c, pose)
 
-    def _range(self, begin: int, end: Optional[int], out: Optional[Floats]) -> tuple[int, Floats]:
+    def _range(self, begin: int, end: Optional[int]) -> tuple[int, int]:
         end = self.vertex_count if end is None else end
-        return end, np.empty((max(end - begin, 0), 3), _FLOAT) if out is None else out
+        if not 0 <= begin <= end <= self.vertex_count:
+            raise IndexError(f"vertices {begin} to {end} of {self.vertex_count}")
+        return end, 3 * (end - begin)
 
-    def deform(self, weights: ArrayLike, scales: Union[float, ArrayLike], out: Optional[Floats] = None,
-               begin: int = 0, end: Optional[int] = None) -> Floats:
-        """Positions [N, 3] of the vertices, or of those in a range; into `out`, where it is given.
-
-        scales: one number, or one a lung."""
-        if end is None:
-            end = self.vertex_count
-        if out is None:  # most calls: half a microsecond less than _range
-            shape = self._shape if end - begin == self.vertex_count else (max(end - begin, 0), 3)
-            out = np.empty(shape, _FLOAT)
-        self._c.deform(weights, scales, begin, end, out)
+    def deform(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
+        """Positions [N, 3] of the vertices, or of those in a range; into `out`, where it is given."""
+        end, size = self._range(begin, end)
+        out = np.empty((end - begin, 3), _FLOAT) if out is None else out
+        _c.deform_range(self._c, pose, begin, end, _address(out, size, "out"))
         return out
 
-    def displace(self, weights: ArrayLike, scales: Union[float, ArrayLike],
-                 out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
+    def displace(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
         """Displacements [N, 3] from the file's surface, as `deform`."""
-        end, out = self._range(begin, end, out)
-        self._c.displace(weights, scales, begin, end, out)
+        end, size = self._range(begin, end)
+        out = np.empty((end - begin, 3), _FLOAT) if out is None else out
+        _c.displace_range(self._c, pose, begin, end, _address(out, size, "out"))
         return out
 
-    def deform_lit(self, weights: ArrayLike, scales: Union[float, ArrayLike],
-                   out: Optional[Floats] = None, normals: Optional[Floats] = None,
+    def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
         """Positions and unit normals, without a look at triangles; needs `has_normals`."""
-        end, out = self._range(begin, end, out)
-        _, normals = self._range(begin, end, normals)
-        self._c.deform_lit(weights, scales, begin, end, out, normals)
+        end, size = self._range(begin, end)
+        out = np.empty((end - begin, 3), _FLOAT) if out is None else out
+        normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals
+        status = _c.deform_lit_range(self._c, pose, begin, end, _address(out, size, "out"),
+                                     _address(normals, size, "normals"))
+        if status != 0:
+            _c.fail(status, b"the basis was made or opened without normals: normals() computes them from the triangles")
         return out, normals
 
-    def deform_batch(self, weights: ArrayLike, scales: ArrayLike, out: Optional[Floats] = None,
-                     begin: int = 0, end: Optional[int] = None) -> Floats:
-        """Positions [T, N, 3] in many states at once: weights [T, K], scales [T] or [T, G]."""
-        weights = np.ascontiguousarray(weights, np.float64)
-        count = weights.shape[0]
-        scales = np.asarray(scales, np.float64).reshape(count, -1)
-        scales = np.ascontiguousarray(np.broadcast_to(scales, (count, len(self.lungs))))
-        end = self.vertex_count if end is None else end
-        if out is None:
-            out = np.empty((count, max(end - begin, 0), 3), np.float32)
-        self._c.deform_batch(count, weights, scales, begin, end, out)
+    def deform_batch(self, poses: Sequence[Pose], out: Optional[Floats] = None, begin: int = 0,
+                     end: Optional[int] = None) -> Floats:
+        """Positions [T, N, 3] in many poses at once."""
+        count = len(poses)
+        end, size = self._range(begin, end)
+        out = np.empty((count, end - begin, 3), _FLOAT) if out is None else out
+        _c.deform_batch(self._c, count, (_c.CPose * count)(*poses), begin, end, _address(out, count * size, "out"))
         return out
 
     def normals(self, xyz: Floats, out: Optional[Floats] = None) -> Floats:
         """Unit normals [N, 3] of a deformed surface, exactly, from its triangles."""
-        if out is None:
-            out = np.empty((self.vertex_count, 3), np.float32)
-        self._c.normals(xyz, out)
+        out = np.empty((self.vertex_count, 3), _FLOAT) if out is None else out
+        _c.normals(self._c, _address(xyz, self._size, "xyz", False), _address(out, self._size, "out"))
         return out
 
 
-def open(source: Union[str, bytes, bytearray, memoryview, os.PathLike[str]], *, storage: str = "auto",
-         simd: str = "auto", normals: bool = True) -> Basis:
+def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
     """Opens a basis file, or one in memory (bytes), checked whole.
 
     storage  how coefficients are kept: "auto" is the smallest that errs by 0.005 mm at most; "exact"

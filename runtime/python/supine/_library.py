@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""The C library, call by call: its types, its functions and its statuses as exceptions."""
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import os
+from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_void_p
+from typing import Any, Optional
+
+MODES_MAX, LUNGS_MAX = 256, 16
+
+
+def _load() -> ctypes.CDLL:
+    """The library in this folder, as wheels have it; else the system's."""
+    beside = os.path.join(os.path.dirname(__file__), "libsupine_runtime.so")
+    return ctypes.CDLL(beside if os.path.exists(beside) else ctypes.util.find_library("supine_runtime"))
+
+
+_c = _load()
+
+
+class Error(Exception):
+    """What the C library refused; its text is the exception's."""
+
+
+class ArgumentError(Error, ValueError):
+    pass
+
+
+class OutOfMemoryError(Error, MemoryError):
+    pass
+
+
+class ReadError(Error, OSError):
+    pass
+
+
+class FormatError(Error, ValueError):
+    pass
+
+
+class MeshError(Error, ValueError):
+    pass
+
+
+class OpenSurfaceError(Error, ValueError):
+    pass
+
+
+class UnsupportedError(Error, NotImplementedError):
+    pass
+
+
+class NumericalError(Error, ArithmeticError):
+    pass
+
+
+# By supine_status.
+_ERRORS = (Error, ArgumentError, OutOfMemoryError, ReadError, FormatError, MeshError, OpenSurfaceError,
+           UnsupportedError, Error, NumericalError, Error)
+for _kind in _ERRORS:
+    _kind.__module__ = "supine"  # as users see them
+
+
+class CError(ctypes.Structure):
+    """supine_error"""
+    _fields_ = [("status", c_int), ("message", c_char * 512)]
+
+
+class Volume(ctypes.Structure):
+    """supine_volume"""
+    _fields_ = [("kind", c_int), ("ml", c_double)]
+
+
+class LungVolume(ctypes.Structure):
+    _fields_ = [("name", c_char * 16), ("volume", Volume)]
+
+
+class State(ctypes.Structure):
+    """supine_state"""
+    _fields_ = [("gravity", c_double * 3), ("volume", Volume), ("lung_count", c_size_t), ("lungs", LungVolume * 2)]
+
+
+class CPose(ctypes.Structure):
+    """supine_pose"""
+    _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX)]
+
+
+class GivenPose:
+    """A pose as an argument, which None is not."""
+    @staticmethod
+    def from_param(pose: Any) -> Any:
+        if not isinstance(pose, CPose):
+            raise TypeError("a pose is wanted: see Basis.pose")
+        return ctypes.byref(pose)
+
+
+class Options(ctypes.Structure):
+    """supine_basis_options"""
+    _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool)]
+
+
+class Info(ctypes.Structure):
+    """supine_basis_info"""
+    _fields_ = [("vertex_count", c_size_t), ("triangle_count", c_size_t), ("mode_count", c_size_t),
+                ("band", c_size_t), ("lung_count", c_size_t), ("lung_begin", POINTER(c_size_t)),
+                ("vector", c_bool), ("has_volume", c_bool), ("storage", c_int), ("simd", c_int),
+                ("bytes_per_vertex", c_double), ("storage_error", c_double), ("lung_names", POINTER(c_char_p)),
+                ("bounds", POINTER(c_float)), ("vertices", c_void_p), ("triangles", c_void_p),
+                ("direction", c_void_p), ("coefficients", c_void_p), ("modes", c_void_p),
+                ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
+                ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
+                ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
+                ("has_full", c_bool), ("is_fields", c_bool)]
+
+
+class Tensor(ctypes.Structure):
+    """supine_tensor"""
+    _fields_ = [("name", c_char_p), ("dtype", c_int), ("rank", c_size_t), ("shape", c_size_t * 4), ("data", c_void_p)]
+
+
+# By supine_dtype.
+DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16)
+
+
+class Metadata(ctypes.Structure):
+    """supine_metadata"""
+    _fields_ = [("key", c_char_p), ("value", c_char_p)]
+
+
+class Breath(ctypes.Structure):
+    """supine_pv_breath"""
+    _fields_ = [("tidal", c_double), ("rate", c_double), ("inhale_fraction", c_double),
+                ("rest_pressure", c_double), ("course", c_int)]
+
+
+def _declare(name: str, result: Any, *arguments: Any) -> Any:
+    function = getattr(_c, "supine_" + name)
+    function.restype, function.argtypes = result, arguments
+    return function
+
+
+def _checked(name: str, *arguments: Any) -> Any:
+    """A function whose last argument is a supine_error: raises where it fails."""
+    function = _declare(name, c_int, *arguments, POINTER(CError))
+
+    def call(*given: Any) -> None:
+        error = CError()
+        status = function(*given, error)
+        if status != 0:
+            fail(status, error.message)
+    return call
+
+
+def fail(status: int, message: bytes = b"") -> None:
+    """Raises the status's exception."""
+    text = message or status_string(status)
+    raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text.decode(errors="replace"))
+
+
+version = _declare("version", c_char_p)
+status_string = _declare("status_string", c_char_p, c_int)
+posture_count = _declare("posture_count", c_size_t)
+posture_name = _declare("posture_name", c_char_p, c_size_t)
+posture_quaternion = _declare("posture_quaternion", c_int, c_double * 4, c_double * 3)
+posture_tilt = _declare("posture_tilt", c_int, c_double * 3, c_double, c_double * 3)
+state_parse = _checked("state_parse", c_char_p, POINTER(State))
+state_parse_posture = _checked("state_parse_posture", c_char_p, POINTER(State))
+breath_normal = _declare("breath_normal", c_void_p)
+breath_evaluate = _checked("breath_evaluate", c_void_p, POINTER(Breath), c_size_t, c_void_p, c_void_p, c_void_p)
+basis_open = _checked("basis_open_with", c_char_p, POINTER(Options), POINTER(c_void_p))
+basis_open_memory = _checked("basis_open_memory_with", c_void_p, c_size_t, POINTER(Options), POINTER(c_void_p))
+basis_close = _declare("basis_close", None, c_void_p)
+basis_get_info = _declare("basis_get_info", POINTER(Info), c_void_p)
+basis_all_metadata = _declare("basis_all_metadata", POINTER(Metadata), c_void_p, POINTER(c_size_t))
+basis_tensor = _declare("basis_tensor", POINTER(Tensor), c_void_p, c_char_p)
+basis_pose = _checked("basis_pose", c_void_p, POINTER(State), GivenPose)
+basis_volumes = _declare("basis_volumes", None, c_void_p, GivenPose, c_void_p)
+basis_error = _declare("basis_error", c_double, c_void_p, GivenPose)
+deform_range = _declare("deform_range", None, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
+displace_range = _declare("displace_range", None, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
+deform_lit_range = _declare("deform_lit_range", c_int, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p, c_void_p)
+deform_batch = _declare("deform_batch", None, c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
+normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
+
+
+def string(text: Optional[bytes]) -> str:
+    """UTF-8 as a str."""
+    return (text or b"").decode(errors="replace")
