@@ -16,12 +16,8 @@
 #include <cmocka.h>
 #include <jansson.h>
 
-#ifdef SUPINE_TEST_CAIRO
 #include <cairo.h>
-#endif
-#ifdef SUPINE_TEST_WEBP
 #include <webp/demux.h>
-#endif
 
 #include <supine/status.h>
 
@@ -392,7 +388,8 @@ static void test_render_misuse_is_a_usage_error(void **state) {
   EXPECT(
       1, "at most 8",
       "render lungs.safetensors --posture left,left,left,left,left,left,left,left,left -o a.png");
-  EXPECT(1, "not both", "render lungs.safetensors --posture left --volume scan+5 --scale 5 -o a.png");
+  EXPECT(1, "not both",
+         "render lungs.safetensors --posture left --volume scan+5 --scale 5 -o a.png");
   EXPECT(2, "nothere", "render nothere.safetensors --posture left -o a.png");
   EXPECT(1, ".webp", "render lungs.safetensors --posture left -o a.webp");
   EXPECT(1, ".webp", "render lungs.safetensors --turn supine:left:1s -o a.png");
@@ -422,7 +419,6 @@ static bool render(const char *format, ...) {
   return true;
 }
 
-#ifdef SUPINE_TEST_CAIRO
 /* Mean difference of red, green and blue, 0 to 255, of two pictures of one size. */
 static double png_difference(const char *a, const char *b) {
   cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
@@ -467,9 +463,7 @@ static void test_render_agrees_with_golden_picture(void **state) {
   assert_true(same < tolerance);
   assert_true(other > 2 * tolerance);
 }
-#endif
 
-#ifdef SUPINE_TEST_CAIRO
 /* Mean place of what is orange in a picture's upper left, which is the ball's arrow, from the
  * middle of the ball. */
 static void find_arrow(const char *path, double place[2]) {
@@ -583,9 +577,7 @@ static void test_render_opacity_is_the_lungs_share(void **state) {
     cairo_surface_destroy(image[i]);
   }
 }
-#endif
 
-#ifdef SUPINE_TEST_WEBP
 /* Frame `wanted` of an animation, RGBA (malloc); what it says of itself. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
@@ -655,9 +647,7 @@ static void test_render_turn_plays_from_posture_to_posture(void **state) {
          "render lungs.safetensors --turn supine:left:1s -o a.webp --inside "
          "nothere.safetensors");
 }
-#endif
 
-#ifdef SUPINE_TEST_CAIRO
 /* Red, green and blue of the page, in its corner. */
 static void corner_of(const char *name, int rgb[3]) {
   char path[256];
@@ -690,7 +680,6 @@ static void test_render_themes_are_dark_and_light(void **state) {
     }
   }
 }
-#endif
 
 static void test_render_options_change_the_picture(void **state) {
   (void)state;
@@ -748,16 +737,12 @@ int main(void) {
       cmocka_unit_test(test_compare_misuse_is_a_usage_error),
       cmocka_unit_test(test_render_without_gl_is_code_3_and_one_line),
       cmocka_unit_test(test_render_misuse_is_a_usage_error),
-#ifdef SUPINE_TEST_CAIRO
       cmocka_unit_test(test_render_agrees_with_golden_picture),
       cmocka_unit_test(test_render_arrow_points_where_gravity_does),
       cmocka_unit_test(test_render_one_point_inside_is_seen),
       cmocka_unit_test(test_render_opacity_is_the_lungs_share),
       cmocka_unit_test(test_render_themes_are_dark_and_light),
-#endif
-#ifdef SUPINE_TEST_WEBP
       cmocka_unit_test(test_render_turn_plays_from_posture_to_posture),
-#endif
       cmocka_unit_test(test_render_options_change_the_picture),
       cmocka_unit_test(test_render_many_postures_and_open_surfaces_work),
   };

@@ -97,7 +97,8 @@ LIMIT = 60  # s
 
 class Trial:
     def __init__(self, program, library, folder):
-        self.program, self.library, self.folder = program, library, folder
+        self.program, self.folder = program, folder
+        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD parts names at spaces
         self.out = folder / "out"
         self.report = folder / "report"
         self.environment = {"SUPINE_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ,
