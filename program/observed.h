@@ -6,6 +6,7 @@
 #include <supine/locate.h>
 
 #include "program/names.h"
+#include "program/stream/sensors.h"
 
 typedef struct supine_command_observed {
   size_t count;
@@ -20,6 +21,14 @@ typedef struct supine_command_observed {
 supine_status supine_command_observed_load(const char *path, const supine_basis *inside,
                                            const supine_command_names *names, double noise,
                                            supine_command_observed *observed, supine_error *error);
+/* List the names of single points, for messages to place. The caller frees names and vertices.
+ * @param list  its `inside` set
+ * @retval SUPINE_ERROR_FORMAT  none, or more than SUPINE_LOCATE_POINTS_MAX
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_observed_names(const char *path, const supine_basis *inside,
+                                            const supine_command_names *names,
+                                            supine_stream_sensor_list *list, supine_error *error);
+
 void supine_command_observed_free(supine_command_observed *observed);
 
 #endif

@@ -5,6 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "program/inside.h"
+#include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/options/state.h"
@@ -30,6 +32,8 @@ typedef struct request {
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
+  const char *points;
+  double noise;
 } request;
 
 static const char *const sends[] = {"weights", "points", "surface", "nothing", NULL};
@@ -52,6 +56,15 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, body), .standard = "1,0,0,0"},
     {"smooth", 0, "MS", "steadies a trembling tracker; a turning body is shown so much later",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms"},
+    {.help = "Points inside the lungs that are observed, as by 'supine locate':"},
+    {"points", 0, "FILE",
+     "where the scan has them, made by 'supine embed BASIS'. A TRANSFORM whose device is a point's "
+     "name, or a POINT list, says where they are, in the axes of --space; from then on surfaces "
+     "and points are sent where the points show them, with the attribute expected_error_mm. The "
+     "volume is found too unless --volume or a message fixes it",
+     SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN},
+    {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
+     .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {.help = "How full the lungs are:"},
     {"volume", 0, "VOLUME",
      "instead of breathing, always: " SUPINE_VOLUME_HELP
@@ -138,6 +151,9 @@ static void show(void *context, supine_stream_server *server) {
 
 static void report(const supine_stream_server *server, const request *wanted) {
   const supine_stream_counts *n = supine_stream_server_counts(server);
+  if (wanted->points != NULL) {
+    (void)printf("%llu positions of observed points\n", (unsigned long long)n->places);
+  }
   (void)printf("%llu poses (%llu repaired, %llu refused), %llu frames, %llu sent to %llu peers\n",
                (unsigned long long)n->poses, (unsigned long long)n->repaired,
                (unsigned long long)n->refused, (unsigned long long)n->frames,
@@ -163,6 +179,37 @@ static void report(const supine_stream_server *server, const request *wanted) {
   if (wanted->smooth > 0.0) {
     (void)printf("smoothing shows a steady turn %.0f ms later on top of that\n", wanted->smooth);
   }
+}
+
+/* What is observed live: a file of 'supine embed' and the names of its points. */
+typedef struct watched {
+  supine_basis *inside;
+  supine_command_names names;
+  supine_stream_sensor_list list;
+} watched;
+
+static supine_status open_points(const supine_basis *basis, const request *wanted, watched *points,
+                                 supine_stream_sensors **sensors, supine_error *error) {
+  if (wanted->points == NULL) {
+    return SUPINE_OK;
+  }
+  supine_status status =
+      supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error);
+  if (status == SUPINE_OK) {
+    points->list = (supine_stream_sensor_list){
+        .inside = points->inside, .noise = wanted->noise, .ras = wanted->space == 1};
+    status = supine_command_observed_names(wanted->points, points->inside, &points->names,
+                                           &points->list, error);
+  }
+  return status == SUPINE_OK ? supine_stream_sensors_create(&points->list, sensors, error) : status;
+}
+
+static void close_points(watched *points, supine_stream_sensors *sensors) {
+  supine_stream_sensors_destroy(sensors);
+  free(points->list.names);
+  free(points->list.vertices);
+  supine_command_names_close(&points->names);
+  supine_basis_close(points->inside);
 }
 
 /* Opens the page, where it was asked for. */
@@ -229,9 +276,13 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   supine_output record = {0};
   supine_stream_server *server = NULL;
   char *page = NULL;
+  watched points = {0};
   supine_status status = volume != NULL ? set_volume(wanted, volume, error)
                                         : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory");
   options.volume = volume;
+  if (status == SUPINE_OK) {
+    status = open_points(basis, wanted, &points, &options.sensors, error);
+  }
   if (status == SUPINE_OK && wanted->replay != NULL) {
     status = supine_stream_poses_load(wanted->replay, &poses, error);
     options.replay = &poses;
@@ -266,6 +317,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   supine_stream_server_destroy(server);
   supine_stream_web_destroy(options.web);
   supine_stream_poses_free(&poses);
+  close_points(&points, options.sensors);
   free(volume);
   free(page);
   return status;

@@ -25,6 +25,9 @@ if(Python3_EXECUTABLE)
       "--volume rest+400 --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1"
     ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${samples}/slicer
     {port} {basis})
+  add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
+    ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples}/slicer)
+  set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
   # The Unity sample, by Mono; its part in the engine against stand-ins for the engine's types.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)

@@ -60,6 +60,7 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
     supine_stream_frame *frame = frames->unused;
     frames->unused = frame->next;
     free(frame->points);
+    free(frame->errors);
     free(frame);
   }
   free(frames->triangles.bytes);
@@ -93,6 +94,35 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
   }
 }
 
+/* Positions and errors of located lungs, all at once: they want a pass over the whole surface.
+ * @retval false  memory is short; lungs that cannot be had keep the law's positions */
+static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
+  const size_t count = f->info->vertex_count;
+  float *xyz = malloc(3 * count * sizeof *xyz + 1);
+  float *sigma = malloc(count * sizeof *sigma + 1);
+  if (frame->errors == NULL) {
+    frame->errors = malloc(SUPINE_STREAM_ATTRIBUTE + 4 * count);
+  }
+  const bool good = xyz != NULL && sigma != NULL && frame->errors != NULL;
+  if (good &&
+      supine_locate_positions(frame->moment.location, f->basis, xyz, sigma, NULL) == SUPINE_OK) {
+    supine_stream_put_points(count, xyz, f->ras, frame->points);
+    const size_t head = supine_stream_attribute_head(count, frame->errors);
+    for (size_t i = 0; i < count; ++i) {
+      uint32_t word;
+      memcpy(&word, &sigma[i], sizeof word);
+      supine_stream_put32(frame->errors + head + 4 * i, word);
+    }
+    frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
+    frame->placed = true;
+  } else {
+    frame->moment.location = NULL;
+  }
+  free(xyz);
+  free(sigma);
+  return good;
+}
+
 /* The points of a frame, once for all peers. */
 static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
@@ -102,6 +132,9 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
     if (frame->points == NULL) {
       return false;
     }
+  }
+  if (frame->moment.location != NULL && !frame->placed && !place_located(f, frame)) {
+    return false;
   }
   uint64_t crc = 0;
   for (size_t begin = 0; begin < count && !frame->placed; begin += PIECE) {
@@ -147,17 +180,17 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
   if (!weights && !place_points(frames, frame)) {
     return false;
   }
+  const bool located = !weights && frame->moment.location != NULL;
   unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
   size_t size = 0;
   if (version == 2) {
     supine_stream_extension((uint32_t)frame->number, body);
     size += SUPINE_STREAM_EXTENSION;
   }
-  size += weights
-              ? put_weights(frames, &frame->moment, body + size)
-              : supine_stream_polydata_head(frames->info->vertex_count,
-                                            triangles ? frames->triangles.count : 0,
-                                            triangles ? frames->triangles.size : 0, body + size);
+  size += weights ? put_weights(frames, &frame->moment, body + size)
+                  : supine_stream_polydata_head(
+                        frames->info->vertex_count, triangles ? frames->triangles.count : 0,
+                        triangles ? frames->triangles.size : 0, located ? 1 : 0, body + size);
   parcel->count = 0;
   parcel->size = 0;
   add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
@@ -169,6 +202,11 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
   if (!weights && triangles) {
     add_piece(parcel, frames->triangles.bytes, frames->triangles.size);
     crc = supine_stream_crc64_join(crc, frames->triangles_crc, frames->triangles_power);
+  }
+  if (located) {
+    const size_t bytes = SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count;
+    add_piece(parcel, frame->errors, bytes);
+    crc = supine_stream_crc64(crc, frame->errors, bytes);
   }
   if (version == 2) {
     add_piece(parcel, metadata, sizeof metadata);

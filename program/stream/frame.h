@@ -3,7 +3,8 @@
  * Frames: a moment of the lungs as messages, made once and sent to any number of peers.
  *
  * A weights frame is an NDARRAY of K + 3 G floats: the K weights and the gains x, y, z of each
- * lung. A surface frame is a POLYDATA. Its triangles never change: they are made into strips once, their
+ * lung. A surface frame is a POLYDATA; where points are observed, located, and each point's
+ * expected error is an attribute. Its triangles never change: they are made into strips once, their
  * checksum is known, and every frame's checksum is joined from the points' and theirs. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
@@ -12,7 +13,7 @@
 #include <sys/uio.h>
 
 #include "program/stream/message.h"
-#include <supine/runtime.h>
+#include <supine/locate.h>
 
 /** What a peer is sent. */
 typedef enum supine_stream_what {
@@ -34,6 +35,7 @@ typedef struct supine_stream_moment {
   uint64_t stamp;    /**< of the pose, as in headers */
   double received;   /**< when the pose came, s of supine_clock_seconds; < 0: no pose did */
   supine_pose pose;
+  const supine_location *location; /**< NULL: no points were observed */
 } supine_stream_moment;
 
 /** A frame that peers share. */
@@ -44,6 +46,8 @@ typedef struct supine_stream_frame {
   bool placed;           /**< `points` hold this moment's, which a peer wanted */
   unsigned char *points; /**< [N] 12 bytes as on the wire */
   uint64_t points_crc;
+  unsigned char
+      *errors; /**< the attribute of a located frame as on the wire; NULL: never was one */
   struct supine_stream_frame *next; /**< of the unused */
 } supine_stream_frame;
 
@@ -66,7 +70,7 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
 
 /** Most pieces of a message, and most bytes before its points: a weights frame whole. */
 enum {
-  SUPINE_STREAM_PIECES = 4,
+  SUPINE_STREAM_PIECES = 5,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + SUPINE_STREAM_EXTENSION + 40 +
                         4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX) + SUPINE_STREAM_METADATA
 };

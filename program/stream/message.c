@@ -62,13 +62,23 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
   return 4;
 }
 
-size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size,
+size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes) {
-  memset(bytes, 0, 40); /* no vertices, lines, polygons, attributes */
+  memset(bytes, 0, 40); /* no vertices, lines, polygons */
   put(bytes, 4, points);
   put(bytes + 28, 4, strips);
   put(bytes + 32, 4, size);
+  put(bytes + 36, 4, attributes);
   return 40;
+}
+
+size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
+  static const char text[] = "expected_error_mm"; /* with its NUL of even length */
+  _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "type, components, count, name");
+  put(bytes, 2, 1); /* a scalar of one component */
+  put(bytes + 2, 4, points);
+  memcpy(bytes + 6, text, sizeof text);
+  return SUPINE_STREAM_ATTRIBUTE;
 }
 
 void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM_EXTENSION]) {

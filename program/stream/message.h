@@ -43,7 +43,10 @@ void supine_stream_header_write(const supine_stream_header *header,
 /** What a message says. */
 typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< of no concern here: another type or device */
-  SUPINE_STREAM_ROTATION,    /**< number [9]: rows of the matrix from tracker to world axes */
+  SUPINE_STREAM_ROTATION,    /**< number [9]: rows of the matrix from tracker to world axes, and
+                                  [3]: where it is, mm; text: its device */
+  SUPINE_STREAM_PLACE,       /**< the same of another device than the one that is followed */
+  SUPINE_STREAM_PLACES,      /**< points: supine_stream_message_point */
   SUPINE_STREAM_QUATERNION,  /**< number [4]: W, X, Y, Z, the same */
   SUPINE_STREAM_DOWN,        /**< number [3]: where things fall, in the tracker's axes */
   SUPINE_STREAM_VOLUME,      /**< number [1]: mL above the posture's rest */
@@ -53,17 +56,23 @@ typedef enum supine_stream_kind {
 
 typedef struct supine_stream_message {
   supine_stream_kind kind;
-  double number[9];
+  double number[12];
   char text[64];
+  const unsigned char *points; /**< [point_count] in the body */
+  size_t point_count;
 } supine_stream_message;
+
+/** Name and position, mm, of a point of PLACES, while its body is there. */
+void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
+                                 double position[3]);
 
 /** Whether the body of such a message is worth reading: the types below of whatever device. */
 int supine_stream_message_wanted(const supine_stream_header *header);
 
-/** Reads a body: TRANSFORM, QTDATA, POSITION; NDARRAY [3] (where things fall) or SENSOR [3] (an
- * accelerometer at rest, which shows the other way); all of device `device` (QTDATA: of that
- * instrument); NDARRAY [1] and STRING of device "VOLUME"; STRING of device "SEND".
- * Numbers come as they are, not-a-number too.
+/** Reads a body: TRANSFORM, QTDATA, POSITION, POINT; NDARRAY [3] (where things fall) or SENSOR [3]
+ * (an accelerometer at rest, which shows the other way); all of device `device` (QTDATA: of that
+ * instrument; TRANSFORM and POINT of any, as places); NDARRAY [1] and STRING of device "VOLUME";
+ * STRING of device "SEND". Numbers come as they are, not-a-number too.
  * @param device  NULL: any
  * @retval SUPINE_ERROR_FORMAT  a wrong CRC, or lengths that contradict each other */
 supine_status supine_stream_message_read(const supine_stream_header *header,
@@ -77,8 +86,13 @@ void supine_stream_put32(unsigned char *bytes, uint32_t value);
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
 /** Head of a POLYDATA of points and strips of triangles, of `size` bytes; returns its own size, 40.
- */
-size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, unsigned char *bytes);
+ * @param attributes  0, or 1: one number a point follows the triangles */
+size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
+                                   unsigned char *bytes);
+
+/** Head of that attribute, "expected_error_mm"; returns its size, 24. */
+enum { SUPINE_STREAM_ATTRIBUTE = 24 };
+size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
 /** The extension of a message of version 2 without metadata. */
 void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM_EXTENSION]);

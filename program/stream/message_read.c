@@ -58,14 +58,38 @@ static void quaternion(cursor *c, supine_stream_message *m) {
   m->number[0] = real32(c);
 }
 
-static void transform(cursor *c, supine_stream_message *m) {
-  m->kind = SUPINE_STREAM_ROTATION;
+static void transform(cursor *c, const char *device, int ours, supine_stream_message *m) {
+  m->kind = ours ? SUPINE_STREAM_ROTATION : SUPINE_STREAM_PLACE;
+  memcpy(m->text, device, strlen(device) + 1);
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) {
       m->number[3 * row + column] = real32(c);
     }
   }
-  (void)pass(c, 12); /* the translation must be there, though it says nothing about gravity */
+  for (int row = 0; row < 3; ++row) {
+    m->number[9 + row] = real32(c);
+  }
+}
+
+/* Name 64, group 32, colour 4, position 12, diameter 4, owner 20. */
+enum { POINT_NAME = 64, POINT_PLACE = 100, POINT_SIZE = 136 };
+
+static void points(cursor *c, supine_stream_message *m) {
+  m->kind = SUPINE_STREAM_PLACES;
+  m->point_count = c->left / POINT_SIZE;
+  m->points = pass(c, m->point_count * POINT_SIZE);
+  c->short_of |= c->left > 0;
+}
+
+void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
+                                 double position[3]) {
+  const unsigned char *at = message->points + POINT_SIZE * point;
+  cursor place = {at + POINT_PLACE, 12, 0};
+  memcpy(name, at, POINT_NAME);
+  name[POINT_NAME] = '\0';
+  for (int i = 0; i < 3; ++i) {
+    position[i] = real32(&place);
+  }
 }
 
 /* Of 12 bytes there is no orientation; of 24 the fourth element is left out, and not negative. */
@@ -144,8 +168,8 @@ static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind)
   }
 }
 
-enum { TRANSFORM, QTDATA, POSITION, NDARRAY, SENSOR, STRING, TYPES };
-static const char *const types[TYPES] = {"TRANSFORM", "QTDATA", "POSITION",
+enum { TRANSFORM, QTDATA, POSITION, POINT, NDARRAY, SENSOR, STRING, TYPES };
+static const char *const types[TYPES] = {"TRANSFORM", "QTDATA", "POSITION", "POINT",
                                          "NDARRAY",   "SENSOR", "STRING"};
 
 static int type_of(const supine_stream_header *header) {
@@ -198,8 +222,10 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
     }
   } else if (type == QTDATA) {
     instruments(&c, device, header, message);
-  } else if (type == TRANSFORM && ours) {
-    transform(&c, message);
+  } else if (type == TRANSFORM) {
+    transform(&c, header->device, ours, message);
+  } else if (type == POINT) {
+    points(&c, message);
   } else if (type == POSITION && ours) {
     position(&c, message);
   } else if (type == NDARRAY && ours) {

@@ -75,6 +75,32 @@ static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const
   take(p, gravity, received, stamp);
 }
 
+/* Take in where a point is seen; false where no sensor has that name. */
+static bool place(supine_stream_patient *p, const char *name, const double position[3],
+                  double received, uint64_t stamp) {
+  if (p->options->sensors == NULL ||
+      !supine_stream_sensors_take(p->options->sensors, name, position)) {
+    return false;
+  }
+  p->fresh = true;
+  p->received = received;
+  p->stamp = stamp;
+  ++p->counts->places;
+  return true;
+}
+
+static void place_all(supine_stream_patient *p, const supine_stream_message *message,
+                      double received, uint64_t stamp) {
+  for (size_t i = 0; i < message->point_count; ++i) {
+    char name[65];
+    double position[3];
+    supine_stream_message_point(message, i, name, position);
+    if (!place(p, name, position, received, stamp) && p->options->sensors != NULL) {
+      supine_stream_patient_warn(p, received, "no point '%s' in the file of --points", name);
+    }
+  }
+}
+
 void supine_stream_patient_hear(supine_stream_patient *patient,
                                 const supine_stream_message *message, double received,
                                 uint64_t stamp) {
@@ -85,7 +111,16 @@ void supine_stream_patient_hear(supine_stream_patient *patient,
   double gravity[3];
   const char *why = NULL;
   switch (message->kind) {
+  case SUPINE_STREAM_PLACE:
+    (void)place(patient, message->text, message->number + 9, received, stamp);
+    break;
+  case SUPINE_STREAM_PLACES:
+    place_all(patient, message, received, stamp);
+    break;
   case SUPINE_STREAM_ROTATION:
+    if (place(patient, message->text, message->number + 9, received, stamp)) {
+      break;
+    }
     verdict = supine_stream_gravity_rotation(setup, message->number, gravity, &why);
     judge(patient, verdict, why, gravity, received, stamp);
     break;
@@ -171,6 +206,32 @@ static void find_gains(supine_stream_patient *patient, double now, supine_stream
   moment->above += moment->volume;
 }
 
+/* The lungs that the observed points show; the volume is found unless it was fixed. */
+static void find_location(supine_stream_patient *patient, double now,
+                          supine_stream_moment *moment) {
+  const supine_stream_volume *volume = patient->options->volume;
+  supine_state state = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
+  supine_pose pose = moment->pose;
+  supine_error error;
+  if (!volume->breathes) {
+    state = volume->fixed;
+  }
+  memcpy(state.gravity, moment->gravity, sizeof state.gravity);
+  supine_status status =
+      supine_stream_sensors_locate(patient->options->sensors, &state, &moment->location, &error);
+  if (status == SUPINE_OK && moment->location != NULL) {
+    status = supine_basis_gains(patient->basis, &moment->location->state, &pose, &error);
+  }
+  if (status != SUPINE_OK) {
+    moment->location = NULL;
+    supine_stream_patient_warn(patient, now, "the points show no lungs: %s", error.message);
+  } else if (moment->location != NULL) {
+    moment->pose = pose;
+    moment->above += moment->location->volume - moment->volume;
+    moment->volume = moment->location->volume;
+  }
+}
+
 void supine_stream_patient_moment(supine_stream_patient *patient, double now,
                                   supine_stream_moment *moment) {
   const double left =
@@ -184,5 +245,8 @@ void supine_stream_patient_moment(supine_stream_patient *patient, double now,
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
   (void)supine_basis_weights(patient->basis, moment->gravity, moment->pose.weights);
   find_gains(patient, now, moment);
+  if (patient->options->sensors != NULL) {
+    find_location(patient, now, moment);
+  }
   patient->fresh = false;
 }

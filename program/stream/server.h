@@ -10,12 +10,14 @@
 #include "program/stream/gravity.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
+#include "program/stream/sensors.h"
 #include "program/stream/volume.h"
 #include "program/stream/web.h"
 
 /** What has happened so far. */
 typedef struct supine_stream_counts {
   uint64_t poses;     /**< taken, the overtaken ones too */
+  uint64_t places;    /**< of observed points, likewise */
   uint64_t repaired;  /**< of them, no rotations until repaired */
   uint64_t refused;   /**< poses that were none */
   uint64_t malformed; /**< messages with a wrong checksum or contradicting lengths */
@@ -38,14 +40,15 @@ typedef struct supine_stream_options {
   const char *device;  /**< whose poses; NULL: any */
   const char *name;    /**< device name of what is sent */
   supine_stream_setup setup;
-  supine_stream_volume *volume; /**< messages may change it */
-  supine_stream_what what;      /**< for peers that have not said */
-  bool ras;                     /**< points in RAS */
-  double rate;                  /**< most frames a second */
-  size_t peers;                 /**< most at a time, up to 1000 */
-  double smooth;                /**< s of lag; 0: none */
-  double seconds;               /**< how long it runs; 0: until told to stop */
-  double patience;              /**< s that a peer may leave a message or frame unfinished; 0: 20 */
+  supine_stream_volume *volume;   /**< messages may change it */
+  supine_stream_sensors *sensors; /**< points that messages may place; NULL: none */
+  supine_stream_what what;        /**< for peers that have not said */
+  bool ras;                       /**< points in RAS */
+  double rate;                    /**< most frames a second */
+  size_t peers;                   /**< most at a time, up to 1000 */
+  double smooth;                  /**< s of lag; 0: none */
+  double seconds;                 /**< how long it runs; 0: until told to stop */
+  double patience; /**< s that a peer may leave a message or frame unfinished; 0: 20 */
   const supine_stream_poses
       *replay;            /**< poses from a file, from when the first peer is there; NULL */
   FILE *record;           /**< takes each pose; NULL */

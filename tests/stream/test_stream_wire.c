@@ -8,6 +8,7 @@
 #include <cmocka.h>
 #include <igtl_header.h>
 #include <igtl_ndarray.h>
+#include <igtl_point.h>
 #include <igtl_polydata.h>
 #include <igtl_position.h>
 #include <igtl_qtdata.h>
@@ -119,7 +120,13 @@ static void test_transform_is_read(void **state) {
       assert_true(m.number[k] == (double)(k + 1));
     }
   }
-  assert_int_equal(read_ok(&header, body, "Probe").kind, SUPINE_STREAM_NOTHING);
+  /* Of another device it says where that is: an observed point, maybe. */
+  const supine_stream_message place = read_ok(&header, body, "Probe");
+  assert_int_equal(place.kind, SUPINE_STREAM_PLACE);
+  assert_string_equal(place.text, "Patient");
+  for (int k = 0; k < 3; ++k) {
+    assert_true(place.number[9 + k] == (double)(k + 10));
+  }
   supine_stream_message m;
   supine_error error;
   header.crc ^= 1;
@@ -279,6 +286,35 @@ static void test_strings_are_read(void **state) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
+static void test_points_are_read(void **state) {
+  (void)state;
+  igtl_point_element list[3];
+  memset(list, 0, sizeof list);
+  for (int i = 0; i < 3; ++i) {
+    memset(list[i].name, 'a' + i, i == 2 ? sizeof list[i].name : 5); /* the longest has no NUL */
+    for (int k = 0; k < 3; ++k) {
+      list[i].position[k] = (float)(10 * i + k);
+    }
+    list[i].radius = 7;
+  }
+  igtl_point_convert_byte_order(list, 3);
+  unsigned char *body = (unsigned char *)list;
+  supine_stream_header header = header_of("POINT", "Tracker", 1, body, sizeof list);
+  const supine_stream_message m = read_ok(&header, body, "Patient");
+  assert_int_equal(m.kind, SUPINE_STREAM_PLACES);
+  assert_int_equal(m.point_count, 3);
+  for (size_t i = 0; i < 3; ++i) {
+    char name[65];
+    double position[3];
+    supine_stream_message_point(&m, i, name, position);
+    assert_int_equal(strlen(name), i == 2 ? 64 : 5);
+    assert_int_equal(name[0], 'a' + (int)i);
+    for (size_t k = 0; k < 3; ++k) {
+      assert_true(position[k] == (double)(10 * i + k));
+    }
+  }
+}
+
 /* Contents that end before they say: every length of each, checksum right. */
 static void test_every_truncation_is_refused(void **state) {
   (void)state;
@@ -287,6 +323,8 @@ static void test_every_truncation_is_refused(void **state) {
     size_t whole;
     unsigned char begin[8];
   } content[] = {{"TRANSFORM", "Patient", 48, {0}},
+                 {"TRANSFORM", "Sensor", 48, {0}},
+                 {"POINT", "Tracker", 136, {0}},
                  {"QTDATA", "Patient", 50, {'P', 'a', 't', 'i', 'e', 'n', 't'}},
                  {"NDARRAY", "Patient", 28, {11, 1, 0, 3}},
                  {"NDARRAY", "VOLUME", 12, {11, 1, 0, 1}},
@@ -305,7 +343,7 @@ static void test_every_truncation_is_refused(void **state) {
       if (status == SUPINE_OK) { /* an empty list of instruments; sizes that say nothing */
         assert_true(size == 0 || size < 4);
       }
-      assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
+      assert_true(m.kind == SUPINE_STREAM_NOTHING || (size == 0 && m.point_count == 0));
       free(body);
     }
   }
@@ -474,6 +512,29 @@ static unsigned char *make_polydata(const sample *s, bool triangles, double sign
   return body;
 }
 
+static void test_attribute_is_the_librarys(void **state) {
+  (void)state;
+  igtl_polydata_info surface;
+  igtl_polydata_init_info(&surface);
+  surface.header.npoints = 2;
+  surface.header.nattributes = 1;
+  assert_int_equal(igtl_polydata_alloc_info(&surface), 1);
+  memset(surface.points, 0, 2 * 12);
+  surface.attributes[0] = (igtl_polydata_attribute){.ncomponents = 1,
+                                                    .n = 2,
+                                                    .name = strdup("expected_error_mm"),
+                                                    .data = calloc(2, sizeof(igtl_float32))};
+  unsigned char theirs[256] = {0};
+  unsigned char ours[256] = {0};
+  const size_t size = (size_t)igtl_polydata_get_size(&surface, IGTL_TYPE_PREFIX_NONE);
+  assert_int_equal(size, 40 + 24 + SUPINE_STREAM_ATTRIBUTE + 8);
+  assert_int_equal(igtl_polydata_pack(&surface, theirs, IGTL_TYPE_PREFIX_NONE), 1);
+  assert_int_equal(igtl_polydata_free_info(&surface), 1);
+  assert_int_equal(supine_stream_polydata_head(2, 0, 0, 1, ours), 40);
+  assert_int_equal(supine_stream_attribute_head(2, ours + 40 + 24), SUPINE_STREAM_ATTRIBUTE);
+  assert_memory_equal(ours, theirs, size);
+}
+
 static void test_surface_is_the_librarys_polydata(void **state) {
   (void)state;
   sample s = sample_create();
@@ -618,6 +679,8 @@ int main(void) {
       cmocka_unit_test(test_position_is_read),
       cmocka_unit_test(test_arrays_and_sensors_are_read),
       cmocka_unit_test(test_strings_are_read),
+      cmocka_unit_test(test_points_are_read),
+      cmocka_unit_test(test_attribute_is_the_librarys),
       cmocka_unit_test(test_every_truncation_is_refused),
       cmocka_unit_test(test_headers_that_are_none_are_refused),
       cmocka_unit_test(test_weights_are_the_librarys_ndarray),
