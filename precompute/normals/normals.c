@@ -170,33 +170,36 @@ static size_t measure(const supine_normals_rows *rows, size_t terms,
   return found;
 }
 
-/* Planes of modes for every vertex; each is one thread's, so that sums do not depend on threads. */
+/* Planes of modes for every vertex. One thread adds up all of a lung in a plane, so that sums do
+ * not depend on threads. */
 typedef struct planes_work {
   const supine_normals_surface *surface;
   const fit *fits; /* [G] */
   size_t terms;
-  float *planes; /* [count, N, 3] */
+  size_t first;  /* mode of the first plane */
+  float *planes; /* [., N, 3] */
 } planes_work;
 
 static void planes_range(void *context, size_t begin, size_t end, size_t thread) {
   const planes_work *work = context;
-  const size_t n = work->surface->vertex_count;
+  const supine_normals_surface *s = work->surface;
   (void)thread;
-  for (size_t j = begin; j < end; ++j) {
-    for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
-      supine_normals_mix(work->surface, lung, work->fits[lung].mix + j * work->terms,
-                         work->planes + 3 * n * j);
-    }
+  for (size_t i = begin; i < end; ++i) {
+    const size_t j = i / s->lung_count;
+    const size_t lung = i % s->lung_count;
+    supine_normals_mix(s, lung, work->fits[lung].mix + (work->first + j) * work->terms,
+                       work->planes + 3 * s->vertex_count * j);
   }
 }
 
-/* Rounds planes to 16 bits, vertices scaled to a normal of length 1 at rest, [N, 3, count]; the
- * unit of each mode goes to the weights. `rest` [N] lengths at rest. */
-static void round_modes(const supine_normals_surface *s, const float *planes, const float *rest,
-                        size_t count, size_t terms, double *weights, int16_t *modes) {
+/* Round planes to 16 bits, vertices scaled to a normal of length 1 at rest, into the modes from
+ * work->first on; the unit of each mode goes to the weights. `rest` [N] lengths at rest. */
+static void round_modes(const planes_work *work, const float *rest, supine_normals_modes *made) {
+  const supine_normals_surface *s = work->surface;
+  const size_t count = made->count;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    for (size_t j = 0; j < count; ++j) {
-      const float *plane = planes + 3 * s->vertex_count * j;
+    for (size_t j = work->first; j < count; ++j) {
+      const float *plane = work->planes + 3 * s->vertex_count * (j - work->first);
       float top = 0;
       for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
         const float size = rest[i / 3] > 0 ? fabsf(plane[i]) / rest[i / 3] : 0;
@@ -205,10 +208,10 @@ static void round_modes(const supine_normals_surface *s, const float *planes, co
       const double unit = top > 0 ? (double)top / INT16_MAX : 1.0;
       for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
         const double value = rest[i / 3] > 0 ? (double)plane[i] / (double)rest[i / 3] : 0.0;
-        modes[i * count + j] = (int16_t)lrint(value / unit);
+        made->modes[i * count + j] = (int16_t)lrint(value / unit);
       }
-      for (size_t a = 0; a < terms; ++a) {
-        weights[(lung * count + j) * terms + a] *= unit;
+      for (size_t a = 0; a < work->terms; ++a) {
+        made->weights[(lung * count + j) * work->terms + a] *= unit;
       }
     }
   }
@@ -236,28 +239,36 @@ static supine_status find_rest(const supine_normals_surface *s, size_t terms, fl
   return SUPINE_OK;
 }
 
-/* The modes for `count` of them, in place of what was made with fewer. */
-static supine_status make(const supine_normals_surface *s, const fit *fits, size_t count,
-                          const float *rest, supine_normals_modes *made) {
-  const size_t terms = supine_normals_terms(s->mode_count);
-  free(made->modes);
-  free(made->weights);
-  made->count = count;
-  made->modes = malloc(3 * s->vertex_count * count * sizeof *made->modes);
-  made->weights = malloc(s->lung_count * count * terms * sizeof *made->weights);
-  float *planes = calloc(3 * s->vertex_count * count, sizeof *planes);
-  if (made->modes == NULL || made->weights == NULL || planes == NULL) {
-    free(planes);
+/* Add modes up to `count` of them. */
+static supine_status add_modes(planes_work *work, size_t count, const float *rest,
+                               supine_normals_modes *made) {
+  const supine_normals_surface *s = work->surface;
+  const size_t terms = work->terms;
+  const size_t old = made->count;
+  const size_t rows = 3 * s->vertex_count;
+  int16_t *modes = realloc(made->modes, rows * count * sizeof *modes);
+  made->modes = modes != NULL ? modes : made->modes;
+  double *weights = realloc(made->weights, s->lung_count * count * terms * sizeof *weights);
+  made->weights = weights != NULL ? weights : made->weights;
+  work->planes = calloc(rows * (count - old), sizeof *work->planes);
+  if (modes == NULL || weights == NULL || work->planes == NULL) {
+    free(work->planes);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    memcpy(made->weights + lung * count * terms, fits[lung].weights,
-           count * terms * sizeof *made->weights);
+  for (size_t i = rows; i-- > 0;) { /* rows become longer, the last one first */
+    memmove(modes + i * count, modes + i * old, old * sizeof *modes);
   }
-  planes_work work = {s, fits, terms, planes};
-  supine_parallel_for(count, 1, supine_thread_count(), planes_range, &work);
-  round_modes(s, planes, rest, count, terms, made->weights, made->modes);
-  free(planes);
+  for (size_t lung = s->lung_count; lung-- > 0;) {
+    double *to = weights + lung * count * terms;
+    memmove(to, weights + lung * old * terms, old * terms * sizeof *to);
+    memcpy(to + old * terms, work->fits[lung].weights + old * terms,
+           (count - old) * terms * sizeof *to);
+  }
+  work->first = old;
+  made->count = count;
+  supine_parallel_for((count - old) * s->lung_count, 1, 0, planes_range, work);
+  round_modes(work, rest, made);
+  free(work->planes);
   return SUPINE_OK;
 }
 
@@ -330,6 +341,7 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
     return SUPINE_OK;
   }
   const size_t terms = supine_normals_terms(surface->mode_count);
+  planes_work work = {.surface = surface, .fits = fits, .terms = terms};
   supine_status status = supine_normals_states_create(surface, STATES, 0.0, &states);
   if (status == SUPINE_OK) {
     status = supine_normals_states_create(surface, HELD_OUT, 0.37, &held_out);
@@ -346,7 +358,7 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
   }
   for (size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
        status == SUPINE_OK && count <= most; count += STEP) {
-    status = make(surface, fits, count, rest, made);
+    status = add_modes(&work, count, rest, made);
     if (status == SUPINE_OK) {
       status = measure_all(surface, &held_out, made);
     }
