@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compare two versions of the program: each command in turn by the old and by the new one.
+
+    bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
+
+Inputs are made by the old one. Prints the least wall and processor seconds and the most memory of
+the rounds, and new over old. Outputs that differ in a byte are named, but for compressed VTP."""
+import argparse
+import filecmp
+import os
+import struct
+import subprocess
+import tempfile
+import time
+
+VOXELS = (512, 512, 248)
+
+
+def write_image(path, label):
+    """NIfTI around the synthetic lungs: noise of 16 bits, or labels of 8."""
+    step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, *VOXELS, 1, 1, 1, 1)
+    struct.pack_into("<hh", header, 70, 2 if label else 4, 8 if label else 16)
+    struct.pack_into("<4f", header, 76, 1.0, *step)
+    struct.pack_into("<2f", header, 108, 352.0, 1.0)
+    header[123] = 2  # mm
+    struct.pack_into("<hh", header, 252, 0, 1)
+    for axis in range(3):  # RAS
+        sign = 1.0 if axis == 2 else -1.0
+        row = [sign * step[axis] if k == axis else 0.0 for k in range(3)]
+        struct.pack_into("<4f", header, 280 + 16 * axis, *row, sign * origin[axis])
+    header[344:347] = b"n+1"
+    with open(path, "wb") as file:
+        file.write(header)
+        for k in range(VOXELS[2]):
+            if label:
+                row = bytes(i >> 5 for i in range(VOXELS[0]))
+                file.write(b"".join(bytes(v + (j >> 5) + k // 16 & 63 for v in row)
+                                    for j in range(VOXELS[1])))
+            else:
+                file.write(os.urandom(2 * VOXELS[0] * VOXELS[1]))
+
+
+def run(command):
+    """Wall and processor seconds, and MB, of a command that must succeed."""
+    start = time.perf_counter()
+    null = os.open(os.devnull, os.O_WRONLY)
+    child = os.posix_spawn(command[0], command, os.environ,
+                           file_actions=[(os.POSIX_SPAWN_DUP2, null, 1)])
+    os.close(null)
+    _, status, used = os.wait4(child, 0)
+    if status != 0:
+        raise SystemExit(" ".join(command) + ": failed")
+    return time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+
+
+def compare(name, programs, arguments, rounds, output=None):
+    """Run both programs in turn and print a row."""
+    best = [[float("inf"), float("inf"), 0.0] for _ in programs]
+    for _ in range(rounds):
+        for which, program in enumerate(programs):
+            wall, cpu, memory = run([program] + arguments)
+            best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
+                           max(best[which][2], memory)]
+            if output is not None:  # the same name for both, as files carry the command
+                os.replace(output, f"{which}-{output}")
+    differs = output is not None and not filecmp.cmp("0-" + output, "1-" + output, False)
+    old, new = best
+    print(f"{name:28} {old[0]:8.3f} {new[0]:8.3f} {new[0] / old[0]:6.2f}   "
+          f"{old[1]:8.3f} {new[1]:8.3f} {new[1] / old[1]:6.2f}   "
+          f"{old[2]:7.0f} {new[2]:7.0f} {new[2] / old[2]:6.2f}"
+          f"{'   other bytes' if differs else ''}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("old")
+    parser.add_argument("new")
+    parser.add_argument("--vertices", default="508000")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--folder")
+    chosen = parser.parse_args()
+    programs = [os.path.abspath(chosen.old), os.path.abspath(chosen.new)]
+    with tempfile.TemporaryDirectory(dir=chosen.folder) as folder:
+        os.chdir(folder)
+
+        def make(*arguments):
+            subprocess.run([programs[0], *arguments], check=True, stdout=subprocess.DEVNULL)
+
+        make("phantom", "--vertices", chosen.vertices, "-o", "large.ply")
+        make("phantom", "--vertices", "20000", "-o", "small.ply")
+        for size in ("large", "small"):
+            make("precompute", size + ".ply", "-o", size + ".safetensors")
+        make("deform", "large.safetensors", "--posture", "prone", "-o", "state.ply")
+        make("embed", "small.safetensors", "--grid", "4", "-o", "grid.safetensors")
+        write_image("image.nii", False)
+        write_image("labels.nii", True)
+        with open("points.csv", "w", encoding="ascii") as file:
+            file.write("x,y,z\n")
+            for i in range(20000):  # within the left lung
+                file.write(f"{40 + i % 61},{-200 + i // 61 % 61},{-170 + i // 3721 * 10}\n")
+
+        print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")
+        print(f"{'':28}" + 3 * f" {'old':>8} {'new':>8} {'ratio':>6}  ")
+        rows = [
+            ("--help", ["--help"], None),
+            ("opening (info)", ["info", "large.safetensors"], None),
+            ("deform --image, 65 M voxels",
+             ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii", "-o",
+              "moved.nii"], "moved.nii"),
+            ("deform --labels",
+             ["deform", "grid.safetensors", "--posture", "prone", "--labels", "labels.nii", "-o",
+              "moved.nii"], "moved.nii"),
+            ("embed, 20,000 points",
+             ["embed", "small.safetensors", "points.csv", "-o", "inside.safetensors"],
+             "inside.safetensors"),
+            ("breathe as VTP, 10 frames",
+             ["breathe", "large.safetensors", "--posture", "prone", "--seconds", "0.15", "-o",
+              "breath.vtp"], None),
+            ("validate", ["validate", "large.safetensors", "--state", "prone:rest:state.ply"],
+             None),
+            ("precompute", ["precompute", "large.ply", "-o", "made.safetensors"], None),
+            ("precompute, harmonics",
+             ["precompute", "large.ply", "--band", "3", "--modes", "harmonics", "-o",
+              "made.safetensors"], None),
+        ]
+        for name, arguments, output in rows:
+            rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
+            compare(name, programs, arguments, rounds, output)
+
+
+if __name__ == "__main__":
+    main()
