@@ -41,16 +41,20 @@ def outliers(column):
     return [x is not None and abs(x - middle) > LIMIT * spread + 1e-9 * abs(middle) for x in column]
 
 
-def page(names, subjects, table, apart, failures):
+def page(names, subjects, table, apart, warnings, failures):
     def cell(name, i):
         value = table[name][i]
         text = "" if value is None else f"{value:.4g}"
         return f'<td class="apart">{text}</td>' if apart[name][i] else f"<td>{text}</td>"
 
+    def said(i):
+        return '<td class="said">' + '<br>'.join(html.escape(line) for line in warnings[i])
+
     head = "".join(f"<th>{html.escape(name.replace('_', ' '))}</th>" for name in names)
-    body = "".join(f"<tr><th>{html.escape(s)}</th>{''.join(cell(n, i) for n in names)}</tr>\n"
+    body = "".join(f"<tr><th>{html.escape(s)}</th>{''.join(cell(n, i) for n in names)}{said(i)}</td></tr>\n"
                    for i, s in enumerate(subjects))
     failed = "".join(f"<li><b>{html.escape(s)}</b>: {html.escape(why)}</li>\n" for s, why in failures)
+    warned = sum(bool(lines) for lines in warnings)
     strange = sum(any(apart[n][i] for n in names) for i in range(len(subjects)))
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Cohort</title><style>
@@ -58,14 +62,15 @@ body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem; color: #222; backgro
 div {{ overflow-x: auto; }} table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
 th, td {{ padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #ddd; }}
 thead th {{ vertical-align: bottom; }} tbody th {{ text-align: left; white-space: nowrap; }}
+.said {{ text-align: left; min-width: 20rem; }}
 .apart {{ background: #fde3c8; font-weight: bold; }}
 </style></head><body>
 <h1>{len(subjects) + len(failures)} subjects: {len(subjects)} done, {len(failures)} failed</h1>
 {'<h2>Failed</h2><ul>' + failed + '</ul>' if failures else ''}
 <h2>Results</h2>
 <p>{strange} with a number that stands apart (shaded: farther from the median than {LIMIT} times
-{TO_SIGMA} median absolute deviations).</p>
-<div><table><thead><tr><th></th>{head}</tr></thead><tbody>
+{TO_SIGMA} median absolute deviations); {warned} with a warning (the last column).</p>
+<div><table><thead><tr><th></th>{head}<th>warnings</th></tr></thead><tbody>
 {body}</tbody></table></div></body></html>
 """
 
@@ -75,6 +80,9 @@ def main(table_path, page_path, *paths):
     for path in paths:
         with open(path, encoding="utf-8") as file:
             results.append(json.load(file))
+    names = [r["subject"] for r in results]
+    if len(set(names)) < len(names):
+        sys.exit(f"given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
     failures = [(r["subject"], r["failure"]) for r in results if "failure" in r]
     done = [r for r in results if "failure" not in r]
     rows = [numbers(r) for r in done]
@@ -82,16 +90,18 @@ def main(table_path, page_path, *paths):
     table = {name: [row.get(name) for row in rows] for name in names}
     apart = {name: outliers(table[name]) for name in names}
     subjects = [r["subject"] for r in done]
+    warnings = [r.get("warnings", []) for r in done]
     with open(table_path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(["subject", *names, "stands_apart_in", "failure"])
+        writer.writerow(["subject", *names, "stands_apart_in", "warnings", "failure"])
         for i, subject in enumerate(subjects):
             strange = " ".join(name for name in names if apart[name][i])
-            writer.writerow([subject, *(table[name][i] for name in names), strange, ""])
+            writer.writerow([subject, *(table[name][i] for name in names), strange,
+                             "; ".join(warnings[i]), ""])
         for subject, why in failures:
-            writer.writerow([subject, *("" for _ in names), "", why])
+            writer.writerow([subject, *("" for _ in names), "", "", why])
     with open(page_path, "w", encoding="utf-8") as file:
-        file.write(page(names, subjects, table, apart, failures))
+        file.write(page(names, subjects, table, apart, warnings, failures))
 
 
 main(*sys.argv[1:])

@@ -32,7 +32,8 @@ def work(folder, volume, report, options, meshes):
     page = ["-o", os.path.join(folder, "report.html")] if report == "yes" else []
     run("precompute", *meshes, *options, "-o", basis)
     comparison = run("compare", basis, "--volume", volume, "--json", *page)
-    return {"info": json.loads(run("info", basis, "--json")), "comparison": json.loads(comparison)}
+    info = json.loads(run("info", basis, "--json"))
+    return {"warnings": info.get("warnings", []), "info": info, "comparison": json.loads(comparison)}
 
 
 def main(output, volume, report, options, *meshes):

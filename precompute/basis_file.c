@@ -258,6 +258,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (content->assumed != NULL) {
     add(&list, "assumed", "%s", content->assumed);
   }
+  if (content->findings != NULL && content->findings[0] != '\0') {
+    add(&list, "warnings", "%.*s", (int)strlen(content->findings) - 1, content->findings);
+  }
   if (content->frame.millimetres_per_unit > 0.0) {
     char letters[4];
     supine_mesh_axes_letters(content->frame.axes, letters);

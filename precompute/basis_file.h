@@ -25,6 +25,7 @@ typedef struct supine_basis_content {
   const char *patient;               /* a person's own law, JSON; optional */
   const char *patient_summary;       /* whose, and how well it held out */
   const char *assumed;               /* optional */
+  const char *findings;              /* lines; NULL or "": none */
   supine_scan_frame frame;
   const char *made_by; /* optional */
 } supine_basis_content;

@@ -4,8 +4,8 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/projection/compression.h"
 #include "precompute/basis_file.h"
+#include "precompute/projection/compression.h"
 
 /* Eight parameters: those of supine_precompute, the fields and how they are fitted. */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
@@ -36,6 +36,7 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
                                           .forms = forms.linear != NULL ? &forms : NULL,
                                           .accuracy = &report->accuracy,
                                           .harmonics = options->modes == 0,
+                                          .findings = options->findings,
                                           .made_by = made_by};
     status = supine_writer_basis_write(path, &content, error);
   }

@@ -287,6 +287,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .patient_summary = p->options->patient_summary,
                                         .made_by = p->options->made_by,
                                         .assumed = p->options->assumed,
+                                        .findings = p->options->findings,
                                         .frame = p->options->frame};
   stage part = {p->options, 0.9, 1.0};
   if (!stage_progress(&part, 0.0)) {

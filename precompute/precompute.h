@@ -21,6 +21,7 @@ typedef struct supine_precompute_options {
   const char *patient;         /**< a person's own law (JSON), for the same; optional */
   const char *patient_summary; /**< whose, and how well it held out; with the former */
   const char *assumed;         /**< what was assumed of the scan, likewise */
+  const char *findings;        /**< what was found of the input, a line each; optional */
   supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
   void *progress_context;

@@ -3,8 +3,8 @@
 #ifndef SUPINE_REST_H
 #define SUPINE_REST_H
 
-#include "precompute/projection/projection.h"
 #include "precompute/physics/reference.h"
+#include "precompute/projection/projection.h"
 
 /* What lungs hold at rest, mL beyond the reference, as real harmonics of bands 0 to 2 [9]. Both
  * lungs of a pair have one scale, found where they, healthy, hold the share of their posture; so

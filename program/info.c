@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine info: what a basis file holds and how exact it is. */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <jansson.h>
+
+#include "sh/base/text.h"
 
 #include <supine/compare.h>
 #include <supine/runtime.h>
@@ -56,6 +59,7 @@ static const char *const errors[] = {"error_directions",  "error_rms_percent", "
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
 
 static const char turned_over[] = "turned_over_percent";
+static const char warnings[] = "warnings";
 
 static const char *text_of(const supine_basis *basis, const char *key) {
   const char *value = supine_basis_metadata(basis, key);
@@ -125,6 +129,33 @@ static void print_expected(const supine_basis *basis) {
   }
 }
 
+/* How the basis was made, and what was found of its input. */
+static void print_facts(const supine_basis *basis) {
+  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
+    if (supine_basis_metadata(basis, shown[i]) != NULL) {
+      (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
+    }
+  }
+  const char *at = supine_basis_metadata(basis, warnings);
+  while (at != NULL && *at != '\0') {
+    const size_t length = strcspn(at, "\n");
+    (void)printf("  %-20s %.*s\n", warnings, (int)length, at);
+    at += length + (at[length] == '\n');
+  }
+}
+
+/* What was found, as a list. */
+static json_t *list_warnings(const supine_basis *basis) {
+  json_t *list = json_array();
+  const char *at = supine_basis_metadata(basis, warnings);
+  while (at != NULL && *at != '\0') {
+    const size_t length = strcspn(at, "\n");
+    (void)json_array_append_new(list, json_stringn(at, length));
+    at += length + (at[length] == '\n');
+  }
+  return list;
+}
+
 static void print_text(const char *path, const supine_basis *basis, const double *energy) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const char *content = supine_basis_metadata(basis, "content");
@@ -145,11 +176,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
       info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
       info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
       info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
-  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
-    if (supine_basis_metadata(basis, shown[i]) != NULL) {
-      (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
-    }
-  }
+  print_facts(basis);
   print_expected(basis);
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
     (void)printf(
@@ -244,13 +271,16 @@ static bool print_json(const char *path, const supine_basis *basis, const double
       (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
     }
   }
-  json_t *root =
-      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o}", "file", path, "lungs",
-                text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
-                (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
-                (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
-                (int)info->has_volume, "kind", info->vector ? "vector" : "scalar",
-                "energy_per_band", bands, "error", error);
+  char printable[PATH_MAX] = "";
+  supine_text_add(printable, sizeof printable, "%s", path);
+  (void)supine_text_make_utf8(printable);
+  json_t *root = json_pack(
+      "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o, s:o}", "file", printable, "lungs",
+      text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
+      (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
+      (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
+      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band", bands,
+      "error", error, warnings, list_warnings(basis));
   bool good = root != NULL;
   for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
     const char *value = supine_basis_metadata(basis, shown[i]);

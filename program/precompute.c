@@ -161,7 +161,8 @@ static int check_fields(const char *list, const char *output) {
 static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
   const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
                                       .modes = wanted->basis.modes,
-                                      .scalar = wanted->kind == 1};
+                                      .scalar = wanted->kind == 1,
+                                      .findings = wanted->model.findings.text};
   supine_fields fields = {0};
   supine_fit_report report;
   size_t mode_count = 0;
@@ -188,6 +189,7 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   wanted->basis.reference = &wanted->model.reference;
   wanted->basis.made_by = made_by;
   wanted->basis.assumed = wanted->model.assumed;
+  wanted->basis.findings = wanted->model.findings.text;
   wanted->basis.frame = wanted->model.frame;
   wanted->basis.progress = supine_options_progress_step;
   wanted->basis.progress_context = &progress;

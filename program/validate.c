@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine validate: a basis, or a patient's law, against other states of the same person. */
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -176,7 +177,9 @@ static json_t *encode_state(const supine_command_state *state,
       json_pack("{s:[f, f, f], s:f}", "gravity", state->state.gravity[0], state->state.gravity[1],
                 state->state.gravity[2], "scale", outcome->scale);
   if (state->path != NULL) {
-    (void)json_object_set_new(root, "file", json_string(state->path));
+    char file[PATH_MAX] = "";
+    supine_text_add(file, sizeof file, "%s", state->path);
+    (void)json_object_set_new(root, "file", json_string(supine_text_make_utf8(file)));
   }
   if (outcome->has_millilitres) {
     (void)json_object_set_new(root, "volume_ml", json_real(outcome->millilitres));

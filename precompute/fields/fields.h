@@ -53,9 +53,10 @@ enum { SUPINE_FIT_BAND_MAX = 11 };
 
 /** What a fit is asked for. */
 typedef struct supine_fit_options {
-  bool scalar;  /**< magnitude x best direction instead of three components */
-  int band;     /**< wanted; negative: chosen */
-  size_t modes; /**< most modes; 0: the harmonics */
+  bool scalar;          /**< magnitude x best direction instead of three components */
+  int band;             /**< wanted; negative: chosen */
+  size_t modes;         /**< most modes; 0: the harmonics */
+  const char *findings; /**< what was found of the surface, a line each, for the basis; optional */
 } supine_fit_options;
 
 /** Fits, compresses, cross-validates.

@@ -9,6 +9,8 @@
 
 #include <supine/version.h>
 
+#include "sh/base/text.h"
+
 #include "program/options/command.h"
 #include "runtime/words.h"
 
@@ -79,6 +81,7 @@ void supine_options_describe(int argc, char **argv, char *text, size_t size) {
     const char *slash = strrchr(argv[i], '/');
     used += (size_t)snprintf(text + used, size - used, " %s", slash != NULL ? slash + 1 : argv[i]);
   }
+  (void)supine_text_make_utf8(text);
 }
 
 /* The number at the front of `text`; NULL where there is none, else where it ends. */

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A comparison as one HTML file that needs nothing else: what fills page/report.html. */
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include <supine/version.h>
+
+#include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
 #include "program/report/comparison_parts.h"
@@ -196,10 +199,9 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
 static json_t *facts(const supine_comparison *c) {
   const supine_extremes *e = &c->extremes;
   const char *slash = strrchr(c->path, '/');
-  json_t *file = json_string(slash != NULL ? slash + 1 : c->path);
-  if (file == NULL) { /* it is no UTF-8 */
-    file = json_string("a basis");
-  }
+  char name[PATH_MAX] = "";
+  supine_text_add(name, sizeof name, "%s", slash != NULL ? slash + 1 : c->path);
+  json_t *file = json_string(supine_text_make_utf8(name));
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A comparison for programs. */
 #include <jansson.h>
+#include <limits.h>
+
+#include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
 #include "program/report/comparison.h"
@@ -80,11 +83,14 @@ static json_t *pairs(const supine_comparison *c) {
 bool supine_report_json(const supine_comparison *c, FILE *file) {
   const supine_extremes *e = &c->extremes;
   char volume[160];
+  char file_name[PATH_MAX] = "";
+  supine_text_add(file_name, sizeof file_name, "%s", c->path);
+  (void)supine_text_make_utf8(file_name);
   supine_report_volume(c, volume, sizeof volume);
   json_t *root =
       json_pack("{s:s, s:s, s:s, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
                 "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
-                "file", c->path, "volume", volume, "displacement_from", c->reference.name,
+                "file", file_name, "volume", volume, "displacement_from", c->reference.name,
                 "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                 supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
                 "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",

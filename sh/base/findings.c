@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sh/base/findings.h"
+#include "sh/base/text.h"
 
 void supine_findings_add(supine_findings *findings, const char *format, ...) {
   const size_t used = strlen(findings->text);
@@ -20,6 +21,7 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
   for (char *c = findings->text + used; *c != '\0'; ++c) { /* a file's name may hold anything */
     *c = *c == '\n' ? ' ' : *c;
   }
+  (void)supine_text_make_utf8(findings->text + used);
   (void)strcat(findings->text, "\n");
 }
 

@@ -28,3 +28,31 @@ bool supine_text_ends_in(const char *name, const char *ending) {
 bool supine_text_ends_in_any_case(const char *name, const char *ending) {
   return strcasecmp(tail_of(name, ending), ending) == 0;
 }
+
+/* Bytes of the UTF-8 character that begins here; 0: it is none. */
+static size_t character(const unsigned char *at) {
+  const size_t size = at[0] < 0x80                     ? 1
+                      : at[0] >= 0xC2 && at[0] <= 0xDF ? 2
+                      : at[0] >= 0xE0 && at[0] <= 0xEF ? 3
+                      : at[0] >= 0xF0 && at[0] <= 0xF4 ? 4
+                                                       : 0;
+  for (size_t i = 1; i < size; ++i) {
+    if ((at[i] & 0xC0) != 0x80) {
+      return 0;
+    }
+  }
+  const bool odd = (at[0] == 0xE0 && at[1] < 0xA0) || (at[0] == 0xED && at[1] > 0x9F) ||
+                   (at[0] == 0xF0 && at[1] < 0x90) || (at[0] == 0xF4 && at[1] > 0x8F);
+  return odd ? 0 : size; /* too long, a surrogate, beyond the last character */
+}
+
+char *supine_text_make_utf8(char *text) {
+  for (char *at = text; *at != '\0';) {
+    const size_t size = character((const unsigned char *)at);
+    if (size == 0) {
+      *at = '?';
+    }
+    at += size == 0 ? 1 : size;
+  }
+  return text;
+}

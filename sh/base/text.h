@@ -14,6 +14,9 @@
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 
+/** Replaces bytes that are not UTF-8, as names of files may hold, by '?'. Returns `text`. */
+char *supine_text_make_utf8(char *text);
+
 /** Does a name end in `ending` (".csv"), with something before it? */
 bool supine_text_ends_in(const char *name, const char *ending);
 /** The same, capitals or not. */
