@@ -248,8 +248,9 @@ const supine_option supine_command_model_options[] = {
     {"box-force", 0, "X,Y,Z", "cx, cy, cz: fixed to the body; default:" SUPINE_LAWS(LAW_BOX),
      FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ"},
     {"soften", 0, "S",
-     "dependent tissue is softer: E exp(-S (h - 1/2)); default 0. It hardly tells prone from "
-     "supine: at 1 the even bands carry 0.004 % of the energy",
+     "dependent tissue is more expandable: a exp(S (h - mean)), h its height along gravity, 0 to "
+     "1; "
+     "default 0. Needs a reach",
      FILLS(model.force.soften)},
     {.help = "Direction of displacement:"},
     {"direction", 0, "WHAT",

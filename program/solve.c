@@ -20,7 +20,7 @@ typedef struct request {
   supine_orientation orientation;
   const char *path;
   supine_volume_options volume;
-  bool has_scale, has_vertex, as_scanned;
+  bool has_scale, has_vertex, as_scanned, pitcher_catcher;
   double scale;
   size_t vertex;
 } request;
@@ -38,6 +38,10 @@ static const supine_option table[] = {
      "instead of a posture: the response of every vertex to a unit force on this one (from 0), a "
      "column of the transfer matrix T, as CSV",
      SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex"},
+    {"pitcher-catcher", 0, NULL,
+     "iterates as the paper does, always from the node that holds most, prints what is still held "
+     "and how far the result is from the direct solve; slow, for small meshes. Needs --law paper",
+     SUPINE_FILLS(request, pitcher_catcher)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
@@ -149,6 +153,54 @@ static supine_status find_scale(const supine_lungs *lungs, const request *wanted
   return supine_volume_scale(solution->cubic, state + volume.ml, scale, error);
 }
 
+/* Share of the largest force that a node may still hold. */
+static const double pitcher_tolerance = 1e-6;
+
+/* Prints each doubling of the distributions a vertex. */
+static void report_held(void *context, size_t steps, double held) {
+  const size_t turns = steps / *(const size_t *)context;
+  if ((turns & (turns - 1)) == 0) {
+    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force held\n", steps, held);
+  }
+}
+
+/* Replaces the solved catch by what the paper's iteration comes to. */
+static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
+                             const double g[3], supine_solution *solution, supine_error *error) {
+  size_t n = lungs->mesh.vertex_count;
+  double range[2];
+  double apart = 0.0;
+  double *force = malloc(n * sizeof *force);
+  double *caught = malloc(n * sizeof *caught);
+  supine_status status = SUPINE_OK;
+  if (model->reach > 0.0 || model->lesions != NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--pitcher-catcher is the paper's transfer over links, without "
+                              "lesions: give --law paper and leave --reach and --lesion out");
+  } else if (force == NULL || caught == NULL ||
+             supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=
+                 SUPINE_OK) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  if (status == SUPINE_OK) {
+    const supine_gravities gravity = {1, g, range, range + 1};
+    supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
+    status =
+        supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
+                                       pitcher_tolerance, caught, NULL, report_held, &n, error);
+  }
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    apart = fmax(apart, fabs(caught[i] - solution->catch_[i]));
+    solution->catch_[i] = caught[i];
+  }
+  if (status == SUPINE_OK) {
+    (void)printf("pitcher-catcher: ends %.2g from the direct solve\n", apart);
+  }
+  free(force);
+  free(caught);
+  return status;
+}
+
 static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
                                     const double g[3], supine_error *error) {
   supine_solution solution = {0};
@@ -158,6 +210,9 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   deformed.vertices = NULL;
   rest.vertices = NULL;
   supine_status status = supine_physics_solve(lungs, &wanted->model.model, g, &solution, error);
+  if (status == SUPINE_OK && wanted->pitcher_catcher) {
+    status = iterate(lungs, &wanted->model.model, g, &solution, error);
+  }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
