@@ -121,22 +121,22 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
     goto cleanup;
   }
   status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
-  for (size_t first = 0; first < rank && status == SUPINE_OK; first += lanes) {
-    const size_t count = rank - first < lanes ? rank - first : lanes;
-    const supine_gravities gravities = {count, made->span->directions + 3 * first, range + first,
+  for (size_t done = 0; done < rank && status == SUPINE_OK; done += lanes) {
+    const size_t first = done + lanes < rank ? done : rank - lanes; /* full lanes are the fastest */
+    const supine_gravities gravities = {lanes, made->span->directions + 3 * first, range + first,
                                         range + rank + first};
     supine_solve_report report;
     if (caller->progress != NULL &&
-        !caller->progress(caller->context, (double)first / (double)rank)) {
+        !caller->progress(caller->context, (double)done / (double)rank)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
       break;
     }
     supine_physics_force(lungs, &model->force, &gravities, n, NULL, force);
-    status = supine_physics_equilibrium_solve(equilibrium, count, force, tolerance, false, caught,
+    status = supine_physics_equilibrium_solve(equilibrium, lanes, force, tolerance, false, caught,
                                               &report, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-      memcpy(made->columns + i * rank + first, caught + i * count, count * sizeof *caught);
+      memcpy(made->columns + i * rank + first, caught + i * lanes, lanes * sizeof *caught);
     }
     made->iterations = report.iterations > made->iterations ? report.iterations : made->iterations;
     made->residual = report.residual > made->residual ? report.residual : made->residual;
