@@ -121,6 +121,27 @@ try:
 except ValueError:
     pass
 
+# Observed points: a wrong one is named, a rotation is found, bad ones are refused.
+seen = list(range(0, n, n // 20))
+truth = lungs.deform(lungs.pose("left:rest+300"))
+turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
+observed = truth[seen] @ turn.T + [500, 20, -7]
+found = lungs.locate(seen, observed, "left", rigid=True, noise=1)
+xyz, sigma = found.positions(lungs)
+assert np.sqrt(((xyz - truth @ turn.T - [500, 20, -7]) ** 2).sum(1).mean()) < 2.5
+assert np.abs(found.rotation - turn).max() < 0.05 and (sigma > 0).all() and not found.outliers.any()
+assert abs(found.volume - lungs.volumes(lungs.pose("left:rest+300")).sum()) < 2 * found.volume_error
+observed = truth[seen] + np.array([12, -7, 20])
+observed[7, 2] += 60
+found = lungs.locate(seen, observed, "left", "rest+300")
+assert list(np.flatnonzero(found.outliers)) == [7] and found.volume_error == 0
+assert (found.positions(lungs)[1] <= np.maximum(3.01, 1.001 * lungs.expected_error("left", "rest+300"))).all()
+assert (lungs.expected_error("scan") == 0).all()
+refused(supine.ArgumentError, "observed points", lungs.locate, [], [])
+refused(supine.ArgumentError, "out of range", lungs.locate, [n], [(0, 0, 0)])
+refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)
+refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
+
 # The interpreter's lock is released while vertices are visited: with a switch interval that never ends
 # a waiting thread gets the lock only where a call gives it away. `repr` keeps it.
 def lets_others_run(call, *arguments, tries=None):

@@ -135,6 +135,29 @@ class Breath(ctypes.Structure):
                 ("rest_pressure", c_double), ("course", c_int)]
 
 
+class Observation(ctypes.Structure):
+    """supine_observation"""
+    _fields_ = [("vertex", c_size_t), ("position", c_double * 3), ("noise", c_double)]
+
+
+class LocateTask(ctypes.Structure):
+    """supine_locate_task"""
+    _fields_ = [("inside", c_void_p), ("count", c_size_t), ("observed", POINTER(Observation)), ("state", State),
+                ("rigid", c_bool)]
+
+
+class Location(ctypes.Structure):
+    """supine_location"""
+    _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
+                ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
+                ("log_evidence", c_double), ("outlier_count", c_size_t), ("fit", c_void_p)]
+
+
+class Residual(ctypes.Structure):
+    """supine_locate_residual"""
+    _fields_ = [("distance", c_double), ("sigma", c_double), ("outlier", c_bool)]
+
+
 def _declare(name: str, result: Any, *arguments: Any) -> Any:
     function = getattr(_c, "supine_" + name)
     function.restype, function.argtypes = result, arguments
@@ -182,6 +205,10 @@ deform_range = _declare("deform_range", None, c_void_p, GivenPose, c_size_t, c_s
 displace_range = _declare("displace_range", None, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
 deform_lit_range = _declare("deform_lit_range", c_int, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p, c_void_p)
 deform_batch = _declare("deform_batch", None, c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
+expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(State), c_void_p)
+locate_space = _declare("locate_space", c_size_t, c_size_t)
+locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(Location))
+locate_positions = _checked("locate_positions", POINTER(Location), c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
 
