@@ -154,6 +154,25 @@ void fixture_add_forms(fixture *f) {
   }
 }
 
+fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) {
+  fixture *f = fixture_create(vertices, modes, 1, 2, false, false, 1, seed);
+  memset(f->mode, 0, 4 * modes * sizeof *f->mode);
+  memset(f->coefficient, 0, vertices * modes * sizeof *f->coefficient);
+  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y */
+  for (size_t i = 0; i < vertices; ++i) {
+    const float *p = f->vertex + 3 * i;
+    const double middle = 150.3 * ((double)f->lung[i] - 0.5);
+    f->direction[3 * i] = (float)(0.2 * ((double)p[0] - middle));
+    f->direction[3 * i + 1] = 0.2F * p[1];
+    f->direction[3 * i + 2] = 0.2F * (p[2] - 131.7F);
+    f->coefficient[modes * i] = 1;
+    f->coefficient[modes * i + 1] = p[1] / 300;
+  }
+  fixture_add_forms(f);
+  return f;
+}
+
 void fixture_destroy(fixture *f) {
   free(f->vertex);
   free(f->triangle);

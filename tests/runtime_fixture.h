@@ -38,6 +38,9 @@ fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
 
+/* Two closed lungs that shrink towards their apex and, by up to a third, where gravity points. */
+fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
+
 /* Gives it the volume forms of its field, where it was made without. */
 void fixture_add_forms(fixture *f);
 

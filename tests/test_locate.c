@@ -24,30 +24,12 @@ typedef struct world {
   supine_locate_residual residuals[SEEN];
 } world;
 
-/* Two lungs that shrink towards their apex and, by a third, where gravity points. */
-static void make_field(fixture *f) {
-  memset(f->mode, 0, 2 * 4 * sizeof *f->mode);
-  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 */
-  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y */
-  for (size_t i = 0; i < f->vertices; ++i) {
-    const float *p = f->vertex + 3 * i;
-    const double middle = 150.3 * ((double)f->lung[i] - 0.5);
-    f->direction[3 * i] = (float)(0.2 * ((double)p[0] - middle));
-    f->direction[3 * i + 1] = 0.2F * p[1];
-    f->direction[3 * i + 2] = 0.2F * (p[2] - 131.7F);
-    f->coefficient[2 * i] = 1;
-    f->coefficient[2 * i + 1] = p[1] / 300;
-  }
-}
-
 static int setup(void **state) {
   static const double resting[9] = {1700 * -3.5449077018110318};
   world *w = fixture_allocate(1, sizeof *w);
-  fixture *f = fixture_create(VERTICES, 2, 1, 2, false, false, 1, 77);
+  fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
   supine_error error = {0};
   size_t size = 0;
-  make_field(f);
-  fixture_add_forms(f);
   f->resting = resting;
   w->bytes = fixture_bytes(f, &size);
   fixture_destroy(f);
