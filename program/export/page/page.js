@@ -58,7 +58,7 @@ function start() {
   let idle = null;      // when the link is written
   let panes = [];
   const marks = [];
-  let tabled = -Infinity; // ms, when the table of what is inside was written
+  let tabled = -Infinity; // ms, when the sentences and the table of what is inside were written
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -274,6 +274,16 @@ function start() {
 
   const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
 
+  let told = null; // the moment that the sentences are about, and how many vertices they tell of
+  /** Write what the moment means, of all vertices or, while it changes, of some thousand. */
+  function tellFinding(stride) {
+    if (told?.moment === state.moment && told.stride <= stride) return;
+    told = { moment: state.moment, stride };
+    const above = basis.hasVolume && Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
+    changed('breathing', state.playing, () => $('finding').setAttribute('aria-live', state.playing ? 'off' : 'polite'));
+    findingOf(basis, state.moment, state.gravity, above, stride).forEach((text, i) => write(['finding', 'finding-move'][i], text));
+  }
+
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
 
   const last = {};
@@ -357,6 +367,7 @@ function start() {
     if (moving) stale = unseen = true;
     if (!unseen) {
       if (inside && state.moment) insideTable.show(state.moment, originMoment());
+      if (state.moment) tellFinding(1);
       before = null;
       streak = 0;
       return;
@@ -374,8 +385,9 @@ function start() {
       deform();
     }
     if (state.moment) draw();
-    if (inside && state.moment && now - tabled > 250) { // not in every frame of a breath
-      insideTable.show(state.moment, originMoment());
+    if (state.moment && now - tabled > 250) { // not in every frame of a breath
+      if (inside) insideTable.show(state.moment, originMoment());
+      tellFinding(Math.ceil(basis.vertices / 3000));
       tabled = now;
     }
     asked = false;
@@ -706,7 +718,7 @@ function start() {
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio(), plates()); showState(); },
-    rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    findingOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// What a moment means, in words: what each lung gains or loses, and how far the surface moves.
+
+const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
+
+/** mL that each lung holds. */
+const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + cubicAt(lungCubic(basis, lung, weights), gains[3 * lung]));
+
+/** Each vertex' part of the surface: a third of the triangles around it. */
+function areasOf({ rest, corners, vertices }) {
+  const areas = new Float32Array(vertices);
+  for (let t = 0; t < corners.length; t += 3) {
+    const [a, b, c] = [0, 1, 2].map((i) => rest.subarray(3 * corners[t + i], 3 * corners[t + i] + 3));
+    const piece = Math.hypot(...cross([0, 1, 2].map((i) => b[i] - a[i]), [0, 1, 2].map((i) => c[i] - a[i])));
+    for (let i = 0; i < 3; ++i) areas[corners[t + i]] += piece;
+  }
+  return areas;
+}
+
+/** How far every `stride`th vertex is in one moment from where it is in another, mm: the mean over the
+ * surface, what 95 % of it do not exceed, within a 2000th of the largest, and the largest. */
+function moveBetween(basis, now, from, stride) {
+  basis.areas ??= areasOf(basis);
+  const { modes, coefficients, direction, areas } = basis;
+  const far = new Float32Array(Math.ceil(basis.vertices / stride));
+  let [sum, area, largest] = [0, 0, 0];
+  for (let at = 0, lung = 0; at < far.length; ++at) {
+    const v = at * stride;
+    while (v >= basis.lungBegin[lung + 1]) ++lung;
+    let [a, b] = [0, 0];
+    for (let k = 0; k < modes; ++k) {
+      a += now.weights[k] * coefficients[v * modes + k];
+      b += from.weights[k] * coefficients[v * modes + k];
+    }
+    let square = 0;
+    for (let axis = 0; axis < 3; ++axis) square += ((a * now.gains[3 * lung + axis] - b * from.gains[3 * lung + axis]) * direction[3 * v + axis]) ** 2;
+    far[at] = Math.sqrt(square);
+    sum += areas[v] * far[at];
+    area += areas[v];
+    largest = Math.max(largest, far[at]);
+  }
+  const bins = new Float64Array(2001);
+  far.forEach((mm, at) => { bins[Math.ceil((2000 * mm) / (largest || 1))] += areas[at * stride]; });
+  let [bin, within] = [0, bins[0]];
+  while (within < 0.95 * area && bin < 2000) within += bins[++bin];
+  return { mean: sum / area, p95: (bin / 2000) * largest, largest };
+}
+
+/** "On the left side", "Supine, 15 degrees head down," and so on. */
+function whereWords(gravity) {
+  const text = postureText(gravity);
+  const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
+  if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')},`;
+  if (name === 'left' || name === 'right') return `On the ${name} side`;
+  return `${name[0].toUpperCase()}${name.slice(1)},${tilt ? ` ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'},` : ''}`;
+}
+
+/** "the right lung gains 122 mL (+18 %)" of each lung, the largest change first. */
+function lungWords(basis, held, before) {
+  return held.map((ml, lung) => ({ name: basis.lungNames[lung], ml: Math.round(ml - before[lung]), percent: Math.round((100 * (ml - before[lung])) / before[lung]) }))
+    .sort((a, b) => Math.abs(b.ml) - Math.abs(a.ml))
+    .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
+}
+
+/** Two sentences about a moment that is `volume` ("500 mL above rest", or empty) in a posture. */
+function findingOf(basis, moment, gravity, volume, stride) {
+  const { from } = basis;
+  const { mean, p95, largest } = moveBetween(basis, moment, from, stride);
+  if (largest < 0.05) return [`This is ${from.name}, which displacements count from.`, ''];
+  const where = `${whereWords(gravity)}${volume ? `${whereWords(gravity).endsWith(',') ? '' : ','} ${volume},` : ''}`;
+  const move = `the surface moves ${mean.toFixed(1)} mm on average and ${largest.toFixed(1)} mm at most, 95 % of it within ${p95.toFixed(1)} mm, from ${from.name}.`;
+  if (!moment.held) return [`${where} ${move}`, ''];
+  basis.fromHeld ??= heldBy(basis, from);
+  return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, move.replace(/^t/, 'T')];
+}

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One question, one number: how far a nodule and the surface move is the same in `compare`, `deform`
+// and the page, from supine at rest and from what --from names; the page's sentence is true in every
+// posture. Lungs fill one gain for all (version 2) and, where the file has it, one each.
+import assert from 'node:assert/strict';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { openLungs, settled } from './browser.mjs';
+import { basis } from './lungs.mjs';
+import { evaluate, folder, randomDirections, supine } from './support.mjs';
+
+const AGREE_MM = 0.051; // half of a tenth, as the page writes, and of a thousandth
+const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 'numbers.html', 'nodules.csv', 'surface.vtp'].map((name) => join(folder, name));
+writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
+supine('embed', basis, points, '-o', inside);
+
+/** What the program says of a posture at rest: the nodule by `compare` and `deform`, the surface by
+ * `compare` (mean, largest), `deform` (largest). */
+function told(posture, from) {
+  const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json'))[0];
+  const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));
+  supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', from, '-o', moved);
+  const [columns, row] = readFileSync(moved, 'utf8').trim().split('\n').slice(-2).map((line) => line.split(','));
+  const largest = /largest displacement ([\d.]+) mm from (.*?),/.exec(supine('deform', basis, '--posture', posture, '--volume', 'rest', '--from', from, '-o', vtp));
+  return { pair: pair.mm, nodule: Number(row[columns.indexOf('mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml };
+}
+
+/** What the page shows of it. */
+async function shown(page, posture) {
+  await page.evaluate((text) => { location.hash = `posture=${text}&depth=0`; }, posture);
+  await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
+  await settled(page);
+  return page.evaluate(() => ({
+    finding: document.getElementById('finding').textContent, move: document.getElementById('finding-move').textContent,
+    nodule: Number(document.querySelector('#inside-rows td:last-child').textContent), legend: document.getElementById('legend-title').textContent, table: document.getElementById('inside-text').textContent,
+    held: window.supine.state.moment.held, lungs: window.supine.basis.lungNames,
+  }));
+}
+
+const near = (a, b, what) => assert.ok(Math.abs(a - b) <= AGREE_MM, `${what}: ${a} and ${b} mm`);
+
+for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'supine at the scan\'s volume'], ['right:rest+200', 'right side at rest + 200 mL']]) {
+  supine('export', basis, '--inside', inside, '-o', html, ...(from === 'supine:rest' ? [] : ['--from', from]));
+  const { page, complaints } = await openLungs(html);
+  for (const posture of ['prone', 'left']) {
+    const [program, seen] = [told(posture, from), await shown(page, posture)];
+    assert.equal(program.name, name);
+    assert.equal(program.reported, name);
+    assert.equal(seen.legend, `Displacement from ${name}`);
+    assert.match(seen.table, new RegExp(`Move from ${name.replace('+', '\\+')}`));
+    const [, mean, largest] = /moves ([\d.]+) mm on average and ([\d.]+) mm at most, .* from (.*)\.$/.exec(seen.move).map(Number);
+    assert.ok(seen.move.endsWith(` from ${name}.`));
+    near(seen.nodule, program.nodule, `${posture} from ${name}: the nodule on the page and by deform`);
+    if (from === 'supine:rest') near(program.pair, program.nodule, `${posture}: the nodule by compare and deform`);
+    near(mean, program.mean, `${posture} from ${name}: the mean on the page and by compare`);
+    near(largest, program.max, `${posture} from ${name}: the largest on the page and by compare`);
+    near(program.largest, program.max, `${posture} from ${name}: the largest by deform and compare`);
+    seen.lungs.forEach((lung, i) => assert.ok(Math.abs(seen.held[i] - program.held[lung.replace(' lung', '')]) < 0.01, `${lung}: ${seen.held[i]}`));
+    if (posture === 'left') assert.match(seen.finding, /^On the left side the (left|right) lung /);
+  }
+  assert.deepEqual(complaints, []);
+  await page.close();
+}
+
+/* The sentences against positions of the library, in postures and any direction. */
+supine('export', basis, '-o', html);
+const { page, complaints } = await openLungs(html);
+const directions = [[0, -1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, -1], [0, 0, 1], ...randomDirections(20, 41)].map((g) => g.map((x) => Number(x.toFixed(2))));
+const places = evaluate(basis, [[[0, 1, 0], 0], ...directions.map((g) => [g, 0])]).map(({ xyz }) => xyz);
+const { lungBegin, corners, lungs } = await page.evaluate(() => { const { basis: b } = window.supine; return { lungBegin: b.lungBegin, corners: Array.from(b.corners), lungs: b.lungNames }; });
+/** mL that a lung's triangles enclose. */
+const enclosed = (xyz, lung) => {
+  let sum = 0;
+  for (let t = 0; t < corners.length; t += 3) {
+    if (corners[t] < lungBegin[lung] || corners[t] >= lungBegin[lung + 1]) continue;
+    const [a, b, c] = [0, 1, 2].map((i) => Array.from(xyz.slice(3 * corners[t + i], 3 * corners[t + i] + 3)));
+    sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return sum / 6000;
+};
+const before = lungs.map((_, lung) => enclosed(places[0], lung));
+for (const [i, g] of directions.entries()) {
+  const { finding, move } = await page.evaluate((gravity) => {
+    const { state, postureFrom, basis: b, findingOf } = window.supine;
+    const { q } = postureFrom(gravity.join(':'));
+    state.depth = 0;
+    state.settle(q, 0, 0);
+    state.compute();
+    const [finding, move] = findingOf(b, state.moment, state.gravity, '', 1);
+    return { finding, move };
+  }, g);
+  lungs.forEach((lung, j) => {
+    const ml = enclosed(places[i + 1], j) - before[j];
+    const [, words, percent] = new RegExp(`the ${lung} (.*?) \\((\\S+) %\\)`).exec(finding);
+    assert.ok(Math.abs(Number(percent.replace('\u2212', '-')) - (100 * ml) / before[j]) < 0.6, `${finding} and not ${ml} mL`);
+    if (!words.startsWith('keeps')) assert.ok(Math.abs((words.startsWith('loses') ? -1 : 1) * parseInt(words.split(' ')[1], 10) - ml) < 1, `${finding} and not ${ml} mL`);
+  });
+  const far = Math.max(...Array.from({ length: places[0].length / 3 }, (_, v) => Math.hypot(...[0, 1, 2].map((k) => places[i + 1][3 * v + k] - places[0][3 * v + k]))));
+  assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(move)[1]) - far) < 0.1, `${move} and not ${far}`);
+}
+assert.deepEqual(complaints, []);
+await page.close();
