@@ -8,6 +8,8 @@
  * sets normals by their modes beside exact ones: at each size the made lungs' own fields, as the
  * default options make them, over and over; of a basis file, itself. */
 #include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +23,13 @@
 #include "full_solve.h"
 
 enum { MADE_VERTICES = 40000 };
-enum { ROWS_MAX = 256, BATCH = 64, BATCH_VERTICES = 50000, SOLVE_VERTICES_MAX = 2000000 };
+enum {
+  ROWS_MAX = 256,
+  PLANAR_BLOCK = 1024,
+  BATCH = 64,
+  BATCH_VERTICES = 50000,
+  SOLVE_VERTICES_MAX = 2000000
+};
 
 /* OpenBLAS's own, which cblas.h does not declare everywhere. */
 char *openblas_get_corename(void);
@@ -33,6 +41,9 @@ typedef struct peers {
   float weights[BATCH * 256];
   float *amount;
   float *product;
+  float *planar;         /* coefficients [K, N], directions [3, N], rest [3, N] */
+  int16_t *small_planar; /* the coefficients in 16 bits, a unit for all */
+  float small_unit;
   full_solve *solve;
   size_t rows;
   supine_bench_row row[ROWS_MAX];
@@ -54,6 +65,78 @@ static void run_sgemv(void *context) {
   cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m->vertices, modes, 0.7F, m->coefficients, modes,
               p->weights, 1, 0, p->amount, 1);
   displace(m->vertices, p->amount, m->direction, m->rest, p->xyz);
+}
+
+/* The same with the coefficients mode by mode, as a product by columns likes them. */
+static void run_sgemv_columns(void *context) {
+  peers *p = context;
+  const supine_bench_image *m = p->image;
+  const int n = (int)m->vertices;
+  cblas_sgemv(CblasColMajor, CblasNoTrans, n, (int)m->modes, 0.7F, p->planar, n, p->weights, 1, 0,
+              p->amount, 1);
+  displace(m->vertices, p->amount, m->direction, m->rest, p->xyz);
+}
+
+/* The best simple code: coefficients, directions, rest and result each in planes, so that the
+ * compiler takes as many vertices at a time as a vector holds; for float32 and 16 bits. */
+#define PLANAR(name, type)                                                                         \
+  static void name(size_t n, const float *restrict w, const type *restrict c,                      \
+                   const float *restrict d, const float *restrict p, float *restrict xyz) {        \
+    for (size_t i = 0; i < n; ++i) {                                                               \
+      float amount = 0;                                                                            \
+      for (size_t k = 0; k < 16; ++k) {                                                            \
+        amount += w[k] * (float)c[k * n + i];                                                      \
+      }                                                                                            \
+      for (size_t axis = 0; axis < 3; ++axis) {                                                    \
+        xyz[axis * n + i] = p[axis * n + i] + amount * d[axis * n + i];                            \
+      }                                                                                            \
+    }                                                                                              \
+  }
+PLANAR(planar_float, float)
+PLANAR(planar_small, int16_t)
+
+static void run_planar(void *context) {
+  peers *p = context;
+  const size_t n = p->image->vertices;
+  planar_float(n, p->weights, p->planar, p->planar + 16 * n, p->planar + 19 * n, p->xyz);
+}
+
+static void run_planar_small(void *context) {
+  peers *p = context;
+  const size_t n = p->image->vertices;
+  float weights[16];
+  for (size_t k = 0; k < 16; ++k) {
+    weights[k] = p->small_unit * p->weights[k];
+  }
+  planar_small(n, weights, p->small_planar, p->planar + 16 * n, p->planar + 19 * n, p->xyz);
+}
+
+/* The image's arrays in planes. */
+static bool make_planes(peers *p, const supine_bench_image *m) {
+  const size_t n = m->vertices;
+  float top = 0;
+  free(p->planar);
+  free(p->small_planar);
+  p->planar = malloc(22 * n * sizeof *p->planar);
+  p->small_planar = malloc(16 * n * sizeof *p->small_planar);
+  if (p->planar == NULL || p->small_planar == NULL) {
+    return false;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t k = 0; k < 16; ++k) {
+      p->planar[k * n + i] = m->coefficients[16 * i + k];
+      top = fmaxf(top, fabsf(m->coefficients[16 * i + k]));
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      p->planar[(16 + axis) * n + i] = m->direction[3 * i + axis];
+      p->planar[(19 + axis) * n + i] = m->rest[3 * i + axis];
+    }
+  }
+  p->small_unit = top / INT16_MAX;
+  for (size_t i = 0; i < 16 * n; ++i) {
+    p->small_planar[i] = (int16_t)lrintf(p->planar[i] / p->small_unit);
+  }
+  return true;
 }
 
 /* The plain loop again, here compiled with -march=native. */
@@ -102,7 +185,8 @@ static size_t add_peers(void *context, const supine_bench_image *image, float *x
   p->xyz = xyz;
   p->amount = calloc(image->vertices, sizeof *p->amount);
   p->product = calloc(product, sizeof *p->product);
-  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 5) {
+  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 8 ||
+      !make_planes(p, image)) {
     return 0;
   }
   for (size_t i = 0; i < sizeof p->weights / sizeof *p->weights; ++i) {
@@ -135,13 +219,28 @@ static size_t add_peers(void *context, const supine_bench_image *image, float *x
   entries[3].row.vertices = (size_t)1024 * 1024;
   entries[3].row.multiplications = 1024;
   entries[3].row.additions = 1024;
+  static const struct {
+    const char *what, *storage, *code;
+    void (*run)(void *context);
+    double bytes;
+  } planar[] = {{"sgemv_columns", "float32", "openblas", run_sgemv_columns, 64 + 4 + 4 + 36},
+                {"planar", "float32", "", run_planar, 64 + 36},
+                {"planar", "int16", "", run_planar_small, 32 + 36}};
+  for (size_t i = 0; i < 3; ++i) {
+    entries[4 + i] = (supine_bench_entry){common, 1, planar[i].run, p};
+    entries[4 + i].row.what = planar[i].what;
+    entries[4 + i].row.storage = planar[i].storage;
+    entries[4 + i].row.code = planar[i].code;
+    entries[4 + i].row.bytes_per_vertex = planar[i].bytes;
+    entries[4 + i].row.multiplications = entries[4 + i].row.additions = 19;
+  }
   if (image->vertices <= SOLVE_VERTICES_MAX) {
     p->solve = full_solve_create(image->vertices);
   }
   if (p->solve == NULL) {
-    return 4;
+    return 7;
   }
-  entries[4] = (supine_bench_entry){{.what = "sparse_solve",
+  entries[7] = (supine_bench_entry){{.what = "sparse_solve",
                                      .storage = "float64",
                                      .code = "",
                                      .vertices = full_solve_vertex_count(p->solve),
@@ -149,7 +248,7 @@ static size_t add_peers(void *context, const supine_bench_image *image, float *x
                                     1,
                                     full_solve_run,
                                     p->solve};
-  return 5;
+  return 8;
 }
 
 static void report(void *context, const supine_bench_row *row) {
@@ -193,6 +292,10 @@ static void print(const peers *p, size_t from) {
            own / find(p, from, "supine", storages[i], 2),
            find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2),
            traffic / find(p, from, "traffic", storages[i], 2));
+    printf("          sgemv by columns %.2f  planar float32 %.2f  planar int16 "
+           "%.2f\n",
+           find(p, from, "sgemv_columns", "", 1) / own, find(p, from, "planar", "float32", 1) / own,
+           find(p, from, "planar", "int16", 1) / own);
   }
   const double solve = find(p, from, "sparse_solve", "", 1);
   if (solve > 0) {
@@ -421,6 +524,8 @@ int main(int argc, char **argv) {
   }
   free(p->amount);
   free(p->product);
+  free(p->planar);
+  free(p->small_planar);
   full_solve_destroy(p->solve);
   free(p);
   return code != 0 ? code : run_modes(1000000);
