@@ -205,6 +205,10 @@ supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error
 /** Releases; what was not committed is gone. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
 
+/** Name a unit of length: "mm", "cm", "m", "um", "in" or, of any other, "2.5 mm".
+ * @param text  [24], written */
+void supine_mesh_unit_name(double millimetres, char *text);
+
 /** The formats that supine_mesh_save writes, by their endings; each is supine_mesh_save_NAME in
  * mesh/io. This is the only list of them. */
 #define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)

@@ -138,14 +138,14 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  if (supine_command_deform_content_wanted(&wanted->content)) {
-    result = supine_command_deform_content(&wanted->content, name, basis, &pose, &reference,
-                                           wanted->from.given, &expected);
-    goto cleanup;
-  }
   (void)snprintf(comment, sizeof comment, "displacement from %s", reference.name);
   supine_mesh_save_options save = {.rest = from.vertices, .comment = comment};
   result = supine_options_basis_frame(basis, name, wanted->as_scanned, &save);
+  if (result == SUPINE_EXIT_OK && supine_command_deform_content_wanted(&wanted->content)) {
+    result = supine_command_deform_content(&wanted->content, name, basis, &pose, &reference,
+                                           wanted->from.given, &expected, &save);
+    goto cleanup;
+  }
   if (result != SUPINE_EXIT_OK) {
     goto cleanup;
   }

@@ -64,10 +64,23 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
          is_csv(wanted->path);
 }
 
+/* A vector, mm, LPS, in other axes and another unit. */
+static void in_frame(supine_axes axes, double unit, const double lps[3], double out[3]) {
+  double matrix[3][3];
+  supine_mesh_axes_matrix(axes, matrix);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = (matrix[0][i] * lps[0] + matrix[1][i] * lps[1] + matrix[2][i] * lps[2]) / unit;
+  }
+}
+
 /* name, lung, x, y, z and where that is now. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_pose *pose, const supine_reference_pose *from,
-                                  const supine_expected *expected, supine_error *error) {
+                                  const supine_expected *expected,
+                                  const supine_mesh_save_options *frame, supine_error *error) {
+  const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
+  char axes[4];
+  char unit_name[24];
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
   supine_command_names names;
@@ -86,21 +99,27 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     supine_deform(basis, pose, xyz);
     supine_deform(basis, &from->pose, before);
+    supine_mesh_unit_name(unit, unit_name);
+    supine_mesh_axes_letters(frame->axes, axes);
     (void)fprintf(output.file,
-                  "# x,y,z: position, mm, LPS; dx,dy,dz,mm: displacement from %s%s\n"
+                  "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; mm: its length%s\n"
                   "name,lung,x,y,z,dx,dy,dz,mm%s\n",
-                  from->name,
+                  from->name, axes, unit_name,
                   expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
                   expected->sigma == NULL ? "" : ",expected_error_mm");
     for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
-      const double d[3] = {(double)p[0] - (double)q[0], (double)p[1] - (double)q[1],
-                           (double)p[2] - (double)q[2]};
+      const double to[3] = {(double)p[0], (double)p[1], (double)p[2]};
+      const double d[3] = {to[0] - (double)q[0], to[1] - (double)q[1], to[2] - (double)q[2]};
+      double there[3];
+      double moved[3];
+      in_frame(frame->axes, unit, to, there);
+      in_frame(frame->axes, unit, d, moved);
       (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f",
                     names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
-                    (double)p[0], (double)p[1], (double)p[2], d[0], d[1], d[2], supine_length(d));
+                    there[0], there[1], there[2], moved[0], moved[1], moved[2], supine_length(d));
       if (expected->sigma != NULL) {
         (void)fprintf(output.file, ",%.3f", (double)expected->sigma[at]);
       }
@@ -245,14 +264,15 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
                                   const supine_reference_pose *from, bool other,
-                                  const supine_expected *expected) {
+                                  const supine_expected *expected,
+                                  const supine_mesh_save_options *frame) {
   supine_error error;
   supine_status status = SUPINE_OK;
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
     status = move_grid(wanted, basis, pose, from, other, &error);
   }
   if (status == SUPINE_OK && wanted->path != NULL && is_csv(wanted->path)) {
-    status = write_points(wanted->path, basis, pose, from, expected, &error);
+    status = write_points(wanted->path, basis, pose, from, expected, frame, &error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(expected, stdout);
     }

@@ -5,6 +5,8 @@
 
 #include <supine/runtime.h>
 
+#include "mesh/mesh.h"
+
 #include "program/options/expected.h"
 #include "program/options/state.h"
 
@@ -27,10 +29,12 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 /* Writes what is wanted, and says what it wrote; an exit code.
  * @param from      what displacements count from, and the state that images are in
  * @param other     that is not the scan
- * @param expected  errors, for CSV */
+ * @param expected  errors, for CSV
+ * @param frame     axes and unit of CSV */
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
                                   const supine_reference_pose *from, bool other,
-                                  const supine_expected *expected);
+                                  const supine_expected *expected,
+                                  const supine_mesh_save_options *frame);
 
 #endif

@@ -496,12 +496,10 @@ static void test_precompute_open_surface_has_no_volume(void **state) {
   assert_true(report.accuracy.relative_rms > 0.0);
   assert_close(report.accuracy.volume, 0.0, 0.0);
   supine_basis *basis = open_basis();
-  double weights[SUPINE_MODES_MAX];
-  double scale;
-  const double g[3] = {0.0, 1.0, 0.0};
+  const supine_state state_of = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_SCAN, 10.0}};
+  supine_pose pose;
   assert_false(supine_basis_get_info(basis)->has_volume);
-  assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
-  assert_int_equal(posed_scale(basis, weights, 10.0, &scale, NULL), SUPINE_ERROR_OPEN_SURFACE);
+  assert_int_equal(supine_basis_pose(basis, &state_of, &pose, NULL), SUPINE_ERROR_OPEN_SURFACE);
   supine_basis_close(basis);
   supine_lungs_free(&lungs);
   supine_mesh_free(&lump);

@@ -136,10 +136,12 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
                                      "--posture upright --tilt -90"};
   static char first[1 << 20];
   static char other[1 << 20];
-  EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl", ways[0]);
+  EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl",
+         ways[0]);
   const size_t length = read_file("way.stl", first, sizeof first);
   for (size_t i = 1; i < sizeof ways / sizeof *ways; ++i) {
-    EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl", ways[i]);
+    EXPECT(0, "from the scan, 2820.00 mL (-3180.00 mL)", "deform lungs.safetensors %s -o way.stl",
+           ways[i]);
     assert_int_equal(read_file("way.stl", other, sizeof other), length);
     size_t differing = 0;
     for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
@@ -166,7 +168,8 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(1, "has left and right",
          "deform lungs.safetensors --posture left --volume middle=rest,right=rest -o b.ply");
   EXPECT(1, "rest+500", "deform lungs.safetensors --posture left --volume 500 -o b.ply");
-  EXPECT(1, "not both", "deform lungs.safetensors --posture left --volume scan+3 --scale 4 -o b.ply");
+  EXPECT(1, "not both",
+         "deform lungs.safetensors --posture left --volume scan+3 --scale 4 -o b.ply");
   EXPECT(5, "lungs hold 10 to 120 %",
          "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "lungs hold 10 to 120 %",
@@ -241,14 +244,19 @@ static double positions_apart(const char *first, const char *second) {
 /* A scan's own state and frame come back. */
 static void test_scanned_state_and_frame_come_back(void **state) {
   (void)state;
-  EXPECT(0, "-2000.00 mL", "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
+  EXPECT(0, "-2000.00 mL",
+         "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "2000 mL below full (6000 mL)",
          "precompute low.ply --scanned supine:-2000 --band 7 -o low.safetensors");
   EXPECT(0, "scan 2000 mL below full", "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
   EXPECT(0, "assumed: RAS axes (as told), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
-  EXPECT(0, "ras.ply", "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
+  EXPECT(0, "ras.ply",
+         "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
+  char head[256] = "";
+  (void)read_file("ras.ply", head, sizeof head - 1);
+  assert_non_null(strstr(head, "SPACE=RAS cm\n"));
   /* That put the left lung first; from here on the order stays. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",

@@ -22,6 +22,7 @@ typedef struct mesh_writer {
   bool mirrored;           /**< left-handed axes: triangles are written in the other sense */
   double quantum;          /**< of lengths in the file's units, a power of two; 0: exact */
   char space[4];           /**< "LPS", "RAS", ... */
+  char unit[24];           /**< of lengths: "mm", "cm", ... */
   char comment[256];       /**< one printable line, "" where there is none */
 } mesh_writer;
 

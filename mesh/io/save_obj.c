@@ -4,7 +4,7 @@
 
 supine_status supine_mesh_save_obj(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
-  (void)fprintf(writer->out, "# SPACE=%s mm\n", writer->space);
+  (void)fprintf(writer->out, "# SPACE=%s %s\n", writer->space, writer->unit);
   if (writer->comment[0] != '\0') {
     (void)fprintf(writer->out, "# %s\n", writer->comment);
   }

@@ -4,8 +4,8 @@
 
 supine_status supine_mesh_save_ply(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
-  (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s mm\n",
-                writer->space);
+  (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s %s\n",
+                writer->space, writer->unit);
   if (writer->comment[0] != '\0') {
     (void)fprintf(writer->out, "comment %s\n", writer->comment);
   }

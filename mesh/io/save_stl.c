@@ -33,7 +33,7 @@ supine_status supine_mesh_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   /* The header must not begin with "solid", by which readers know STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
-  (void)snprintf(text, sizeof text, "SPACE=%s mm %s", writer->space, writer->comment);
+  (void)snprintf(text, sizeof text, "SPACE=%s %s %s", writer->space, writer->unit, writer->comment);
   unsigned char header[HEADER + 4] = {0};
   memcpy(header, text, strnlen(text, HEADER));
   unsigned char *at = header + HEADER;

@@ -26,7 +26,7 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
 /* 3D Slicer looks for the axes in the array SPACE; a reader of text, in the comment. "--" may not
  * stand in an XML comment. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
-  (void)fprintf(out, "<!-- SPACE=%s mm ", writer->space);
+  (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
     (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* may be cut in a letter */
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
@@ -60,8 +60,7 @@ static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE 
 static void write_field_data(const vtp *file, FILE *out) {
   const mesh_writer *writer = &file->writer;
   char units[64];
-  const double unit = fabs(1.0 / writer->factor[2]);
-  (void)snprintf(units, sizeof units, unit == 1.0 ? "mm, mL, s" : "%g mm, mL, s", unit);
+  (void)snprintf(units, sizeof units, "%s, mL, s", writer->unit);
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
