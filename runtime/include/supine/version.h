@@ -12,8 +12,8 @@ extern "C" {
 #endif
 
 /** @{ Of these headers. */
-#define SUPINE_VERSION "0.2.0"
-#define SUPINE_VERSION_NUMBER 200 /**< 10000 major + 100 minor + patch */
+#define SUPINE_VERSION "0.3.0"
+#define SUPINE_VERSION_NUMBER 300 /**< 10000 major + 100 minor + patch */
 /** @} */
 
 /** Of the library that is linked or loaded, as SUPINE_VERSION; never NULL. */
