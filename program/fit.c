@@ -6,16 +6,17 @@
 
 #include "sh/base/text.h"
 
+#include "precompute/inside/surface.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/patient/gain.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
 #include "program/options/command.h"
-#include "program/options/posture_list.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "fit";
 
+/* Two scans of the person, or landmarks in them, and how each was taken. */
 typedef struct request {
   const char *path, *landmarks, *name;
   bool reverse, translation, rigid, has_law, has_midline, has_gain, expandability, json;
@@ -23,48 +24,54 @@ typedef struct request {
   double midline, gain, reach;
   supine_mesh_load_options load;
 
-  supine_patient_scan rest, state;
+  supine_state rest, state;
   size_t count; /* of further states, or of all where no other was named */
-  supine_patient_scan further[SUPINE_PATIENT_OTHERS_MAX];
+  supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
   const char *rest_path, *state_path; /* surfaces; NULL: none */
 } request;
 
-/* "supine", "prone:rest", "supine+15:-3000" */
-static int read_scan(const char *command, const char *text, void *field) {
-  supine_patient_scan *scan = field;
-  const char *colon = strchr(text, ':');
-  const size_t length = colon != NULL ? (size_t)(colon - text) : strlen(text);
-  supine_posture_list list;
-  double litres;
-  if (length >= sizeof scan->posture ||
-      (colon != NULL && strcmp(colon + 1, "full") != 0 && strcmp(colon + 1, "rest") != 0 &&
-       !supine_options_parse_number(colon + 1, &litres)) ||
-      (colon != NULL && strlen(colon + 1) >= sizeof scan->volume)) {
-    return SUPINE_OPTION_MISFIT;
+/* What is known of the person. */
+typedef struct evidence {
+  supine_lungs lungs[2]; /* at the fuller state, at the emptier one */
+  supine_patient_pairs pairs;
+  bool swapped; /* the state named second is the fuller one */
+} evidence;
+
+static void begin(void *chosen) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  request *wanted = chosen;
+  memcpy(wanted->rest.gravity, supine, sizeof supine);
+  wanted->rest.volume.kind = SUPINE_VOLUME_REST;
+  memcpy(wanted->state.gravity, supine, sizeof supine);
+}
+
+/* "supine", "prone:rest", "supine:rest+500", "2600mL" */
+static int read_state(const char *command, const char *text, void *field) {
+  supine_state *state = field;
+  supine_error error;
+  if (supine_state_parse(text, state, &error) != SUPINE_OK) {
+    return supine_options_usage(command, "%s", error.message);
   }
-  (void)snprintf(scan->posture, sizeof scan->posture, "%.*s", (int)length, text);
-  (void)snprintf(scan->volume, sizeof scan->volume, "%s", colon != NULL ? colon + 1 : "");
-  const int result = supine_options_posture_list_parse(command, scan->posture, &list);
-  if (result != SUPINE_EXIT_OK || list.count != 1) {
-    return result != SUPINE_EXIT_OK ? result : SUPINE_OPTION_MISFIT;
-  }
-  memcpy(scan->gravity, list.item[0].gravity, sizeof scan->gravity);
-  return SUPINE_EXIT_OK;
+  return state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0
+             ? supine_options_usage(command, "'%s': rest, full or a volume of both lungs in mL",
+                                    text)
+             : SUPINE_EXIT_OK;
 }
 
 /* "prone:PAIRS.csv", "prone:rest:PRONE.ply", into the whole request. */
-static int read_state(const char *command, const char *text, void *field) {
+static int read_further(const char *command, const char *text, void *field) {
   request *wanted = field;
   const char *colon = strrchr(text, ':');
-  char posture[2 * SUPINE_PATIENT_TEXT];
+  char state[SUPINE_PATIENT_STATE_TEXT];
   if (wanted->count == SUPINE_PATIENT_OTHERS_MAX || colon == NULL || colon[1] == '\0' ||
-      (size_t)(colon - text) >= sizeof posture) {
+      (size_t)(colon - text) >= sizeof state) {
     return SUPINE_OPTION_MISFIT;
   }
-  (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
+  (void)snprintf(state, sizeof state, "%.*s", (int)(colon - text), text);
   wanted->further_path[wanted->count] = colon + 1;
-  return read_scan(command, posture, &wanted->further[wanted->count++]);
+  wanted->further[wanted->count].gravity[1] = 1.0;
+  return read_state(command, state, &wanted->further[wanted->count++]);
 }
 
 static bool is_landmarks(const char *path) {
@@ -82,32 +89,34 @@ static const supine_option table[] = {
      "1)",
      FILLS(landmarks), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "rest is the other one of the two", FILLS(reverse)},
-    {"rest", 0, "POSTURE[:VOLUME]",
-     "how the person lay at rest, and how full the lungs were: full, rest or mL", FILLS(rest),
-     .read = read_scan, .standard = "supine",
-     .wants = "a posture, and :full, :rest or :ML after it"},
-    {"other", 0, "POSTURE[:VOLUME]", "the same of the other state", FILLS(state), .read = read_scan,
-     .standard = "supine", .wants = "a posture, and :full, :rest or :ML after it"},
+    {"rest", 0, "STATE",
+     "how the person lay in the first scan, and how full the lungs were: POSTURE, VOLUME or "
+     "POSTURE:VOLUME, with VOLUME rest, full, either with +ML or -ML, or what a CT shows, 2600mL",
+     FILLS(rest), .read = read_state, .standard = "supine:rest"},
+    {"other", 0, "STATE",
+     "the same of the other state; without a volume the surfaces tell. Which of the two is the "
+     "fuller one does not matter: the law counts from it",
+     FILLS(state), .read = read_state, .standard = "supine"},
     {"translation", 0, NULL,
      "the scans' frames may be shifted against each other: finds the shift as well",
      FILLS(translation), .rivals = "motion"},
     {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
     {"law", 0, "LAW",
-     "paper: c1 to c6 and the force of the published law; affine: one affine map; quadratic: one "
-     "of second degree for each lung. Default: what leaves least of points that it has not seen",
+     "deep (default): the deep law, its size fitted; paper: the published law, c1 to c9 fitted. "
+     "What either leaves of this person is carried by kriging",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
     {"name", 0, "TEXT", "whose lungs these are; default: the landmarks' file", FILLS(name)},
     {"gain", 0, "G",
      "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
      "stays with the body; default 0.4, the 'deep' law's",
      FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
-    {"state", 0, "POSTURE[:VOLUME]:FILE",
-     "a further state from the same rest, its surface or its landmarks (.csv); may be repeated, up "
-     "to 8. In another posture than the fitted state it tells the gain, in the same one how far "
-     "that breath went; the law's other constants are the fitted state's. Without another state "
-     "to fit to, the first is that",
-     .read = read_state, .alias = "third",
-     .wants = "(at most 8) a posture, perhaps :full, :rest or :ML, a colon and a file"},
+    {"state", 0, "STATE:FILE",
+     "a further state, its surface or its landmarks from the first scan (.csv); may be repeated, "
+     "up to 8. In another posture than the fitted states it tells the gain, in the same one how "
+     "far that breath went; the law's other constants are those of the two states. Without "
+     "another state to fit to, the first is that",
+     .read = read_further, .alias = "third",
+     .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
     {.table = supine_options_surface_frame, FILLS(load)},
@@ -115,9 +124,9 @@ static const supine_option table[] = {
      "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
      .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {"expandability", 0, NULL,
-     "of surfaces: finds how expandable which parts are, as well, under the 'deep' law's force, in "
-     "regions some 45 mm apart, and says which it cannot see; kept where blocks that it has not "
-     "seen come nearer",
+     "of surfaces: finds how expandable which parts are, under the 'deep' law's force, in regions "
+     "some 45 mm apart, in place of kriging and with the paper's law, and says which it cannot see; "
+     "kept where held-out blocks come nearer",
      FILLS(expandability)},
     {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -129,16 +138,22 @@ static void print_row(const char *what, double fitted, double held_out, const ch
   (void)printf("  %-24s %7.2f   %7.2f%s\n", what, fitted, held_out, after);
 }
 
-static void print_scores(const supine_patient_fit_report *report, supine_patient_law kept) {
-  static const char *const laws[] = {"law paper, (15)-(18)", "law affine", "law quadratic"};
+static void print_scores(const supine_patient_fit_report *report, supine_patient_law law,
+                         bool corrected) {
+  char text[64];
   (void)printf("what is left of the displacement, mm RMS:\n"
                "                             fitted  held out\n");
   print_row("nothing moved", report->fitted.none, report->held_out.none, "");
   print_row("translation", report->fitted.translation, report->held_out.translation, "");
-  print_row("affine, each lung", report->fitted.affine_lungs, report->held_out.affine_lungs, "");
-  for (int k = 0; k < SUPINE_PATIENT_LAW_COUNT; ++k) {
-    print_row(laws[k], report->fitted.law[k], report->held_out.law[k],
-              k == (int)kept ? "   <- kept" : "");
+  print_row("affine map", report->fitted.affine, report->held_out.affine, "");
+  (void)snprintf(text, sizeof text, "law %s", supine_patient_law_names[law]);
+  print_row(text, report->fitted.law, report->held_out.law, "");
+  if (corrected) {
+    (void)snprintf(text, sizeof text, "law %s + kriging", supine_patient_law_names[law]);
+    print_row(text, report->fitted.corrected, report->held_out.corrected, "   <- kept");
+    (void)printf("expected of held-out points %.2f mm RMS; %.0f %% of them lie within the 95 %% "
+                 "band\n",
+                 report->expected, 100.0 * report->band);
   }
   (void)printf("held out: %d folds of 40 mm blocks that the fit had not seen, %d times over\n",
                SUPINE_PATIENT_FOLDS, SUPINE_PATIENT_SEEDS);
@@ -160,12 +175,15 @@ static void print_paper_law(const supine_patient *patient,
                report->starts_agreeing, SUPINE_PATIENT_STARTS, report->start_apart);
 }
 
-static void print_surface(const supine_patient_surface_report *surface, bool landmarks) {
-  (void)printf("surface: %zu vertices, %.0f %% of them matched; to the other surface, along its "
-               "normals,\n  %.2f mm RMS at rest, %.2f mm in the end; six starts end within %.2g mm "
-               "of each other\n",
-               surface->vertices, 100.0 * surface->matched, surface->before, surface->after,
-               surface->point_apart);
+static void print_surface(const supine_patient_surface_report *surface, supine_patient_law law,
+                          bool landmarks) {
+  (void)printf("surface: %zu vertices, %.0f %% of them matched; to the emptier surface, along its "
+               "normals,\n  %.2f mm RMS before, %.2f mm in the end",
+               surface->vertices, 100.0 * surface->matched, surface->before, surface->after);
+  if (law == SUPINE_PATIENT_PAPER) {
+    (void)printf("; six starts end within %.2g mm of each other", surface->point_apart);
+  }
+  (void)putchar('\n');
   if (!landmarks) {
     (void)puts("a small distance between surfaces does not prove the motion of what is in them:\n"
                "  surfaces 5 mm apart have had points 14 mm off. Landmarks tell: --landmarks");
@@ -245,10 +263,16 @@ static void print_applied(const supine_patient_surface_fit *found) {
 static void print_gain(const supine_patient_record *record, bool given) {
   for (size_t k = 0; k < record->told_count; ++k) {
     const supine_patient_told *told = &record->told[k];
-    (void)printf("%s: breath scale %.2f, leaves %.1f mm RMS, %.1f were no force to turn\n",
-                 told->posture, told->scale, told->left, told->left_without);
+    char text[SUPINE_PATIENT_STATE_TEXT];
+    (void)supine_state_describe(&told->state, text, sizeof text);
+    (void)printf("%s: breath scale %.2f, leaves %.1f mm RMS, %.1f were no force to turn\n", text,
+                 told->scale, told->left, told->left_without);
   }
-  if (record->gain_told) {
+  if (record->gain_open) {
+    (void)printf("gain not determined: the states in other postures do not tell what turns with\n"
+                 "gravity; %.2g is the deep law's\n",
+                 record->force.gain);
+  } else if (record->gain_told) {
     (void)printf("gain %.2f +- %.2f turns with gravity, by the states in other postures\n",
                  record->force.gain, record->gain_error);
   } else if (!given) {
@@ -258,32 +282,42 @@ static void print_gain(const supine_patient_record *record, bool given) {
   }
 }
 
+static void print_states(const supine_patient_record *record) {
+  static const char *const which[2] = {"fuller state", "emptier state"};
+  for (size_t k = 0; k < 2; ++k) {
+    char text[SUPINE_PATIENT_STATE_TEXT];
+    (void)supine_state_describe(&record->state[k], text, sizeof text);
+    (void)printf("%s: %s", which[k], text);
+    if (record->volume[k] > 0.0) {
+      (void)printf(", %.0f mL", record->volume[k]);
+    }
+    (void)putchar('\n');
+  }
+}
+
 static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
                        const request *wanted) {
   const supine_patient *patient = &record->patient;
   const bool moved = wanted->translation || wanted->rigid;
+  print_states(record);
   (void)printf("%zu %s in %zu blocks of 40 mm\n", report->count,
                report->components == 3 ? "landmarks" : "measurements", report->blocks);
-  print_scores(report, patient->law);
+  print_scores(report, patient->law, patient->correction.count > 0);
   if (moved) {
     const double *t = patient->motion;
-    (void)printf("motion between the scans, as the paper's law has it: %.1f,%.1f,%.1f mm", t[0],
-                 t[1], t[2]);
+    (void)printf("motion between the scans: %.1f,%.1f,%.1f mm", t[0], t[1], t[2]);
     if (wanted->rigid) {
       (void)printf(", turned by %.1f degrees",
                    sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5]) * 57.29577951308232);
     }
     (void)putchar('\n');
   }
-  print_paper_law(patient, report);
-  (void)printf("kept: %s, which explains %.0f %% of the squared displacement%s held out (%.0f %% "
-               "fitted)\n",
-               supine_patient_law_names[patient->law], 100.0 * report->explained,
-               moved ? " about the motion between the scans" : "",
+  if (patient->law == SUPINE_PATIENT_PAPER) {
+    print_paper_law(patient, report);
+  }
+  (void)printf("it explains %.0f %% of the squared displacement%s held out (%.0f %% fitted)\n",
+               100.0 * report->explained, moved ? " about the motion between the scans" : "",
                100.0 * report->explained_fitted);
-  (void)printf("the paper's constants were accurate to 1 %%, its validation to 2 mm: here %.1f mm "
-               "are left\n",
-               record->held_out);
 }
 
 /* "left.ply,right.ply" as one model. */
@@ -321,36 +355,122 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
   return status;
 }
 
-static supine_status fit_surfaces(const request *wanted, const supine_patient_pairs *pairs,
+/* --- the evidence ---------------------------------------------------------------------------- */
+
+static void evidence_free(evidence *of) {
+  supine_lungs_free(&of->lungs[0]);
+  supine_lungs_free(&of->lungs[1]);
+  supine_patient_pairs_free(&of->pairs);
+}
+
+/* mL; 0: the surface is not there or not closed. */
+static double volume_of(const supine_lungs *lungs) {
+  return lungs->mesh.vertex_count > 0 && lungs->topology.closed
+             ? 1e-3 * supine_mesh_volume(&lungs->mesh)
+             : 0.0;
+}
+
+/* Which lung each landmark lies in, by the surface of its scan. */
+static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
+                                supine_error *error) {
+  supine_inside_surface *tree = NULL;
+  pairs->side = malloc(pairs->count * sizeof *pairs->side);
+  supine_status status =
+      pairs->side == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
+                             pairs->count)
+          : supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                         lungs->mesh.triangles, &tree, error);
+  for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
+    const supine_inside_place place = supine_inside_surface_find(tree, pairs->from + 3 * i, NULL);
+    const size_t lung =
+        lungs->lung_count == 2 && place.triangle >= lungs->triangle_begin[1] ? 1 : 0;
+    pairs->side[i] = lungs->side[lung];
+  }
+  supine_inside_surface_destroy(tree);
+  return status;
+}
+
+static supine_status load_evidence(const request *wanted, evidence *of, supine_error *error) {
+  const bool moved = wanted->translation || wanted->rigid;
+  supine_status status = SUPINE_OK;
+  if (wanted->landmarks != NULL) {
+    status = supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &of->pairs, error);
+    if (status == SUPINE_OK) {
+      status = supine_patient_pairs_check(&of->pairs, moved, error);
+    }
+  }
+  if (status == SUPINE_OK && wanted->rest_path != NULL) {
+    status = load_lungs(wanted, wanted->rest_path, &of->lungs[0], error);
+  }
+  if (status == SUPINE_OK && wanted->state_path != NULL) {
+    status = load_lungs(wanted, wanted->state_path, &of->lungs[1], error);
+  }
+  if (status == SUPINE_OK && wanted->rest_path != NULL && of->pairs.count > 0) {
+    status = find_sides(&of->lungs[0], &of->pairs, error);
+  }
+  return status;
+}
+
+/* +1 where the second state was named the fuller one, -1 the emptier one, 0 neither. */
+static int named_order(const supine_state *first, const supine_state *second) {
+  const supine_volume *a = &first->volume;
+  const supine_volume *b = &second->volume;
+  if (a->kind == b->kind && a->kind != SUPINE_VOLUME_DEFAULT) {
+    const bool same = a->kind != SUPINE_VOLUME_REST ||
+                      memcmp(first->gravity, second->gravity, sizeof first->gravity) == 0;
+    return !same || a->ml == b->ml ? 0 : b->ml > a->ml ? 1 : -1;
+  }
+  return a->kind == SUPINE_VOLUME_REST && b->kind == SUPINE_VOLUME_FULL   ? 1
+         : a->kind == SUPINE_VOLUME_FULL && b->kind == SUPINE_VOLUME_REST ? -1
+                                                                          : 0;
+}
+
+/* Count from the fuller of the two states, by the surfaces' volumes or the landmarks' spread. */
+static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
+  static const double doubt = 0.02; /* of a volume: less than that may be how surfaces were cut */
+  const double volume[2] = {volume_of(&of->lungs[0]), volume_of(&of->lungs[1])};
+  const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
+                        : of->pairs.count > 0              ? supine_patient_pairs_growth(&of->pairs)
+                                                           : 1.0;
+  const int named = named_order(&wanted->rest, &wanted->state);
+  if ((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt)) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the state that was named the fuller one holds %.0f %% of the other: "
+                            "are --rest and --other the wrong way round, or --reverse missing?",
+                            100.0 * (named > 0 ? growth : 1.0 / growth));
+  }
+  of->swapped = named > 0 || (named == 0 && growth > 1.0);
+  if (of->swapped) {
+    const supine_lungs lungs = of->lungs[0];
+    of->lungs[0] = of->lungs[1];
+    of->lungs[1] = lungs;
+    supine_patient_pairs_swap(&of->pairs);
+  }
+  return SUPINE_OK;
+}
+
+/* --- the fit --------------------------------------------------------------------------------- */
+
+static supine_status fit_surfaces(const request *wanted, const evidence *of,
                                   const supine_patient_fit_options *options,
                                   supine_patient_surface_fit *found, supine_error *error) {
-  supine_lungs rest = {0};
-  supine_lungs state = {0};
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
-  model.force = supine_physics_model(SUPINE_LAW_DEEP).force; /* held where tissue is to be found */
-  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain;
-  supine_status status = load_lungs(wanted, wanted->rest_path, &rest, error);
-  if (status == SUPINE_OK) {
-    status = load_lungs(wanted, wanted->state_path, &state, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_patient_surface_task task = {.rest = &rest,
-                                        .state = &state.mesh,
-                                        .model = &model,
-                                        .landmarks = pairs,
-                                        .options = *options,
-                                        .expandability = wanted->expandability,
-                                        .progress = supine_options_progress_step,
-                                        .progress_context = &progress};
-    memcpy(task.gravity, wanted->state.gravity, sizeof task.gravity);
-    supine_options_signals_catch(true);
-    status = supine_patient_fit_surface(&task, found, error);
-    supine_options_progress_end(&progress);
-  }
-  supine_lungs_free(&rest);
-  supine_lungs_free(&state);
+  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain; /* held for expandability */
+  supine_patient_surface_task task = {.rest = &of->lungs[0],
+                                      .state = &of->lungs[1].mesh,
+                                      .model = &model,
+                                      .landmarks = of->pairs.count > 0 ? &of->pairs : NULL,
+                                      .options = *options,
+                                      .expandability = wanted->expandability,
+                                      .progress = supine_options_progress_step,
+                                      .progress_context = &progress};
+  memcpy(task.gravity, options->gravity, sizeof task.gravity);
+  supine_options_signals_catch(true);
+  const supine_status status = supine_patient_fit_surface(&task, found, error);
+  supine_options_progress_end(&progress);
   return status;
 }
 
@@ -365,82 +485,131 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
                             pairs->count);
   }
   supine_patient_rows_of_pairs(&frame, pairs, rows);
-  const supine_status status = supine_patient_fit(&frame, rows, pairs->count, 3, options,
+  const supine_status status = supine_patient_fit(&frame, rows, 0, pairs->count, options,
                                                   &found->patient, &found->report, error);
   free(rows);
   return status;
 }
 
+/* --- further states -------------------------------------------------------------------------- */
+
 /* Further states: what of the force turns. */
 typedef struct further_work {
   supine_patient_pairs pairs[SUPINE_PATIENT_OTHERS_MAX];
-  supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX], rest;
+  supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX];
   supine_patient_other other[SUPINE_PATIENT_OTHERS_MAX];
 } further_work;
 
-static supine_status load_further(const request *wanted, bool moved, further_work *work,
+/* Landmarks of further states start in the first scan: taken to the fuller state where that is the
+ * emptier one. */
+static supine_status load_further(const request *wanted, const evidence *of,
+                                  const supine_patient_record *record, further_work *work,
                                   supine_error *error) {
+  const bool moved = wanted->translation || wanted->rigid;
   supine_status status = SUPINE_OK;
   for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
     const char *path = wanted->further_path[k];
+    supine_patient_pairs *pairs = &work->pairs[k];
     memcpy(work->other[k].gravity, wanted->further[k].gravity, sizeof work->other[k].gravity);
-    if (is_landmarks(path)) {
-      status = supine_patient_pairs_load(path, wanted->reverse, &work->pairs[k], error);
-      if (status == SUPINE_OK) {
-        status = supine_patient_pairs_check(&work->pairs[k], moved, error);
-      }
-      work->other[k].pairs = &work->pairs[k];
-      continue;
-    }
-    if (work->rest.mesh.vertex_count == 0) {
-      status = load_lungs(wanted, wanted->rest_path, &work->rest, error);
-    }
-    if (status == SUPINE_OK) {
+    if (!is_landmarks(path)) {
       status = load_lungs(wanted, path, &work->lungs[k], error);
       work->other[k].surface = &work->lungs[k].mesh;
+      continue;
     }
+    status = supine_patient_pairs_load(path, wanted->reverse, pairs, error);
+    if (status == SUPINE_OK) {
+      status = supine_patient_pairs_check(pairs, moved, error);
+    }
+    if (status == SUPINE_OK && of->swapped) {
+      supine_patient_refer(&record->patient, pairs->count, pairs->from);
+    }
+    work->other[k].pairs = pairs;
   }
   return status;
 }
 
-static supine_status find_gain(const request *wanted, supine_patient_record *record,
+static supine_status find_gain(const request *wanted, evidence *of, supine_patient_record *record,
                                supine_error *error) {
   const bool moved = wanted->translation || wanted->rigid;
   further_work *work = calloc(1, sizeof *work);
   supine_patient_gain gain = {0};
+  supine_lungs *from = &of->lungs[0];
   supine_status status =
       work == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for further states")
-                   : load_further(wanted, moved, work, error);
+                   : load_further(wanted, of, record, work, error);
+  if (from->mesh.vertex_count == 0) { /* the first scan alone, which is the emptier one */
+    from = &of->lungs[1];
+    supine_patient_refer(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
+    supine_mesh_box(&from->mesh, from->minimum, from->maximum);
+  }
   if (status == SUPINE_OK) {
-    status = supine_patient_gain_fit(record, &work->rest, wanted->reach, moved, work->other,
-                                     wanted->count, &gain, error);
+    status = supine_patient_gain_fit(record, from, record->reach, moved, work->other, wanted->count,
+                                     &gain, error);
   }
   if (status == SUPINE_OK) {
     record->gain_told = gain.told;
+    record->gain_open = gain.open;
     record->gain_error = gain.error;
-    record->force = supine_patient_force(&record->patient, gain.gain, record->state.gravity);
+    record->force = supine_patient_force(&record->patient, gain.gain, record->state[1].gravity);
     record->told_count = wanted->count;
     for (size_t k = 0; k < wanted->count; ++k) {
       const supine_patient_other *other = &work->other[k];
-      record->told[k] = (supine_patient_told){"", other->scale, other->left, other->left_without};
-      memcpy(record->told[k].posture, wanted->further[k].posture, sizeof record->told[k].posture);
+      record->told[k] =
+          (supine_patient_told){wanted->further[k], other->scale, other->left, other->left_without};
     }
   }
   for (size_t k = 0; work != NULL && k < SUPINE_PATIENT_OTHERS_MAX; ++k) {
     supine_patient_pairs_free(&work->pairs[k]);
     supine_lungs_free(&work->lungs[k]);
   }
-  if (work != NULL) {
-    supine_lungs_free(&work->rest);
-  }
   free(work);
   return status;
 }
 
-static void keep(const request *wanted, const supine_patient_surface_fit *found,
+/* --- the record ------------------------------------------------------------------------------ */
+
+/* A state without a volume, by what the surfaces hold. */
+static void complete_state(supine_patient_record *record, size_t k) {
+  supine_volume *of = &record->state[k].volume;
+  const supine_state *other = &record->state[1 - k];
+  const bool same = memcmp(record->state[k].gravity, other->gravity, sizeof other->gravity) == 0;
+  if (of->kind != SUPINE_VOLUME_DEFAULT || record->volume[k] <= 0.0) {
+    return;
+  }
+  *of = (supine_volume){SUPINE_VOLUME_ABSOLUTE, record->volume[k]};
+  if (record->volume[1 - k] > 0.0 && (other->volume.kind == SUPINE_VOLUME_FULL ||
+                                      (other->volume.kind == SUPINE_VOLUME_REST && same))) {
+    *of = (supine_volume){other->volume.kind,
+                          other->volume.ml + record->volume[k] - record->volume[1 - k]};
+  }
+}
+
+static void keep_states(const request *wanted, const evidence *of, supine_patient_record *record) {
+  record->state[of->swapped ? 1 : 0] = wanted->rest;
+  record->state[of->swapped ? 0 : 1] = wanted->state;
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_volume *told = &record->state[k].volume;
+    record->volume[k] = volume_of(&of->lungs[k]);
+    if (record->volume[k] == 0.0 && told->kind == SUPINE_VOLUME_ABSOLUTE) {
+      record->volume[k] = told->ml;
+    }
+  }
+  complete_state(record, 0);
+  complete_state(record, 1);
+  if (record->from_surface) {
+    memcpy(record->emptier[0], of->lungs[1].minimum, sizeof record->emptier[0]);
+    memcpy(record->emptier[1], of->lungs[1].maximum, sizeof record->emptier[1]);
+  } else {
+    const supine_patient_frame frame =
+        supine_patient_frame_of_points(of->pairs.count, of->pairs.to, NULL);
+    memcpy(record->emptier[0], frame.minimum, sizeof record->emptier[0]);
+    memcpy(record->emptier[1], frame.maximum, sizeof record->emptier[1]);
+  }
+}
+
+static void keep(const request *wanted, const evidence *of, const supine_patient_surface_fit *found,
                  supine_patient_record *record) {
   const supine_patient_fit_report *report = &found->report;
-  const supine_patient_law law = found->patient.law;
   const supine_patient_scores *held = &report->held_out;
   const char *source = wanted->landmarks != NULL ? wanted->landmarks : wanted->state_path;
   const char *slash = strrchr(source, '/');
@@ -452,51 +621,48 @@ static void keep(const request *wanted, const supine_patient_surface_fit *found,
   record->stiffness = found->stiffness;
   record->expand = found->expand;
   record->applied = found->applied;
-  record->rest = wanted->rest;
-  record->state = wanted->state;
+  record->reach = wanted->reach;
   record->from_surface = wanted->state_path != NULL;
-  record->inflation = supine_patient_inflation(&record->patient);
+  keep_states(wanted, of, record);
   record->force = supine_patient_force(
-      &record->patient, wanted->has_gain ? wanted->gain : usual_gain, wanted->state.gravity);
+      &record->patient, wanted->has_gain ? wanted->gain : usual_gain, record->state[1].gravity);
   record->points = report->count;
-  record->held_out = held->law[law];
+  record->held_out = held->corrected;
   record->held_out_baseline = wanted->translation || wanted->rigid ? held->translation : held->none;
-  record->fitted = report->fitted.law[law];
+  record->expected = report->expected;
+  record->band = report->band;
+  record->fitted = report->fitted.corrected;
   record->explained = report->explained;
 }
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
                          supine_patient_surface_fit *found, supine_patient_record *record,
                          supine_error *error) {
-  const supine_patient_fit_options options = {.law_given = wanted->has_law,
-                                              .law = (supine_patient_law)wanted->law,
-                                              .moved = wanted->rigid ? SUPINE_PATIENT_RIGID
-                                                       : wanted->translation
-                                                           ? SUPINE_PATIENT_TRANSLATION
-                                                           : SUPINE_PATIENT_STILL};
-  supine_patient_pairs pairs = {0};
-  supine_status status = SUPINE_OK;
-  if (wanted->landmarks != NULL) {
-    status = supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &pairs, error);
-    if (status == SUPINE_OK) {
-      status = supine_patient_pairs_check(&pairs, options.moved != SUPINE_PATIENT_STILL, error);
-    }
+  supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
+                                        .moved = wanted->rigid         ? SUPINE_PATIENT_RIGID
+                                                 : wanted->translation ? SUPINE_PATIENT_TRANSLATION
+                                                                       : SUPINE_PATIENT_STILL};
+  evidence of = {0};
+  supine_status status = load_evidence(wanted, &of, error);
+  if (status == SUPINE_OK) {
+    status = order_states(wanted, &of, error);
   }
   if (status == SUPINE_OK) {
-    status = wanted->state_path != NULL
-                 ? fit_surfaces(wanted, pairs.count > 0 ? &pairs : NULL, &options, found, error)
-                 : fit_landmarks(wanted, &pairs, &options, found, error);
+    memcpy(options.gravity, of.swapped ? wanted->rest.gravity : wanted->state.gravity,
+           sizeof options.gravity);
+    status = wanted->state_path != NULL ? fit_surfaces(wanted, &of, &options, found, error)
+                                        : fit_landmarks(wanted, &of.pairs, &options, found, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, found, record);
+    keep(wanted, &of, found, record);
     if (wanted->count > 0) {
-      status = find_gain(wanted, record, error);
-    }
-    if (status == SUPINE_OK && wanted->path != NULL) {
-      status = supine_patient_write(wanted->path, record, &found->report, given->made_by, error);
+      status = find_gain(wanted, &of, record, error);
     }
   }
-  supine_patient_pairs_free(&pairs);
+  if (status == SUPINE_OK && wanted->path != NULL) {
+    status = supine_patient_write(wanted->path, record, &found->report, given->made_by, error);
+  }
+  evidence_free(&of);
   return status;
 }
 
@@ -520,6 +686,7 @@ static int arrange(request *wanted, const supine_arguments *given) {
       return supine_options_usage(name, "more than %d further states", SUPINE_PATIENT_OTHERS_MAX);
     }
     wanted->further[wanted->count] = wanted->state;
+    wanted->further[wanted->count].volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0.0};
     wanted->further_path[wanted->count++] = given->operand[next];
   }
   if (wanted->landmarks == NULL && wanted->state_path == NULL) {
@@ -528,17 +695,20 @@ static int arrange(request *wanted, const supine_arguments *given) {
   }
   for (size_t k = 0; k < wanted->count; ++k) {
     if (!is_landmarks(wanted->further_path[k]) && wanted->rest_path == NULL) {
-      return supine_options_usage(name, "%s is a surface: name the one at rest as well",
+      return supine_options_usage(name, "%s is a surface: name that of the first scan as well",
                                   wanted->further_path[k]);
     }
   }
   if (wanted->state_path != NULL && wanted->rest_path == NULL) {
-    return supine_options_usage(name, "%s is a surface: name the one at rest as well",
+    return supine_options_usage(name, "%s is a surface: name that of the first scan as well",
                                 wanted->state_path);
   }
   if (wanted->expandability && wanted->state_path == NULL) {
     return supine_options_usage(name, "--expandability is of surfaces: name the one at rest and "
                                       "the one in the other state");
+  }
+  if (wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP) {
+    return supine_options_usage(name, "--expandability goes with the paper's law: leave --law out");
   }
   if (wanted->has_gain && wanted->count > 0) {
     return supine_options_usage(name, "--gain or --state: further states tell the gain");
@@ -548,8 +718,8 @@ static int arrange(request *wanted, const supine_arguments *given) {
 
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
-  supine_patient_record record = {0};
-  supine_patient_surface_fit found = {0};
+  static supine_patient_record record; /* some 40 kB each */
+  static supine_patient_surface_fit found;
   supine_error error;
   const int result = arrange(wanted, given);
   if (result != SUPINE_EXIT_OK) {
@@ -564,7 +734,7 @@ static int run(void *chosen, const supine_arguments *given) {
     free(text);
   } else {
     if (wanted->state_path != NULL) {
-      print_surface(&found.surface, wanted->landmarks != NULL);
+      print_surface(&found.surface, record.patient.law, wanted->landmarks != NULL);
     }
     print_text(&record, &found.report, wanted);
     if (wanted->state_path != NULL) {
@@ -580,21 +750,26 @@ const supine_command supine_command_fit = {
     name,
     "a person's own law, from scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
-             "REST STATE... [--state POSTURE:FILE]... -o patient.json [OPTIONS]",
+             "SCAN SCAN... [--state STATE:FILE]... -o patient.json [OPTIONS]",
     .about =
-        "Fits how one person's lungs move to matched points of two scans, and says how much of "
-        "the motion of points that it has not seen each law explains. 'supine precompute "
-        "--patient' makes a basis of what is kept.",
+        "Fits how one person's lungs move between two scans: a law, and by kriging what it leaves "
+        "of this person; and says how near held-out points come, and how near they were expected. "
+        "Landmarks tell most; surfaces alone do not show what slides along them. 'supine "
+        "precompute --patient' makes a basis of it, from either scan.",
     .options = table,
     .notes =
         "Example:\n"
         "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
         "--other supine:full -o patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --landmarks pairs.csv -o patient.json\n"
-        "  supine fit rest.ply full.ply --state prone:rest:prone.ply -o patient.json\n"
-        "  supine precompute lungs.ply --patient patient.json -o lungs.safetensors",
+        "  supine fit rest.ply later.ply --other supine:rest+500 -o patient.json\n"
+        "  supine fit rest.ply full.ply --other supine:full --state prone:rest:prone.ply --law "
+        "paper \\\n"
+        "      -o patient.json\n"
+        "  supine precompute rest.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
     .operands_most = 2 + SUPINE_PATIENT_OTHERS_MAX,
-    .operands_missing = "one surface at rest and some in other states",
+    .operands_missing = "a surface in one state and some in others",
     .request_size = sizeof(request),
+    .begin = begin,
     .run = run};

@@ -514,7 +514,9 @@ static void say_assumed(supine_model_options *options, const supine_lungs *lungs
     }
     supine_text_add(text, size, " mm");
   }
-  supine_text_add(text, size, "; %s law; scan ", supine_physics_law_names[options->model.law]);
+  supine_text_add(text, size, "; %s law; scan ",
+                  options->patient != NULL ? "the patient's own"
+                                           : supine_physics_law_names[options->model.law]);
   if (!reference->known) {
     supine_text_add(text, size, "taken as the reference of every posture");
     return;
@@ -594,6 +596,51 @@ static int make_lungs(supine_model_options *options, const char *command, const 
   return SUPINE_EXIT_OK;
 }
 
+/* The law, force and stiffness of a person, and what the scan shows of the two that were fitted. */
+static supine_status set_patient(supine_model_options *options, const char *command,
+                                 const supine_lungs *lungs, supine_error *error) {
+  const supine_patient_record *record = options->patient;
+  size_t state = 0;
+  if (record == NULL) {
+    return SUPINE_OK;
+  }
+  const supine_status status = supine_patient_check_place(record, lungs, &state, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_patient_model(record, &options->model);
+  supine_patient_resting(record, &options->resting);
+  if (!options->has_scan) {
+    const double volume = lungs->topology.closed ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+    options->scan = supine_patient_scan(record, state, volume, &options->resting);
+    if (state == 1 && options->scan.kind == SUPINE_SCAN_NONE) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "this is the emptier of the two scans that were fitted, and nothing "
+                              "tells how far it is from full inflation: name its state, as "
+                              "--scanned supine:rest, or take the fuller scan");
+    }
+    supine_options_say(command,
+                       "note: taken as the %s of the two states that were fitted; "
+                       "--scanned says otherwise",
+                       state == 0 ? "fuller" : "emptier");
+  }
+  if (!supine_patient_is_uneven(record)) {
+    return SUPINE_OK;
+  }
+  if (options->stiffness != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the patient's law brings its own stiffness: leave --expandability "
+                            "out");
+  }
+  options->stiffness = malloc(lungs->mesh.vertex_count * sizeof *options->stiffness);
+  if (options->stiffness == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                            lungs->mesh.vertex_count);
+  }
+  options->model.stiffness = options->stiffness;
+  return supine_patient_set_stiffness(record, lungs, options->stiffness, error);
+}
+
 /* Over 60 lines: one step after another, each with its message. */
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
                               size_t count, bool keep, supine_lungs *lungs) {
@@ -634,6 +681,7 @@ int supine_command_model_load(supine_model_options *options, const char *command
       set_directions(options, lungs, &error) != SUPINE_OK ||
       set_lesions(options, command, lungs, &error) != SUPINE_OK ||
       set_shares(options, lungs, &error) != SUPINE_OK ||
+      set_patient(options, command, lungs, &error) != SUPINE_OK ||
       supine_reference_find(lungs, &options->model, &options->scan, &options->resting,
                             &options->reference, &error) != SUPINE_OK) {
     result = supine_options_fail(command, &error);

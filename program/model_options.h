@@ -6,6 +6,7 @@
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
+#include "precompute/patient/patient_file.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 
@@ -30,6 +31,7 @@ typedef struct supine_model_options {
   char assumed[512];          /* likewise, in a sentence */
   supine_findings findings;   /* and what was found wrong with them */
   supine_scan_frame frame;
+  const supine_patient_record *patient; /* a person's own law, the caller's; NULL: none */
   const char *expandability; /* a file, or NULL: the law */
   supine_expandability_law law;
   size_t lesion_count;

@@ -204,50 +204,28 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   return supine_options_finish(name);
 }
 
-/* Directions and force of a person's own law; what is kept of it in the file is owned by the
- * caller.
- */
-static supine_status take_patient(const supine_lungs *lungs, request *wanted, char **text,
+/* Read a person's own law, and what the file keeps of it, which the caller owns. */
+static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
                                   supine_error *error) {
-  supine_model_options *model = &wanted->model;
-  supine_patient_record record;
-  supine_status status = supine_patient_read(wanted->patient, &record, error);
+  supine_status status = supine_patient_read(wanted->patient, record, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  model->vectors = malloc(3 * lungs->mesh.vertex_count * sizeof *model->vectors);
-  *text = supine_patient_text(&record, NULL, NULL);
-  if (model->vectors == NULL || *text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                            lungs->mesh.vertex_count);
+  *text = supine_patient_text(record, NULL, NULL);
+  if (*text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
-  if (supine_patient_is_uneven(&record)) {
-    if (model->stiffness != NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%s brings its own stiffness: leave --expandability out",
-                              wanted->patient);
-    }
-    model->stiffness = malloc(lungs->mesh.vertex_count * sizeof *model->stiffness);
-    if (model->stiffness == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              lungs->mesh.vertex_count);
-    }
-    supine_patient_stiffness_of(&record.stiffness, lungs, model->stiffness);
-    model->model.stiffness = model->stiffness;
-  }
-  status = supine_patient_directions(&record, lungs, &model->model, model->vectors, error);
-  model->model.direction.model = SUPINE_DIRECTION_VECTORS;
-  model->model.direction.vectors = model->vectors;
+  wanted->model.patient = record;
+  wanted->model.law_choice = SUPINE_LAW_DEEP; /* what the options below say of constants */
   wanted->basis.patient = *text;
-  if (status == SUPINE_OK) {
-    (void)snprintf(wanted->summary, sizeof wanted->summary,
-                   "%s: %s law from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
-                   record.name, supine_patient_law_names[record.patient.law], record.points,
-                   record.held_out, record.held_out_baseline, 100.0 * record.explained);
-    wanted->basis.patient_summary = wanted->summary;
-    (void)printf("%s\n", wanted->summary);
-  }
-  return status;
+  (void)snprintf(wanted->summary, sizeof wanted->summary,
+                 "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
+                 record->name, supine_patient_law_names[record->patient.law],
+                 record->patient.correction.count > 0 ? " and kriging" : "", record->points,
+                 record->held_out, record->held_out_baseline, 100.0 * record->explained);
+  wanted->basis.patient_summary = wanted->summary;
+  (void)printf("%s\n", wanted->summary);
+  return SUPINE_OK;
 }
 
 static void begin(void *chosen) {
@@ -259,7 +237,6 @@ static void begin(void *chosen) {
 static int check_patient(const request *wanted) {
   const supine_model_options *options = &wanted->model;
   const supine_model *model = &options->model;
-  const supine_resting usual = supine_reference_resting_default();
   const struct {
     bool given;
     const char *option;
@@ -269,13 +246,14 @@ static int check_patient(const request *wanted) {
                  {!isnan(model->force.box[0]), "box-force"},
                  {!isnan(model->direction.c[0]), "constants"},
                  {model->direction.model != SUPINE_DIRECTION_BOX, "direction"},
-                 {options->has_scan, "scanned"},
-                 {memcmp(&options->resting, &usual, sizeof usual) != 0, "resting"}};
+                 {!isnan(model->reach), "reach"}};
   for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
     if (brought[i].given) {
       return supine_options_usage(
-          name, "--patient brings its own law, force and scan: leave --%s out%s", brought[i].option,
-          strcmp(brought[i].option, "gain") == 0 ? ", or give it to 'supine fit'" : "");
+          name, "--patient brings its own law and force: leave --%s out%s", brought[i].option,
+          strcmp(brought[i].option, "gain") == 0 || strcmp(brought[i].option, "reach") == 0
+              ? ", or give it to 'supine fit'"
+              : "");
     }
   }
   return SUPINE_EXIT_OK;
@@ -286,6 +264,7 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_lungs lungs = {0};
   supine_error error;
   char *text = NULL;
+  static supine_patient_record record; /* some 40 kB */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_options_usage(
         name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
@@ -293,13 +272,13 @@ static int run(void *chosen, const supine_arguments *given) {
   int result = wanted->fields != NULL    ? check_fields(wanted->fields, wanted->path)
                : wanted->patient != NULL ? check_patient(wanted)
                                          : SUPINE_EXIT_OK;
+  if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
+      take_patient(wanted, &record, &text, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
+  }
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->fields != NULL || wanted->patient != NULL, &lungs);
-  }
-  if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
-      take_patient(&lungs, wanted, &text, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
+                                       wanted->fields != NULL, &lungs);
   }
   if (result == SUPINE_EXIT_OK) {
     result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)

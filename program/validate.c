@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine validate: a basis, or a patient's law, against other states of the same person. */
+/* supine validate: a basis against other states of the same person. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@ typedef struct request {
   supine_mesh_load_options load;
   supine_volume_options volume;
   double scale;
-  bool has_scale, reverse, json;
+  bool has_scale, reverse, translation, rigid, json;
 } request;
 
 /* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
@@ -80,11 +80,14 @@ static const supine_option table[] = {
      "default: the basis's scan itself",
      FILLS(from), .read = read_from, .wants = "a state, as supine:rest"},
     {.help =
-         "The volume of states that name none (default: a patient's own state as it was fitted, "
-         "else what the state's surface holds):"},
+         "The volume of states that name none (default: what the state's surface holds):"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
      .wants = "a number", .rivals = "breath"},
+    {"translation", 0, NULL,
+     "the other scan's frame may be shifted: the prediction is shifted to where it fits best",
+     FILLS(translation), .rivals = "motion"},
+    {"rigid", 0, NULL, "or shifted and turned", FILLS(rigid), .rivals = "motion"},
     {.table = supine_options_surface_frame, FILLS(load)},
     {"output", 'o', "FILE",
      "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
@@ -105,8 +108,16 @@ static void print_distances(const char *title, const char *largest,
   (void)printf("%s, mm:\n  %-12s %7s %7s %7s %10s   explained\n", title, "", "mean", "RMS", "95 %",
                largest);
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    (void)printf("  %-12s %7.2f %7.2f %7.2f %10.2f   %7.1f %%\n", supine_patient_map_names[k],
-                 of[k].mean, of[k].rms, of[k].p95, of[k].largest, 100.0 * of[k].explained);
+    (void)printf("  %-12s %7.2f %7.2f %7.2f %10.2f", supine_patient_map_names[k], of[k].mean,
+                 of[k].rms, of[k].p95, of[k].largest);
+    if (isnan(of[k].explained)) {
+      (void)puts("         -");
+    } else {
+      (void)printf("   %7.1f %%\n", 100.0 * of[k].explained);
+    }
+  }
+  if (isnan(of[0].explained)) {
+    (void)puts("  nothing moved between the two states: there is nothing to explain");
   }
 }
 
@@ -162,11 +173,12 @@ static void print_text(const supine_command_subject *s) {
 static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    (void)json_object_set_new(all, supine_patient_map_names[k],
-                              json_pack("{s:f, s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean,
-                                        "rms_mm", of[k].rms, "p95_mm", of[k].p95, "largest_mm",
-                                        of[k].largest, "explained_percent",
-                                        100.0 * of[k].explained));
+    json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
+                            "p95_mm", of[k].p95, "largest_mm", of[k].largest);
+    (void)json_object_set_new(
+        row, "explained_percent",
+        isnan(of[k].explained) ? json_null() : json_real(100.0 * of[k].explained));
+    (void)json_object_set_new(all, supine_patient_map_names[k], row);
   }
   return all;
 }
@@ -227,8 +239,6 @@ static int set_states(const request *wanted, supine_command_subject *s) {
     if (result != SUPINE_EXIT_OK) {
       return result;
     }
-  } else if (s->has_patient) {
-    memcpy(gravity, s->record.state.gravity, sizeof gravity);
   }
   for (size_t i = 0; i < s->count; ++i) {
     supine_command_state *state = &s->state[i];
@@ -291,19 +301,18 @@ static int run(void *chosen, const supine_arguments *given) {
       return result;
     }
   }
-  if (supine_command_subject_open(path, &s, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else if (s.basis == NULL && wanted->count > 0) {
-    result =
-        supine_options_usage(name, "%s is a law without a surface: make a basis of it first", path);
-  } else {
-    result = set_states(wanted, &s);
+  if (supine_text_ends_in(path, ".json")) {
+    return supine_options_usage(name,
+                                "%s is a law without a surface: make a basis of it first, by "
+                                "'supine precompute --patient'",
+                                path);
   }
-  if (result == SUPINE_EXIT_OK && s.basis == NULL &&
-      !supine_command_law_says(&s, s.state[0].state.gravity)) {
-    result =
-        supine_options_usage(name, "%s alone knows its own posture only: make a basis of it", path);
-  }
+  s.moved = wanted->rigid         ? SUPINE_PATIENT_RIGID
+            : wanted->translation ? SUPINE_PATIENT_TRANSLATION
+                                  : SUPINE_PATIENT_STILL;
+  result = supine_command_subject_open(path, &s, &error) != SUPINE_OK
+               ? supine_options_fail(name, &error)
+               : set_states(wanted, &s);
   if (result == SUPINE_EXIT_OK) {
     if (validate(wanted, &s, &error) != SUPINE_OK) {
       result = supine_options_fail(name, &error);
@@ -320,8 +329,8 @@ const supine_command supine_command_validate = {
     name,
     "how far a prediction is from another scan",
     .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
-             "BASIS|PATIENT.json --landmarks PAIRS.csv [OPTIONS]",
-    .about = "Compares a basis, or a patient's law, with other states of the same person: "
+             "BASIS --landmarks PAIRS.csv --volume VOLUME [OPTIONS]",
+    .about = "Compares a basis with other states of the same person: "
              "distances between the surfaces and of landmarks, and how much of the motion is "
              "explained, beside what no motion, a translation, a similarity and an affine map "
              "leave; and, of several states, how linear displacement is with volume.",
@@ -329,10 +338,9 @@ const supine_command supine_command_validate = {
     .notes = "Examples:\n"
              "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
              "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-             "      --state supine:full:full.ply --landmarks pairs.csv\n"
-             "  supine validate patient.json --landmarks pairs.csv",
+             "      --state supine:full:full.ply --landmarks pairs.csv",
     .operands_least = 1,
     .operands_most = 1,
-    .operands_missing = "name one basis file, or one patient.json",
+    .operands_missing = "name one basis file",
     .request_size = sizeof(request),
     .run = run};

@@ -13,7 +13,6 @@
 #include "precompute/inside/surface.h"
 #include "program/options/basis_input.h"
 #include "sh/base/parallel.h"
-#include "sh/base/text.h"
 
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24, GRAIN = 64 };
 
@@ -33,19 +32,7 @@ void supine_command_subject_free(supine_command_subject *subject) {
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error) {
   supine_command_subject *s = subject;
-  if (supine_text_ends_in(path, ".json")) {
-    s->has_patient = true;
-    return supine_patient_read(path, &s->record, error);
-  }
   supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  const char *law = supine_basis_metadata(s->basis, "patient_law");
-  if (law != NULL) {
-    s->has_patient = true;
-    status = supine_patient_parse(path, law, &s->record, error);
-  }
   if (status == SUPINE_OK) {
     status = supine_options_basis_rest_mesh(s->basis, &s->rest);
     if (status != SUPINE_OK) {
@@ -61,10 +48,6 @@ static bool same_direction(const double a[3], const double b[3]) {
     off = fmax(off, fabs(a[k] - b[k]));
   }
   return off < same_posture;
-}
-
-bool supine_command_law_says(const supine_command_subject *subject, const double gravity[3]) {
-  return subject->has_patient && same_direction(gravity, subject->record.state.gravity);
 }
 
 /* The surface in a pose, [N, 3]. */
@@ -100,9 +83,6 @@ static double held(const supine_basis *basis, const supine_pose *pose) {
 supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error) {
   supine_command_subject *s = subject;
   supine_pose pose;
-  if (s->basis == NULL) {
-    return SUPINE_OK;
-  }
   if (s->from.posture[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
@@ -122,7 +102,7 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
 
 /* --- a prediction ---------------------------------------------------------------------------- */
 
-/* The gains: as asked, as the patient was fitted, or those of the state's volume. */
+/* The gains: as asked, or those of the state's volume. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -136,8 +116,6 @@ static supine_status find_gains(const supine_command_subject *s, const supine_co
   outcome->has_millilitres = told || measured;
   if (state->has_scale) {
     supine_pose_fill(&outcome->pose, state->scale);
-  } else if (!told && s->count == 1 && supine_command_law_says(s, asked.gravity)) {
-    supine_pose_fill(&outcome->pose, s->record.inflation);
   } else if (!outcome->has_millilitres) {
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "how full is the other state? Landmarks do not tell: --volume, or "
@@ -169,16 +147,6 @@ static supine_status predict_surface(const supine_command_subject *s,
   }
   if (status == SUPINE_OK) {
     status = deform(s->basis, &outcome->pose, outcome->predicted, error);
-  }
-  for (size_t i = 0; status == SUPINE_OK && i < n; ++i) {
-    double motion[3] = {0.0, 0.0, 0.0};
-    if (supine_command_law_says(
-            s, state->state.gravity)) { /* between the scans that it was fitted to */
-      supine_patient_motion(&s->record.patient, s->rest.vertices + 3 * i, motion);
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      outcome->predicted[3 * i + k] += motion[k];
-    }
   }
   return status;
 }
@@ -293,8 +261,7 @@ void supine_command_find_line(supine_command_subject *subject) {
 
 /* --- points ---------------------------------------------------------------------------------- */
 
-/* Where points inside go: by the patient's law itself, with the motion between the scans that was
- * found with it, else by the biharmonic interpolation of the surface's displacement. */
+/* Compute where points inside go: by biharmonic interpolation of the surface's displacement. */
 static supine_status predict_points(const supine_command_subject *s, size_t which,
                                     const supine_patient_pairs *pairs, double *predicted,
                                     supine_error *error) {
@@ -302,20 +269,6 @@ static supine_status predict_points(const supine_command_subject *s, size_t whic
   const supine_command_outcome *outcome = &s->outcome[which];
   const size_t n = s->rest.vertex_count;
   supine_inside_biharmonic fit = {0};
-  if (supine_command_law_says(s, s->state[which].state.gravity) &&
-      !supine_patient_is_uneven(&s->record)) {
-    const double times = s->basis == NULL ? 1.0 : outcome->scale * s->record.inflation;
-    for (size_t i = 0; i < pairs->count; ++i) {
-      double u[3];
-      double motion[3];
-      supine_patient_displacement(&s->record.patient, pairs->from + 3 * i, u);
-      supine_patient_motion(&s->record.patient, pairs->from + 3 * i, motion);
-      for (size_t k = 0; k < 3; ++k) {
-        predicted[3 * i + k] = pairs->from[3 * i + k] + times * u[k] + motion[k];
-      }
-    }
-    return SUPINE_OK;
-  }
   double *displacement = malloc(3 * n * sizeof *displacement);
   supine_status status = displacement == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                                  "no memory for %zu vertices", n)
@@ -343,9 +296,6 @@ static supine_status check_points(const supine_command_subject *s,
   double low[3];
   double high[3];
   size_t outside = 0;
-  if (s->basis == NULL) {
-    return SUPINE_OK;
-  }
   supine_mesh_box(&s->rest, low, high);
   for (size_t i = 0; i < pairs->count; ++i) {
     const double *p = pairs->from + 3 * i;
@@ -366,7 +316,7 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
   double *predicted = NULL;
   supine_status status = supine_patient_pairs_load(path, reverse, &pairs, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_pairs_check(&pairs, s->has_patient, error);
+    status = supine_patient_pairs_check(&pairs, s->moved != SUPINE_PATIENT_STILL, error);
   }
   if (status == SUPINE_OK) {
     status = check_points(s, &pairs, error);
@@ -378,7 +328,8 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
                                : predict_points(s, which, &pairs, predicted, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_validate_points(&pairs, predicted, s->outcome[which].points, error);
+    status = supine_patient_validate_points(&pairs, predicted, s->moved, s->outcome[which].points,
+                                            error);
     s->outcome[which].has_points = true;
   }
   free(predicted);
@@ -421,19 +372,19 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (state->path != NULL) {
     status = load_state(state->path, load, &mesh, error);
   }
-  if (status == SUPINE_OK && s->basis != NULL) {
+  if (status == SUPINE_OK) {
     status = predict_surface(s, state, &mesh, outcome, error);
   }
-  if (status == SUPINE_OK && state->path != NULL) {
-    status = supine_patient_validate_surface(&s->rest, outcome->predicted, &mesh, outcome->nearest,
-                                             outcome->surface, error);
+  if (status == SUPINE_OK && landmarks != NULL) {
+    status = validate_points(s, i, landmarks, reverse, error);
+  }
+  if (status == SUPINE_OK && state->path != NULL) { /* adds the motion to the prediction */
+    status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &mesh,
+                                             outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;
   }
   if (status == SUPINE_OK && state->path != NULL && s->count > 1) {
     status = find_best(s, &mesh, outcome, error);
-  }
-  if (status == SUPINE_OK && landmarks != NULL) {
-    status = validate_points(s, i, landmarks, reverse, error);
   }
   supine_mesh_free(&mesh);
   return status;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What 'supine validate' works on: a basis or a patient's law, the state that motion starts from,
+/* What 'supine validate' works on: a basis, the state that motion starts from,
  * and the states that it is to lead to. */
 #ifndef SUPINE_COMMAND_VALIDATION_H
 #define SUPINE_COMMAND_VALIDATION_H
 
-#include "precompute/patient/patient_file.h"
+#include "precompute/patient/rows.h"
 #include "precompute/patient/validate.h"
 #include "program/options/orientation.h"
 #include "program/options/state.h"
@@ -36,9 +36,8 @@ typedef struct supine_command_outcome {
 } supine_command_outcome;
 
 typedef struct supine_command_subject {
-  supine_basis *basis; /* NULL: a patient's law alone */
-  bool has_patient;
-  supine_patient_record record;
+  supine_basis *basis;
+  supine_patient_moved moved; /* which motion between the scans is taken out */
   supine_command_state from;
   double from_scale, from_millilitres; /* gain and volume of the state that motion starts from */
   supine_mesh rest;                    /* where motion starts from */
@@ -52,17 +51,14 @@ typedef struct supine_command_subject {
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Opens a basis, or a patient.json by its ending.
- * @retval those of the readers */
+/* Opens a basis.
+ * @retval those of the reader */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);
 
 /* Sets the surface that motion starts from: the scan's own state where `from` names no posture.
  * @retval those of the run-time library */
 supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error);
-
-/* Whether the patient's own law says where points inside go: in the state that it was fitted to. */
-bool supine_command_law_says(const supine_command_subject *subject, const double gravity[3]);
 
 /* Predicts state i, and compares it with its surface and with landmarks (NULL: none).
  * @param reverse  of the landmarks

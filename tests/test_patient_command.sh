@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # From a law to a patient's basis and back: test_patient_command.sh PROGRAM
 #
-# Lungs are moved by a known law; fit finds it from the surfaces, precompute makes a basis of it, and
-# validate finds what fit said was left; and the same from landmarks. Then what is refused.
+# Lungs are moved by a known law; fit finds it from surfaces and from landmarks, precompute makes a
+# basis of it, and validate finds the person's other states. Then what is refused.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -20,35 +20,119 @@ near() { # A B TOLERANCE
   awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { exit !(a != "" && b != "" && a - b < t && b - a < t) }'
 }
 
-"$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
-"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
-  --constants 5,2.2,9,1.1,20,1.4 --scale 30 -o state.ply >/dev/null || fail solve
+vertices() { # FILE: x y z of its vertices
+  awk '/^v / { print $2 "," $3 "," $4 }' "$1"
+}
+pairs() { # FROM TO NAME: every eleventh vertex of two OBJ files, as landmarks
+  {
+    echo x,y,z,to_x,to_y,to_z
+    vertices "$1.obj" >from.csv
+    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 11 == 1'
+  } >"$3.csv"
+}
+surfaces() { # FILE: what validate says of its first state, mm RMS
+  number rms_mm "$1"
+}
 
-# Surfaces: the law comes back, and its basis lies on the state.
-"$supine" fit rest.ply state.ply --name "somebody" -o surface.json --json >fit.json || fail fit
-"$supine" precompute rest.ply --patient surface.json --reach 10 -o surface.safetensors >/dev/null ||
-  fail precompute
-"$supine" info surface.safetensors | grep -q 'patient *somebody: paper law .* held out' ||
-  fail "info does not say whose"
-"$supine" validate surface.safetensors --state state.ply --json >valid.json || fail validate
-near "$(number rms_mm valid.json)" 0 0.1 || fail "surfaces $(number rms_mm valid.json) mm apart"
-near "$(number explained_percent valid.json)" 100 0.1 || fail "not explained"
-awk -v a="$(number rms_mm valid.json)" -v b="$(number rms_mm valid.json 5)" \
-  'BEGIN { exit !(a < b / 3) }' || fail "no better than an affine map"
-"$supine" deform surface.safetensors --posture left --volume scan+300 -o left.ply >/dev/null ||
-  fail "no other posture"
+# One person in several states, two meshings: a law far from the default.
+for mesh in p:2000 q:3000; do
+  name=${mesh%:*}
+  "$supine" phantom -o $name.ply --vertices ${mesh#*:} >/dev/null || fail phantom
+  "$supine" precompute $name.ply --base 0.75 --gain 0.7 --constants 8,2.2,12,1.3,13,1.2 \
+    --held-out 20 -o $name.safetensors >/dev/null || fail "precompute $name"
+  for state in supine:rest supine:full prone:rest; do
+    for ending in ply obj; do
+      "$supine" deform $name.safetensors --posture ${state%:*} --volume ${state#*:} \
+        -o "${name}_${state%:*}_${state#*:}.$ending" >/dev/null || fail "deform $state"
+    done
+  done
+done
+pairs p_supine_rest p_supine_full full
+pairs p_supine_full p_supine_rest empty
+pairs p_supine_rest p_prone_rest prone
+pairs p_supine_full p_prone_rest down
+
+# A gain of 0.70 comes back, whichever way round the two states are told; and the basis made of the
+# scan at rest meets the true prone surface.
+turns() { # NAME ARGUMENTS of fit
+  name=$1
+  shift
+  "$supine" fit "$@" --name somebody -o "$name.json" >fit.txt || fail "fit $name"
+  near "$(sed -n 's/^gain \([0-9.]*\) +- .*/\1/p' fit.txt)" 0.70 0.05 ||
+    fail "$name: $(grep gain fit.txt)"
+  "$supine" precompute p_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
+    >out 2>note || fail "precompute $name: $(cat note)"
+  grep -q 'taken as the emptier of the two states' note || fail "the scan's state is not told"
+  "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:p_prone_rest.ply \
+    --json >valid.json || fail "validate $name"
+  near "$(surfaces valid.json)" 0 1 || fail "$name: prone off by $(surfaces valid.json) mm"
+  near "$(number rms_mm valid.json 2)" 0 4 && fail "prone did not turn"
+}
+turns forwards p_supine_rest.ply p_supine_full.ply --other supine:full \
+  --state prone:rest:p_prone_rest.ply --law paper
+turns backwards p_supine_full.ply p_supine_rest.ply --rest supine:full --other supine:rest \
+  --state prone:rest:p_prone_rest.ply --law paper
+turns points --landmarks full.csv --other supine:full --state prone:rest:prone.csv --law paper
+turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
+  --state prone:rest:down.csv --law paper
+grep -q 'full inflation' fit.txt || fail "states are not told: $(head -3 fit.txt)"
+"$supine" info points.safetensors | grep -q 'patient *somebody: paper law and kriging .* held out' ||
+  fail "info does not say whose: $("$supine" info points.safetensors)"
+
+# Without another option: from scans of two meshings to a basis that lies on both.
+"$supine" fit p_supine_rest.ply q_supine_full.ply --other supine:full -o surface.json >fit.txt ||
+  fail "fit two meshings"
+grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"
+for scan in p_supine_rest q_supine_full; do
+  "$supine" precompute $scan.ply --patient surface.json -o surface.safetensors >out 2>&1 ||
+    fail "precompute $scan: $(cat out)"
+  for state in rest:p full:q; do
+    "$supine" validate surface.safetensors \
+      --state supine:${state%:*}:${state#*:}_supine_${state%:*}.ply --json >valid.json ||
+      fail "validate $scan at $state"
+    near "$(surfaces valid.json)" 0 2 || fail "$scan at $state: $(surfaces valid.json) mm"
+  done
+done
+"$supine" validate surface.safetensors --state q_supine_full.ply --json >valid.json ||
+  fail "validate where nothing moved"
+grep -q '"explained_percent": null' valid.json || fail "explained of nothing"
+
+# What nothing knows is refused.
+"$supine" fit p_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
+  >fit.txt || fail "fit volumes alone"
+"$supine" precompute p_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
+  fail "an emptier scan of unknown state"
+grep -q 'or take the fuller scan' out || fail "emptier scan: $(cat out)"
+"$supine" precompute q_supine_full.ply --patient known.json -o known.safetensors >out 2>&1 ||
+  fail "precompute volumes alone: $(cat out)"
+for volume in rest full; do
+  "$supine" deform known.safetensors --posture prone --volume $volume -o x.ply >out 2>&1 &&
+    fail "$volume is known"
+done
+"$supine" validate known.safetensors --state p_supine_rest.ply --json >valid.json ||
+  fail "validate volumes alone"
+near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
+
+# A state that did not turn at all determines no gain.
+"$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
+  --json >fit.json 2>&1 || fail "fit a state that did not turn"
+"$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
+  --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
+grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
 # A stiff part comes back, goes into the basis, and the basis lies on the state.
+"$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
 "$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
-  --constants 5,2.2,9,1.1,20,1.4 --scale 30 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
+  --constants 5,2.2,9,1.1,20,1.4 --scale -30 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
   fail "solve with a lesion"
-"$supine" fit rest.ply stiff.ply --expandability -o stiff.json >fit.txt || fail "fit a lesion"
+"$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
+  >fit.txt || fail "fit a lesion"
 grep -q 'kept; nine tenths of what is seen' fit.txt || fail "no expandability kept"
 grep -q 'least expandable: left lung' fit.txt || fail "not told: $(cat fit.txt)"
 grep -q 'not seen: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
 grep -q 'correlation with height along gravity \(0.99\|1.00\);.* leaves [0-3] %' fit.txt || # what was made
   fail "the force: $(grep correlation fit.txt)"
-"$supine" precompute rest.ply --patient stiff.json --reach 10 -o stiff.safetensors >/dev/null ||
+"$supine" precompute rest.ply --patient stiff.json -o stiff.safetensors >/dev/null 2>&1 ||
   fail "precompute with stiffness"
 "$supine" validate stiff.safetensors --state stiff.ply --json >valid.json || fail "validate stiff"
 near "$(number explained_percent valid.json)" 100 2 || # regions are not of the lesion's shape
@@ -61,7 +145,7 @@ near "$(number explained_percent valid.json)" 100 2 || # regions are not of the 
   fail "deform to rest"
 "$supine" precompute scan.ply --scanned supine:rest --law deep --band 3 -o scanned.safetensors \
   >/dev/null || fail "precompute a scan at rest"
-"$supine" validate scanned.safetensors --state supine:-0:scan.ply --json >valid.json ||
+"$supine" validate scanned.safetensors --state supine:scan:scan.ply --json >valid.json ||
   fail "validate the scan itself"
 near "$(number rms_mm valid.json 2)" 0 0.01 || fail "motion does not start from the scan"
 near "$(number rms_mm valid.json)" 0 0.01 || fail "the scan is not predicted"
@@ -96,9 +180,6 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
 # Points that a basis of no patient's law turns go by its surface's displacement.
-vertices() { # FILE: x y z of its vertices
-  awk '/^v / { print $2 "," $3 "," $4 }' "$1"
-}
 for posture in supine prone; do
   "$supine" deform scanned.safetensors --posture $posture --volume rest -o $posture.obj >/dev/null ||
     fail "deform to OBJ"
@@ -113,62 +194,20 @@ done
 near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm valid.json) mm off"
 near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
 
-# Other postures tell the gain: by surfaces, by landmarks, or both; one posture does not.
-"$supine" precompute rest.ply --scanned none --law deep --constants 5,2.2,9,1.1,20,1.4 --base 0.9 \
-  --gain 0.4 --box-force 0,-0.2,0 --band 15 -o known.safetensors >/dev/null || fail "a known law"
-"$supine" deform known.safetensors --posture supine --volume scan+900 -o wide.ply >/dev/null || fail deform
-"$supine" deform known.safetensors --posture prone --volume scan+600 -o down.ply >/dev/null || fail deform
-"$supine" deform known.safetensors --posture supine --volume scan+500 -o half.ply >/dev/null || fail deform
-"$supine" fit rest.ply --state supine:wide.ply --state prone:+600:down.ply -o two.json --json \
-  >fit.json || fail "fit two states"
-near "$(number gain fit.json)" 0.4 0.03 || fail "gain $(number gain fit.json)"
-near "$(number gain_standard_error fit.json)" 0.02 0.02 || fail "its error"
-for state in supine:0:zero supine:900:wide prone:600:down; do
-  posture=${state%%:*}
-  volume=${state#*:}
-  "$supine" deform known.safetensors --posture "$posture" --volume "${volume%:*}" \
-    -o "${state##*:}.obj" >/dev/null || fail "deform to OBJ"
-  {
-    echo x,y,z,to_x,to_y,to_z
-    vertices zero.obj >from.csv
-    vertices "${state##*:}.obj" | paste -d, from.csv - | awk 'NR % 3 == 1'
-  } >"${state##*:}.csv"
-done
-"$supine" fit --landmarks wide.csv --state prone:+600:down.csv -o three.json --json >fit.json ||
-  fail "fit two sets of landmarks"
-near "$(number gain fit.json)" 0.4 0.03 || fail "gain of landmarks $(number gain fit.json)"
-"$supine" fit rest.ply wide.ply half.ply >fit.txt || fail "fit more operands"
-grep -q 'supine: breath scale 0.5' fit.txt || fail "half a breath: $(grep scale fit.txt)"
-grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"
-
-# Landmarks: vertices of the two, every second, with half a millimetre of noise.
-"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
-  --constants 5,2.2,9,1.1,20,1.4 --scale 30 -o state.obj >/dev/null || fail "solve to OBJ"
-"$supine" solve rest.ply --posture supine --reach 10 --scale 0.000001 -o rest.obj >/dev/null ||
-  fail "solve at rest"
-{
-  echo x,y,z,to_x,to_y,to_z
-  vertices rest.obj >from.csv
-  vertices state.obj | awk -F, 'BEGIN { srand(7) } {
-    printf "%.4f,%.4f,%.4f\n", $1 + rand() - 0.5, $2 + rand() - 0.5, $3 + rand() - 0.5 }' >to.csv
-  paste -d, from.csv to.csv | awk 'NR % 2 == 1'
-} >pairs.csv
-# One affine map of both lungs, by its surface.
-awk '/^v / { printf "v %.5f %.5f %.5f\n", 1.06 * $2 + 3, 0.97 * $3 - 4, 1.08 * $4 - 6; next } { print }' rest.obj >affine.obj
-"$supine" fit rest.ply affine.obj --law affine --json >fit.json || fail "fit an affine surface"
-near "$(number fitted_rms_mm fit.json)" 0 2.5 || fail "affine: $(number fitted_rms_mm fit.json) left"
-for law in paper affine quadratic; do
-  "$supine" fit --landmarks pairs.csv --law $law -o points.json --json >fit.json || fail "fit $law"
-  "$supine" validate points.json --landmarks pairs.csv --json >valid.json || fail "validate $law"
-  near "$(number fitted_rms_mm fit.json)" "$(number rms_mm valid.json)" 1e-6 ||
-    fail "$law: $(number fitted_rms_mm fit.json) is not $(number rms_mm valid.json)"
-  "$supine" precompute rest.ply --patient points.json --reach 10 -o points.safetensors >/dev/null ||
-    fail "precompute $law"
-  "$supine" validate points.safetensors --landmarks pairs.csv --state state.ply --json >basis.json ||
-    fail "validate the basis of $law"
-  near "$(number rms_mm basis.json 6)" "$(number rms_mm valid.json)" 1e-6 ||
-    fail "$law: the basis leaves $(number rms_mm basis.json 6)"
-done
+# A shift between the scans is found, where it is asked for.
+awk '/^v / { print $1, $2 + 12, $3 - 5, $4 + 7; next } { print }' p_supine_full.obj >shifted.obj
+"$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj \
+  --translation --json >valid.json || fail "validate a shift"
+near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
+"$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj --json \
+  >valid.json || fail "validate without a shift"
+near "$(surfaces valid.json)" 0 3 && fail "a shift was taken out unasked"
+# Half a breath more in the same posture.
+"$supine" deform p.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
+  fail deform
+"$supine" fit p_supine_rest.ply p_supine_full.ply half.ply --other supine:full --law paper \
+  >fit.txt || fail "fit more operands"
+grep -q 'supine.*: breath scale 0.[45]' fit.txt || fail "half a breath: $(grep scale fit.txt)"
 
 # What is refused, with its exit code.
 refused() { # CODE WORDS COMMAND...
@@ -181,27 +220,30 @@ refused() { # CODE WORDS COMMAND...
   grep -q -- "$words" out || fail "'$words' is not in: $(cat out)"
 }
 refused 1 'against what' validate points.safetensors
-refused 1 'make a basis of it first' validate points.json --state state.ply
-refused 1 'knows its own posture only' validate points.json --landmarks pairs.csv --posture prone
+refused 1 'make a basis of it first' validate points.json --landmarks full.csv
+refused 1 'Landmarks do not tell' validate points.safetensors --landmarks full.csv
 refused 1 'what to fit to' fit rest.ply
-refused 1 'tell the gain' fit --landmarks pairs.csv --gain 0.3 --state prone:pairs.csv
-refused 1 'name the one at rest' fit --landmarks pairs.csv --state prone:state.ply
+refused 1 'tell the gain' fit --landmarks full.csv --gain 0.3 --state prone:rest:prone.csv
+refused 1 'name that of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
+refused 1 'rest+500' fit --landmarks full.csv --other supine:500
+refused 2 'the wrong way round' fit p_supine_full.ply p_supine_rest.ply --other supine:full
+refused 2 'the wrong way round' fit --landmarks empty.csv --other supine:full
 refused 2 'the same as the one at rest' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
-  '--direction normal' '--scanned full' '--resting prone=0.5'; do
-  refused 1 "leave ${beside%% *} out" precompute rest.ply --patient points.json $beside \
+  '--direction normal' '--reach 10'; do
+  refused 1 "leave ${beside%% *} out" precompute p.ply --patient points.json $beside \
     -o x.safetensors
 done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
   --expandability linear:z:0.5:1.5 -o x.safetensors
-refused 1 'is of surfaces' fit --landmarks pairs.csv --expandability
-refused 1 'the affine law has no force' fit rest.ply stiff.ply --law affine --expandability
+refused 1 'is of surfaces' fit --landmarks full.csv --expandability
+refused 1 "goes with the paper's law" fit rest.ply stiff.ply --law deep --expandability
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
-  pairs.csv >far.csv
-"$supine" fit --landmarks far.csv -o far.json >/dev/null || fail "fit far away"
-refused 2 'another frame, unit or person' precompute rest.ply --patient far.json -o x.safetensors
-refused 2 'another frame, unit or person' validate points.safetensors --landmarks far.csv
+  full.csv >far.csv
+"$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
+refused 2 'another frame, unit or person' precompute p.ply --patient far.json -o x.safetensors
+refused 2 'another frame, unit or person' validate points.safetensors --volume full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"
 echo passed

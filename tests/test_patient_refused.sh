@@ -72,8 +72,9 @@ refused 2 'lines 9 and 62 both give the point' --landmarks twice.csv
 head -12 good.csv >eleven.csv
 refused 2 '11 pairs of points determine no law: give at least 12' --landmarks eleven.csv
 refused 2 '11 pairs of points determine no law' --landmarks good.csv --state prone:rest:eleven.csv
-head -50 good.csv >few.csv
-refused 2 '49 points are fewer than the 60 unknowns of the quadratic law' --landmarks few.csv --law quadratic
+head -15 good.csv >few.csv
+refused 2 '14 points are fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
+refused 1 'takes deep or paper' --landmarks good.csv --law quadratic
 head -1 good.csv >none.csv
 refused 2 'no pairs of points' --landmarks none.csv
 sed '1s/,to_z//' good.csv >header.csv
@@ -126,7 +127,7 @@ refused 2 'broken.obj' rest.obj broken.obj
 refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
 refused 1 'two lungs at most' rest.obj,other.obj,state.obj state.obj
-refused 1 'name the one at rest as well' --state prone:state.obj
+refused 1 'name that of the first scan as well' --state prone:state.obj
 refused 2 'find a further state' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj
 echo passed

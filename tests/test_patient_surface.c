@@ -72,8 +72,11 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   state.vertices = target;
 
   const supine_model model = truth(); /* its stiffness and reach are known; the rest is found */
-  const supine_patient_surface_task task = {
-      .rest = &rest, .state = &state, .model = &model, .gravity = {0.0, 1.0, 0.0}};
+  const supine_patient_surface_task task = {.rest = &rest,
+                                            .state = &state,
+                                            .model = &model,
+                                            .options = {.law = SUPINE_PATIENT_PAPER},
+                                            .gravity = {0.0, 1.0, 0.0}};
   supine_patient_surface_fit fit;
   supine_error error = {0};
   if (supine_patient_fit_surface(&task, &fit, &error) != SUPINE_OK) {
@@ -81,22 +84,16 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
-  /* As a basis would move it. */
-  supine_patient_record record = {
-      .patient = patient, .state = {"supine", "", {0.0, 1.0, 0.0}}, .from_surface = true};
-  record.inflation = supine_patient_inflation(&patient);
+  /* As a basis would move it: counted from the emptier state, the scale is of opposite sign. */
+  supine_patient_record record = {.patient = patient, .reach = 10.0, .from_surface = true};
   record.force = supine_patient_force(&patient, 0.4, supine_gravity);
-  double *directions = malloc(3 * rest.mesh.vertex_count * sizeof *directions);
   supine_model found = truth();
-  assert_int_equal(supine_patient_directions(&record, &rest, &found, directions, &error),
-                   SUPINE_OK);
-  found.direction.model = SUPINE_DIRECTION_VECTORS;
-  found.direction.vectors = directions;
+  supine_patient_model(&record, &found);
   supine_solution solution = {0};
   assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),
                    SUPINE_OK);
   double *positions = malloc(3 * rest.mesh.vertex_count * sizeof *positions);
-  supine_physics_solution_apply(&solution, &rest.mesh, record.inflation, positions);
+  supine_physics_solution_apply(&solution, &rest.mesh, -1.0, positions);
   double square = 0.0;
   for (size_t i = 0; i < 3 * rest.mesh.vertex_count; ++i) {
     square += pow(positions[i] - expected[i], 2.0) / (double)rest.mesh.vertex_count;
@@ -126,10 +123,42 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   assert_true(applied->left < 0.3 * applied->spread);
   assert_true(applied->matched > 0.95 && applied->blocks > 20);
   supine_physics_solution_free(&solution);
-  free(directions);
   free(positions);
   free(expected);
   free(target);
+  supine_lungs_free(&rest);
+  supine_lungs_free(&other);
+}
+
+/* Law and kriging from surfaces of another meshing, a law that is far from deep: as the basis moves
+ * it, the surface lies on the other state. */
+static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
+  (void)state_;
+  supine_mesh coarse = helper_lump(9, 70.3, 5);
+  supine_mesh fine = helper_lump(15, 70.3, 5);
+  supine_lungs rest = {0};
+  supine_lungs other = {0};
+  supine_error error;
+  assert_int_equal(supine_lungs_create(&coarse, 1, NULL, &rest, &error), SUPINE_OK);
+  assert_int_equal(supine_lungs_create(&fine, 1, NULL, &other, &error), SUPINE_OK);
+  double largest = 0.0;
+  supine_mesh state = other.mesh;
+  state.vertices = moved_by_truth(&other, &largest);
+  const supine_model model = truth();
+  const supine_patient_surface_task task = {
+      .rest = &rest, .state = &state, .model = &model, .gravity = {0.0, 1.0, 0.0}};
+  static supine_patient_surface_fit fit;
+  assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
+  printf("largest move %.1f mm; %.2f mm before, %.3f in the end; deep alone %.2f, held out %.3f "
+         "mm\n",
+         largest, fit.surface.before, fit.surface.after, fit.report.held_out.law,
+         fit.report.held_out.corrected);
+  assert_true(fit.patient.correction.count > 100);
+  assert_true(fit.surface.before > 3.0 && fit.surface.after < 0.2);
+  assert_true(fit.report.held_out.corrected < 0.4);
+  free(state.vertices);
+  supine_mesh_free(&coarse);
+  supine_mesh_free(&fine);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
@@ -157,6 +186,7 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
     const supine_patient_surface_task task = {.rest = &rest,
                                               .state = &state,
                                               .model = &model,
+                                              .options = {.law = SUPINE_PATIENT_PAPER},
                                               .gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
     assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
     found[k] = fit.applied.correlation;
@@ -265,6 +295,7 @@ static void test_other_frames_units_and_sides_are_refused(void **state_) {
 int main(void) {
   static const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_known_law_is_found_from_another_meshing),
+      cmocka_unit_test(test_fit_surface_deep_law_meets_other_meshing),
       cmocka_unit_test(test_force_that_ignores_gravity_shows),
       cmocka_unit_test(test_weights_end_at_4_685_standard_deviations),
       cmocka_unit_test(test_other_frames_units_and_sides_are_refused)};

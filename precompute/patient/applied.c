@@ -74,14 +74,9 @@ static void catch_range(void *context, size_t begin, size_t end, size_t thread) 
     double motion[3];
     double normal[3] = {0.0, 0.0, 0.0};
     double off = 0.0;
-    if (s->patient->law == SUPINE_PATIENT_PAPER) {
-      s->catch_[v] = caught[0] + c[0] * caught[1] + c[1] * caught[2] + c[2] * caught[3];
-      for (size_t k = 0; k < 3; ++k) {
-        at[k] = s->catch_[v] * d[k];
-      }
-    } else {
-      supine_patient_displacement(s->patient, p, at);
-      s->catch_[v] = dot(at, d) / square;
+    s->catch_[v] = caught[0] + c[0] * caught[1] + c[1] * caught[2] + c[2] * caught[3];
+    for (size_t k = 0; k < 3; ++k) {
+      at[k] = s->catch_[v] * d[k];
     }
     supine_patient_motion(s->patient, p, motion);
     for (size_t k = 0; k < 3; ++k) {
@@ -202,9 +197,10 @@ static supine_status find(study *s, const double *stiffness, const double gravit
   find_areas(&lungs->mesh, s->area);
   for (size_t v = 0; v < n; ++v) {
     double *d = s->directions + 3 * v;
-    supine_patient_paper_direction(s->patient, lungs->mesh.vertices + 3 * v, d);
+    supine_patient_place *place = &s->rows[v].place;
+    *place = supine_patient_find(&s->m->frame, lungs->mesh.vertices + 3 * v, 0.0);
+    supine_patient_direction(s->patient, place, d);
     s->softener += shortest * shortest * dot(d, d) / (double)n;
-    s->rows[v].place = supine_patient_find(&s->m->frame, lungs->mesh.vertices + 3 * v);
   }
   supine_parallel_for(n, GRAIN, 0, catch_range, s);
   for (size_t v = 0; v < n; ++v) {

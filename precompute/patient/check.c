@@ -26,6 +26,7 @@ typedef struct summary {
   double thinnest;  /* RMS across the flattest direction of the first points, mm */
   double turn;      /* degrees; of the rotation in the best affine map */
   double left;      /* RMS that it leaves, mm */
+  double growth;    /* its determinant; 0: none was found */
   bool mirrored;
 } summary;
 
@@ -89,6 +90,7 @@ static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, covariance, 3, map, 3) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
+  s->growth = supine_triple(map, map + 3, map + 6);
   s->left = sqrt(fmax(0.0, s->spread[1] * s->spread[1] - cblas_ddot(9, cross, 1, map, 1)));
   if (LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'A', 3, 3, map, 3, width, u, 3, vt, 3) != 0) {
     return SUPINE_ERROR_NUMERICAL;
@@ -99,6 +101,12 @@ static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
   s->mirrored = supine_triple(rotation, rotation + 3, rotation + 6) < 0.0;
   s->turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (trace - 1.0)))) * 180.0 / 3.14159265358979323846;
   return SUPINE_OK;
+}
+
+double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
+  summary s = {0};
+  measure(pairs, &s);
+  return find_map(pairs, &s) == SUPINE_OK && s.growth > 0.0 ? s.growth : 1.0;
 }
 
 /* How far the points move, RMS mm; without what they have in common where that is of no account. */

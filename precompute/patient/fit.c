@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* All laws fitted, each held out, one kept. */
+/* A law fitted, corrected and held out. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,160 +10,76 @@
 
 #include "precompute/patient/fit.h"
 
+#include "precompute/patient/krige.h"
+#include "precompute/physics/model.h"
 #include "sh/base/parallel.h"
 
 enum {
   FOLDS = SUPINE_PATIENT_FOLDS,
   SEEDS = SUPINE_PATIENT_SEEDS,
-  RIDGES = 5,
+  ITEMS = SEEDS * FOLDS,
   REPLICATES = 100, /* of the bootstrap: a standard error is known to 7 % */
   FIT_STEPS = 200,
-  REFIT_STEPS = 30,
-  POLYNOMIAL = SUPINE_PATIENT_POLYNOMIAL
+  REFIT_STEPS = 30
 };
 
-/* mm^2, per unit of a coefficient: data of n points weigh about n / 5. */
-static const double quadratic_ridges[RIDGES] = {0.3, 1.0, 3.0, 10.0, 30.0};
-static const double lung_ridges[RIDGES] = {1.0, 3.0, 10.0, 30.0, 1000.0};
-
 static const double same_start = 0.01;
+
+/* Half widths of the 95 % band, in the expected error of a point and of one component. */
+static const double band_point = 1.8;
+static const double band_component = 1.96;
 
 /* Relative, of a step: fits of parts of the data need not be sharper than what they show. */
 static const double fit_tolerance = 1e-8;
 static const double refit_tolerance = 1e-3;
 
+/* Weighted sums of squares, mm^2, over rows. */
+typedef struct squares {
+  double none, translation, affine, law, corrected, expected, weight;
+  size_t points, within;
+} squares;
+
 /* Everything between the rows and the patient. */
 typedef struct study {
   const supine_patient_frame *frame;
+  const supine_patient_fit_options *options;
   supine_patient_row *rows;
-  size_t row_count, components;
-  supine_patient_moved moved;
-  supine_patient_power power;      /* of all rows */
-  size_t *fold;                    /* [SEEDS, row_count] */
-  supine_patient_normals *normals; /* [SEEDS, FOLDS] */
-  double *squares;                 /* [SEEDS * FOLDS] left of the paper's law in each fold */
-  supine_patient_power *drawn;     /* [REPLICATES] */
+  size_t single, triples, row_count, components;
+  supine_patient_power law;    /* of all rows */
+  size_t *fold;                /* [SEEDS, row_count] */
+  squares *left;               /* [ITEMS] of held-out folds */
+  supine_patient_power *drawn; /* [REPLICATES] */
   size_t blocks;
-  supine_status *failed; /* [SEEDS * FOLDS or REPLICATES] */
+  supine_status *failed; /* [ITEMS or REPLICATES] */
 } study;
 
-void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]) {
-  for (size_t a = 0; a < 3; ++a) {
-    c[2 * a] = patient->lengths[a];
-    c[2 * a + 1] = patient->powers[a];
-    c[6 + a] = patient->powers[3 + a];
+supine_patient_power supine_patient_deep(const double gravity[3]) {
+  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_patient_power law = {0};
+  for (size_t k = 0; k < 3; ++k) {
+    law.linear[k] = model.direction.c[2 * k];
+    law.powers[k] = model.direction.c[2 * k + 1];
+    /* Heights fall along Y and Z (lungs.h) where gravity is along +y and +z. */
+    law.powers[3 + k] = model.force.box[k] - (k > 0 ? model.force.gain * gravity[k] : 0.0);
   }
+  return law;
 }
 
-/* Deals the blocks of a seed's grid to the folds, and sums up the normal equations of each. */
-static supine_status deal(study *s, size_t seed, supine_error *error) {
-  const size_t blocks = supine_patient_rows_block(s->frame, s->rows, s->row_count, seed + 1);
-  size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
-  if (blocks == 0 || fold_of == NULL ||
-      supine_patient_rows_deal(blocks, FOLDS, 1000 + seed, fold_of) != SUPINE_OK) {
-    free(fold_of);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu blocks", blocks);
-  }
-  for (size_t i = 0; i < s->row_count; ++i) {
-    const size_t fold = fold_of[s->rows[i].block];
-    s->fold[seed * s->row_count + i] = fold;
-    supine_patient_normals_add_row(&s->normals[seed * FOLDS + fold], &s->rows[i]);
-  }
-  s->blocks = blocks;
-  free(fold_of);
-  return SUPINE_OK;
-}
+/* --- fits ------------------------------------------------------------------------------------ */
 
-/* --- polynomials ----------------------------------------------------------------------------- */
-
-/* The normal equations of a seed's folds but for two (FOLDS: none). */
-static void sum_but(const study *s, size_t seed, size_t first, size_t second,
-                    supine_patient_normals *sum) {
-  memset(sum, 0, sizeof *sum);
-  for (size_t fold = 0; fold < FOLDS; ++fold) {
-    if (fold != first && fold != second) {
-      supine_patient_normals_add(sum, &s->normals[seed * FOLDS + fold]);
-    }
-  }
-}
-
-/* What a polynomial leaves of held-out folds, mm^2: those of one seed but `without`, each fitted on
- * the others but `without`. */
-static double held_out_squares(const study *s, size_t seed, size_t without,
-                               const double penalty[POLYNOMIAL]) {
-  supine_patient_normals sum;
-  double coefficients[POLYNOMIAL];
-  double squares = 0.0;
-  for (size_t fold = 0; fold < FOLDS; ++fold) {
-    const supine_patient_normals *held = &s->normals[seed * FOLDS + fold];
-    if (fold == without || held->weight == 0.0) {
-      continue;
-    }
-    sum_but(s, seed, fold, without, &sum);
-    if (supine_patient_polynomial_fit(&sum, penalty, coefficients) != SUPINE_OK) {
-      return INFINITY;
-    }
-    squares += supine_patient_polynomial_squares(held, coefficients);
-  }
-  return squares;
-}
-
-/* The ridge that leaves least of held-out folds: of all seeds, or of one without a fold, so that
- * what judges the law has not chosen its ridge. */
-static void choose_ridge(const study *s, size_t seed, size_t without, double *quadratic,
-                         double *lung) {
-  const bool one = s->frame->only_side != 0;
-  double least = INFINITY;
-  for (size_t i = 0; i < RIDGES; ++i) {
-    for (size_t j = 0; j < (one ? 1 : RIDGES); ++j) {
-      double penalty[POLYNOMIAL];
-      double squares = 0.0;
-      supine_patient_penalty_quadratic(quadratic_ridges[i], lung_ridges[j], one, penalty);
-      for (size_t k = 0; k < SEEDS; ++k) {
-        if (seed == SEEDS || k == seed) {
-          squares += held_out_squares(s, k, without, penalty);
-        }
-      }
-      if (squares < least) {
-        least = squares;
-        *quadratic = quadratic_ridges[i];
-        *lung = lung_ridges[j];
-      }
-    }
-  }
-}
-
-static double quadratic_held_out(const study *s) {
-  double squares = 0.0;
-  for (size_t item = 0; item < SEEDS * FOLDS; ++item) {
-    supine_patient_normals sum;
-    double penalty[POLYNOMIAL];
-    double coefficients[POLYNOMIAL];
-    double quadratic = quadratic_ridges[RIDGES - 1];
-    double lung = lung_ridges[RIDGES - 1];
-    if (s->normals[item].weight == 0.0) {
-      continue;
-    }
-    choose_ridge(s, item / FOLDS, item % FOLDS, &quadratic, &lung);
-    supine_patient_penalty_quadratic(quadratic, lung, s->frame->only_side != 0, penalty);
-    sum_but(s, item / FOLDS, item % FOLDS, FOLDS, &sum);
-    squares += supine_patient_polynomial_fit(&sum, penalty, coefficients) == SUPINE_OK
-                   ? supine_patient_polynomial_squares(&s->normals[item], coefficients)
-                   : INFINITY;
-  }
-  return squares;
-}
-
-/* --- the paper's law ------------------------------------------------------------------------- */
-
-/* Fits the rows of a copy from where the fit of all rows ended, and from the first start. */
+/* Fit rows of a copy: of the paper's law from where the fit of all rows ended, and, afresh, from
+ * the first start. */
 static supine_status refit(const study *s, const supine_patient_row *rows, size_t count,
                            bool afresh, supine_patient_power *fit) {
+  const supine_patient_moved moved = s->options->moved;
   supine_patient_power other;
-  supine_status status = supine_patient_power_fit(rows, count, s->moved, s->power.powers,
-                                                  REFIT_STEPS, refit_tolerance, fit, NULL);
+  if (s->options->law == SUPINE_PATIENT_DEEP) {
+    return supine_patient_scale_fit(rows, count, moved, &s->law, fit, NULL);
+  }
+  supine_status status = supine_patient_power_fit(rows, count, moved, s->law.powers, REFIT_STEPS,
+                                                  refit_tolerance, fit, NULL);
   if (afresh && status == SUPINE_OK) {
-    status = supine_patient_power_fit(rows, count, s->moved, supine_patient_starts[0], REFIT_STEPS,
+    status = supine_patient_power_fit(rows, count, moved, supine_patient_starts[0], REFIT_STEPS,
                                       refit_tolerance, &other, NULL);
     if (status == SUPINE_OK && other.squares < fit->squares) {
       *fit = other;
@@ -172,36 +88,99 @@ static supine_status refit(const study *s, const supine_patient_row *rows, size_
   return status;
 }
 
+static supine_patient_krige_options krige_options(const study *s) {
+  return (supine_patient_krige_options){.moved = s->options->moved,
+                                        .scale_known = s->options->law == SUPINE_PATIENT_PAPER};
+}
+
+/* The rows of a fold or all others, single ones first; how many of each. */
+static void split(const study *s, const size_t *fold, size_t which, bool inside,
+                  supine_patient_row *rows, size_t count[2]) {
+  size_t at = 0;
+  count[0] = count[1] = 0;
+  for (size_t i = 0; i < s->row_count; ++i) {
+    if ((fold[i] == which) == inside) {
+      rows[at++] = s->rows[i];
+      ++count[i < s->single ? 0 : 1];
+    }
+  }
+  count[1] /= 3;
+}
+
+static void add_points(const study *s, const supine_patient_row *rows, size_t count,
+                       const supine_patient_power *law, const supine_patient_krige *krige,
+                       double *scratch, squares *to) {
+  const double factor = supine_patient_krige_noise(krige);
+  for (size_t i = 0; i < count; i += s->components) {
+    double square = 0.0;
+    double expected = 0.0;
+    double weight = 0.0;
+    for (size_t j = i; j < i + s->components; ++j) {
+      const supine_patient_row *row = &rows[j];
+      double variance;
+      const double left = supine_patient_krige_predict(krige, row, &variance, scratch) - row->value;
+      to->law += row->weight * pow(supine_patient_power_residual(law, row), 2.0);
+      to->corrected += row->weight * left * left;
+      variance += pow(factor * row->noise, 2.0);
+      to->expected += row->weight * variance;
+      square += left * left;
+      expected += variance;
+      weight += row->weight;
+    }
+    const double band = s->components == 3 ? band_point : band_component;
+    to->points += weight > 0.0;
+    to->within += weight > 0.0 && square <= band * band * expected;
+  }
+}
+
+static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *to) {
+  supine_patient_row *kept = malloc(s->row_count * sizeof *kept);
+  supine_patient_row *held = malloc(s->row_count * sizeof *held);
+  supine_patient_row *thinned = malloc(s->row_count * sizeof *thinned);
+  double *scratch = malloc(s->row_count * sizeof *scratch);
+  supine_patient_krige *krige = NULL;
+  supine_patient_power law;
+  supine_status status = kept == NULL || held == NULL || thinned == NULL || scratch == NULL
+                             ? SUPINE_ERROR_MEMORY
+                             : SUPINE_OK;
+  if (status == SUPINE_OK) {
+    size_t count[2];
+    size_t out[2];
+    split(s, fold, which, false, kept, count);
+    split(s, fold, which, true, held, out);
+    const size_t rows = count[0] + 3 * count[1];
+    if (rows == s->row_count) {
+      goto cleanup; /* an empty fold */
+    }
+    status = refit(s, kept, rows, true, &law);
+    if (status == SUPINE_OK) {
+      const supine_patient_krige_options options = krige_options(s);
+      const size_t thin = supine_patient_krige_thin(kept, count[0], count[1], thinned);
+      status = supine_patient_krige_create(&law, thinned, thin, &options, &krige, NULL);
+    }
+    if (status == SUPINE_OK) {
+      add_points(s, held, out[0] + 3 * out[1], &law, krige, scratch, to);
+    }
+  }
+cleanup:
+  supine_patient_krige_destroy(krige);
+  free(kept);
+  free(held);
+  free(thinned);
+  free(scratch);
+  return status;
+}
+
 static void hold_out_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   study *s = context;
   for (size_t item = begin; item < end; ++item) {
-    const size_t *fold = s->fold + item / FOLDS * s->row_count;
-    supine_patient_power fit;
-    supine_patient_row *kept = malloc(s->row_count * sizeof *kept);
-    size_t count = 0;
-    s->failed[item] = SUPINE_ERROR_MEMORY;
-    for (size_t i = 0; kept != NULL && i < s->row_count; ++i) {
-      if (fold[i] != item % FOLDS) {
-        kept[count++] = s->rows[i];
-      }
-    }
-    if (kept != NULL && count == s->row_count) {
-      s->failed[item] = SUPINE_OK; /* an empty fold */
-    } else if (kept != NULL) {
-      s->failed[item] = refit(s, kept, count, true, &fit);
-      for (size_t i = 0; s->failed[item] == SUPINE_OK && i < s->row_count; ++i) {
-        if (fold[i] == item % FOLDS) {
-          s->squares[item] +=
-              s->rows[i].weight * pow(supine_patient_power_residual(&fit, &s->rows[i]), 2.0);
-        }
-      }
-    }
-    free(kept);
+    s->failed[item] =
+        hold_out(s, s->fold + item / FOLDS * s->row_count, item % FOLDS, &s->left[item]);
   }
 }
 
-/* Blocks drawn with replacement, as many as there are. */
+/* Draw blocks with replacement, as many as there are, and fit them. */
 static void draw_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   study *s = context;
@@ -274,17 +253,18 @@ static double apart(const study *s, const supine_patient_power *a, const supine_
   return most;
 }
 
-static double root_mean(const study *s, double squares, double weight) {
-  return sqrt(squares * (double)s->components / weight);
+static double root_mean(const study *s, double sum, double weight) {
+  return weight > 0.0 ? sqrt(sum * (double)s->components / weight) : 0.0;
 }
 
+/* Search the paper's nine constants from every start. */
 static supine_status fit_power(study *s, double weight, supine_patient_fit_report *report,
                                supine_error *error) {
   supine_patient_power fits[SUPINE_PATIENT_STARTS];
   size_t best = 0;
   for (size_t k = 0; k < SUPINE_PATIENT_STARTS; ++k) {
     const supine_status status =
-        supine_patient_power_fit(s->rows, s->row_count, s->moved, supine_patient_starts[k],
+        supine_patient_power_fit(s->rows, s->row_count, s->options->moved, supine_patient_starts[k],
                                  FIT_STEPS, fit_tolerance, &fits[k], error);
     if (status != SUPINE_OK) {
       return status;
@@ -297,171 +277,211 @@ static supine_status fit_power(study *s, double weight, supine_patient_fit_repor
         report->starts[k] <= (1.0 + same_start) * report->starts[best] + 1e-6;
     report->start_apart = fmax(report->start_apart, apart(s, &fits[k], &fits[best]));
   }
-  s->power = fits[best];
-  memcpy(report->at_bound, s->power.at_bound, sizeof report->at_bound);
+  s->law = fits[best];
+  memcpy(report->at_bound, s->law.at_bound, sizeof report->at_bound);
   return SUPINE_OK;
 }
 
 /* --- all of it ------------------------------------------------------------------------------- */
 
-static void score_polynomials(const study *s, double weight, supine_patient_fit_report *report,
-                              double affine[POLYNOMIAL], double quadratic[POLYNOMIAL]) {
-  double penalty[4][POLYNOMIAL];
-  double coefficients[4][POLYNOMIAL];
-  double *held[4] = {&report->held_out.translation, &report->held_out.law[SUPINE_PATIENT_AFFINE],
-                     &report->held_out.affine_lungs, NULL};
-  double *fitted[4] = {&report->fitted.translation, &report->fitted.law[SUPINE_PATIENT_AFFINE],
-                       &report->fitted.affine_lungs, &report->fitted.law[SUPINE_PATIENT_QUADRATIC]};
-  const bool one = s->frame->only_side != 0;
-  supine_patient_normals all;
-  sum_but(s, 0, FOLDS, FOLDS, &all);
-  choose_ridge(s, SEEDS, FOLDS, &report->ridge_quadratic, &report->ridge_lung);
-  supine_patient_penalty_translation(penalty[0]);
-  supine_patient_penalty_affine(false, penalty[1]);
-  supine_patient_penalty_affine(!one, penalty[2]);
-  supine_patient_penalty_quadratic(report->ridge_quadratic, report->ridge_lung, one, penalty[3]);
-  for (size_t k = 0; k < 4; ++k) {
-    if (supine_patient_polynomial_fit(&all, penalty[k], coefficients[k]) != SUPINE_OK) {
-      memset(coefficients[k], 0, sizeof coefficients[k]);
-    }
-    *fitted[k] = root_mean(s, supine_patient_polynomial_squares(&all, coefficients[k]), weight);
-    for (size_t seed = 0; seed < SEEDS && held[k] != NULL; ++seed) {
-      *held[k] += held_out_squares(s, seed, FOLDS, penalty[k]);
-    }
-    if (held[k] != NULL) {
-      *held[k] = root_mean(s, *held[k], SEEDS * weight);
+/* What no model needs: fitted and held out. */
+static void score_maps(const study *s, squares *fitted, squares *held) {
+  for (size_t seed = 0; seed <= SEEDS; ++seed) { /* the last: of all rows */
+    const size_t *fold = s->fold + (seed % SEEDS) * s->row_count;
+    for (size_t which = 0; which < (seed < SEEDS ? FOLDS : 1); ++which) {
+      double map[2][SUPINE_PATIENT_AFFINE];
+      for (int kind = 0; kind < 2; ++kind) {
+        if (!supine_patient_affine_fit(s->rows, s->row_count, seed < SEEDS ? fold : NULL, which,
+                                       kind == 0, map[kind])) {
+          memset(map[kind], 0, sizeof map[kind]);
+        }
+      }
+      squares *to = seed < SEEDS ? held : fitted;
+      for (size_t i = 0; i < s->row_count; ++i) {
+        const supine_patient_row *row = &s->rows[i];
+        if (seed == SEEDS || fold[i] == which) {
+          to->none += row->weight * row->value * row->value;
+          to->translation += row->weight * pow(supine_patient_affine_residual(map[0], row), 2.0);
+          to->affine += row->weight * pow(supine_patient_affine_residual(map[1], row), 2.0);
+          to->weight += row->weight;
+        }
+      }
     }
   }
-  report->held_out.law[SUPINE_PATIENT_QUADRATIC] =
-      root_mean(s, quadratic_held_out(s), SEEDS * weight);
-  report->fitted.none = report->held_out.none = root_mean(s, all.squares, weight);
-  report->fitted.affine = report->fitted.law[SUPINE_PATIENT_AFFINE];
-  report->held_out.affine = report->held_out.law[SUPINE_PATIENT_AFFINE];
-  memcpy(affine, coefficients[1], sizeof coefficients[1]);
-  memcpy(quadratic, coefficients[3], sizeof coefficients[3]);
 }
 
-/* Points that a law needs: as many as its unknowns would be if each point gave one number, so that
- * each is three times overdetermined by landmarks. */
-static size_t points_needed(supine_patient_law law, supine_patient_moved moved, bool one) {
-  static const size_t unknowns[SUPINE_PATIENT_LAW_COUNT] = {9, 12, 30};
-  const size_t motion = moved == SUPINE_PATIENT_STILL ? 0 : moved == SUPINE_PATIENT_RIGID ? 6 : 3;
-  return law == SUPINE_PATIENT_PAPER               ? unknowns[law] + motion
-         : law == SUPINE_PATIENT_QUADRATIC && !one ? 2 * unknowns[law]
-                                                   : unknowns[law];
+static supine_patient_scores scores_of(const study *s, const squares *of) {
+  return (supine_patient_scores){.none = root_mean(s, of->none, of->weight),
+                                 .translation = root_mean(s, of->translation, of->weight),
+                                 .affine = root_mean(s, of->affine, of->weight),
+                                 .law = root_mean(s, of->law, of->weight),
+                                 .corrected = root_mean(s, of->corrected, of->weight)};
 }
 
-static supine_status choose_law(const study *s, const supine_patient_fit_options *options,
-                                const supine_patient_fit_report *report, supine_patient_law *law,
-                                supine_error *error) {
-  const bool one = s->frame->only_side != 0;
-  const char *name = supine_patient_law_names[options->law];
-  if (options->law_given) {
-    const size_t needed = points_needed(options->law, options->moved, one);
-    *law = options->law;
-    return report->count >= needed
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                  "%zu points are fewer than the %zu unknowns of the %s law: give "
-                                  "more, or a law of fewer",
-                                  report->count, needed, name);
-  }
-  double least = INFINITY;
-  for (int k = 0; k < SUPINE_PATIENT_LAW_COUNT; ++k) {
-    if (report->count >= points_needed((supine_patient_law)k, options->moved, one) &&
-        report->held_out.law[k] < least) {
-      least = report->held_out.law[k];
-      *law = (supine_patient_law)k;
-    }
-  }
-  return isfinite(least)
+static supine_status check_count(const study *s, supine_error *error) {
+  static const size_t motion[] = {0, 3, 6};
+  const size_t needed =
+      (s->options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + motion[s->options->moved];
+  const size_t points = s->single + s->triples;
+  return points >= needed
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%zu points determine no law: give more", report->count);
+                                "%zu points are fewer than the %zu unknowns of the %s law: give "
+                                "more, or --law deep",
+                                points, needed, supine_patient_law_names[s->options->law]);
 }
 
-static void fill(const study *s, supine_patient_law law, const double *affine,
-                 const double *quadratic, supine_patient *patient) {
-  *patient = (supine_patient){.law = law, .frame = *s->frame};
-  memcpy(patient->powers, s->power.powers, sizeof patient->powers);
-  memcpy(patient->lengths, s->power.linear, sizeof patient->lengths);
-  memcpy(patient->motion, s->power.linear + 3, sizeof patient->motion);
-  memcpy(patient->polynomial, law == SUPINE_PATIENT_QUADRATIC ? quadratic : affine,
-         sizeof patient->polynomial);
-}
-
-static supine_status prepare(study *s, supine_error *error) {
-  const size_t items = SEEDS * FOLDS > REPLICATES ? SEEDS * FOLDS : REPLICATES;
-  s->fold = malloc(SEEDS * s->row_count * sizeof *s->fold);
-  s->normals = calloc(SEEDS * FOLDS, sizeof *s->normals);
-  s->squares = calloc(SEEDS * FOLDS, sizeof *s->squares);
-  s->drawn = calloc(REPLICATES, sizeof *s->drawn);
-  s->failed = calloc(items, sizeof *s->failed);
-  if (s->fold == NULL || s->normals == NULL || s->squares == NULL || s->drawn == NULL ||
-      s->failed == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", s->row_count);
+/* Deal the blocks of each seed's grid to the folds. */
+static supine_status deal(study *s, supine_error *error) {
+  for (size_t seed = 0; seed < SEEDS; ++seed) {
+    const size_t blocks = supine_patient_rows_block(s->frame, s->rows, s->row_count, seed + 1);
+    size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
+    if (blocks == 0 || fold_of == NULL ||
+        supine_patient_rows_deal(blocks, FOLDS, 1000 + seed, fold_of) != SUPINE_OK) {
+      free(fold_of);
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu blocks", blocks);
+    }
+    for (size_t i = 0; i < s->row_count; ++i) {
+      s->fold[seed * s->row_count + i] = fold_of[s->rows[i].block];
+    }
+    s->blocks = blocks;
+    free(fold_of);
   }
-  supine_status status = SUPINE_OK;
-  for (size_t seed = 0; seed < SEEDS && status == SUPINE_OK; ++seed) {
-    status = deal(s, seed, error);
+  return SUPINE_OK;
+}
+
+/* Correct the law of all rows; `fitted` gets what law and correction leave. */
+static supine_status correct(const study *s, supine_patient *patient, squares *fitted,
+                             supine_error *error) {
+  supine_patient_row *thinned = malloc(s->row_count * sizeof *thinned);
+  double *scratch = malloc(s->row_count * sizeof *scratch);
+  supine_patient_krige *krige = NULL;
+  supine_status status =
+      thinned == NULL || scratch == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", s->row_count)
+          : SUPINE_OK;
+  if (status == SUPINE_OK) {
+    const supine_patient_krige_options options = krige_options(s);
+    const size_t count = supine_patient_krige_thin(s->rows, s->single, s->triples, thinned);
+    status = supine_patient_krige_create(&s->law, thinned, count, &options, &krige, error);
+  }
+  if (status == SUPINE_OK) {
+    add_points(s, s->rows, s->row_count, &s->law, krige, scratch, fitted);
+    supine_patient_krige_take(krige, patient);
+  }
+  supine_patient_krige_destroy(krige);
+  free(thinned);
+  free(scratch);
+  return status;
+}
+
+static supine_status hold_all_out(study *s, squares *held, supine_error *error) {
+  supine_parallel_for(ITEMS, 1, 0, hold_out_range, s);
+  for (size_t item = 0; item < ITEMS; ++item) {
+    const squares *of = &s->left[item];
+    held->law += of->law;
+    held->corrected += of->corrected;
+    held->expected += of->expected;
+    held->points += of->points;
+    held->within += of->within;
+  }
+  return failure(s, ITEMS, "holding blocks out", error);
+}
+
+static void conclude(const study *s, const squares *fitted, const squares *held,
+                     supine_patient_fit_report *report) {
+  const bool moved = s->options->moved != SUPINE_PATIENT_STILL;
+  report->blocks = s->blocks;
+  report->fitted = scores_of(s, fitted);
+  report->held_out = scores_of(s, held);
+  report->expected = root_mean(s, held->expected, held->weight);
+  report->band = held->points > 0 ? (double)held->within / (double)held->points : 0.0;
+  if (s->options->uncorrected) {
+    report->fitted.corrected = report->fitted.law;
+    report->held_out.corrected = report->held_out.law;
+  }
+  const supine_patient_scores *of = &report->held_out;
+  report->explained = 1.0 - pow(of->corrected / (moved ? of->translation : of->none), 2.0);
+  of = &report->fitted;
+  report->explained_fitted = 1.0 - pow(of->corrected / (moved ? of->translation : of->none), 2.0);
+}
+
+static supine_status fit_law(study *s, double weight, supine_patient_fit_report *report,
+                             supine_error *error) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const double *g = s->options->gravity;
+  if (s->options->law == SUPINE_PATIENT_PAPER) {
+    return fit_power(s, weight, report, error);
+  }
+  const bool given = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
+  const supine_patient_power shape = supine_patient_deep(given ? g : supine);
+  return supine_patient_scale_fit(s->rows, s->row_count, s->options->moved, &shape, &s->law, error);
+}
+
+static supine_status study_run(study *s, supine_patient *patient, supine_patient_fit_report *report,
+                               supine_error *error) {
+  squares fitted = {0};
+  squares held = {0};
+  double weight = 0.0;
+  supine_status status = check_count(s, error);
+  if (status == SUPINE_OK) {
+    status = deal(s, error);
+  }
+  for (size_t i = 0; i < s->row_count; ++i) {
+    weight += s->rows[i].weight;
+  }
+  if (status == SUPINE_OK) {
+    score_maps(s, &fitted, &held);
+    status = fit_law(s, weight, report, error);
+  }
+  if (status == SUPINE_OK) {
+    status = hold_all_out(s, &held, error);
+  }
+  if (status == SUPINE_OK && s->options->law == SUPINE_PATIENT_PAPER) {
+    status = bootstrap(s, report, error);
+  }
+  *patient = (supine_patient){.law = s->options->law, .frame = *s->frame};
+  if (status == SUPINE_OK) {
+    status = correct(s, patient, &fitted, error);
+  }
+  if (status == SUPINE_OK && s->options->uncorrected) {
+    patient->correction.count = 0;
+    memcpy(patient->lengths, s->law.linear, sizeof patient->lengths);
+    memcpy(patient->motion, s->law.linear + 3, sizeof patient->motion);
+  }
+  if (status == SUPINE_OK) {
+    conclude(s, &fitted, &held, report);
   }
   return status;
 }
 
 /* Eight parameters: what is fitted, to what, how, and what comes of it. */
 supine_status supine_patient_fit(const supine_patient_frame *frame, supine_patient_row *rows,
-                                 size_t count, size_t components,
+                                 size_t single, size_t triples,
                                  const supine_patient_fit_options *options, supine_patient *patient,
                                  supine_patient_fit_report *report, supine_error *error) {
   supine_patient_fit_report unused;
+  const size_t count = single + 3 * triples;
   report = report != NULL ? report : &unused;
-  *report = (supine_patient_fit_report){.count = count, .components = components};
   study s = {.frame = frame,
+             .options = options,
              .rows = rows,
-             .row_count = components * count,
-             .components = components,
-             .moved = options->moved};
-  double affine[POLYNOMIAL];
-  double quadratic[POLYNOMIAL];
-  double weight = 0.0;
-  supine_patient_law law = SUPINE_PATIENT_QUADRATIC;
-  for (size_t i = 0; i < s.row_count; ++i) {
-    weight += rows[i].weight;
-  }
-  supine_status status = prepare(&s, error);
-  if (status == SUPINE_OK) {
-    report->blocks = s.blocks;
-    score_polynomials(&s, weight, report, affine, quadratic);
-    status = fit_power(&s, weight, report, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_parallel_for(SEEDS * FOLDS, 1, 0, hold_out_range, &s);
-    status = failure(&s, SEEDS * FOLDS, "holding blocks out", error);
-  }
-  if (status == SUPINE_OK) {
-    double squares = 0.0;
-    for (size_t item = 0; item < SEEDS * FOLDS; ++item) {
-      squares += s.squares[item];
-    }
-    report->fitted.law[SUPINE_PATIENT_PAPER] = root_mean(&s, s.power.squares, weight);
-    report->held_out.law[SUPINE_PATIENT_PAPER] = root_mean(&s, squares, SEEDS * weight);
-    status = bootstrap(&s, report, error);
-  }
-  if (status == SUPINE_OK) {
-    status = choose_law(&s, options, report, &law, error);
-  }
-  if (status == SUPINE_OK) {
-    const bool moved = options->moved != SUPINE_PATIENT_STILL;
-    const supine_patient_scores *held = &report->held_out;
-    const supine_patient_scores *fitted = &report->fitted;
-    report->explained = 1.0 - pow(held->law[law] / (moved ? held->translation : held->none), 2.0);
-    report->explained_fitted =
-        1.0 - pow(fitted->law[law] / (moved ? fitted->translation : fitted->none), 2.0);
-    fill(&s, law, affine, quadratic, patient);
-  }
+             .single = single,
+             .triples = triples,
+             .row_count = count,
+             .components = single > 0 ? 1 : 3,
+             .fold = malloc(SEEDS * count * sizeof(size_t)),
+             .left = calloc(ITEMS, sizeof(squares)),
+             .drawn = calloc(REPLICATES, sizeof(supine_patient_power)),
+             .failed = calloc(REPLICATES, sizeof(supine_status))};
+  *report = (supine_patient_fit_report){.count = single > 0 ? count : triples,
+                                        .components = s.components};
+  const supine_status status =
+      s.fold == NULL || s.left == NULL || s.drawn == NULL || s.failed == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count)
+          : study_run(&s, patient, report, error);
   free(s.fold);
-  free(s.normals);
-  free(s.squares);
+  free(s.left);
   free(s.drawn);
   free(s.failed);
   return status;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * From landmarks or surfaces to a patient's law, with what it is worth. */
+ * From landmarks or surfaces to a patient's law, with what it is worth on held-out blocks. */
 #ifndef SUPINE_PATIENT_FIT_H
 #define SUPINE_PATIENT_FIT_H
 
@@ -8,27 +8,36 @@
 #include "precompute/patient/rows.h"
 
 /** Held-out blocks: folds, and seeds that the grid of blocks is placed with. */
-enum { SUPINE_PATIENT_FOLDS = 5, SUPINE_PATIENT_SEEDS = 3, SUPINE_PATIENT_CONSTANTS = 9 };
+enum { SUPINE_PATIENT_FOLDS = 5, SUPINE_PATIENT_SEEDS = 3 };
 
-/** Zero-initialised: the law that holds out best, no motion between the scans. */
+/** Zero-initialised: the deep law, corrected, no motion between the scans. */
 typedef struct supine_patient_fit_options {
-  bool law_given;
   supine_patient_law law;
   supine_patient_moved moved;
+  bool uncorrected;  /**< leave the correction out */
+  double gravity[3]; /**< of the emptier state; all 0: supine */
 } supine_patient_fit_options;
 
-/** Root mean squares, mm, of what laws leave. */
+/** Held-out or fitted errors, mm RMS, of a law and of what it is to be better than. */
+typedef struct supine_patient_scores {
+  double none, translation, affine;
+  double law;       /**< without its correction */
+  double corrected; /**< with it */
+} supine_patient_scores;
+
 typedef struct supine_patient_fit_report {
   size_t count;      /**< landmarks, or points of a surface */
   size_t blocks;     /**< cubes that they fall into */
-  size_t components; /**< measured at each: 3 of a landmark, 1 of a surface */
+  size_t components; /**< measured at each: 3 of landmarks alone, else 1 */
   supine_patient_scores fitted;
-  supine_patient_scores held_out;       /**< on blocks that the fit had not seen */
-  double explained;                     /**< share of the squared displacement, held out */
-  double explained_fitted;              /**< the same, of what was fitted */
-  double ridge_quadratic;               /**< chosen by held-out blocks */
-  double ridge_lung;                    /**< INFINITY: one map for both lungs */
-  double starts[SUPINE_PATIENT_STARTS]; /**< what each start left of the paper's law, mm RMS */
+  supine_patient_scores held_out; /**< on blocks that the fit had not seen */
+  double band;                    /**< share of held-out points within the 95 % band */
+  double
+      expected; /**< mm RMS, expected of held-out points (of a component, where one is measured) */
+  double explained;        /**< share of the squared displacement, held out */
+  double explained_fitted; /**< the same, of what was fitted */
+  /* Of the paper's law alone: */
+  double starts[SUPINE_PATIENT_STARTS]; /**< what each start left, mm RMS */
   double start_apart;     /**< largest distance between two starts' fields, mm, over the
                                points */
   size_t starts_agreeing; /**< within 1 % of the best */
@@ -38,18 +47,19 @@ typedef struct supine_patient_fit_report {
   double high[SUPINE_PATIENT_CONSTANTS];
 } supine_patient_fit_report;
 
-/** c1 to c9 of a patient, the force scaled to 1 at the box's centre. */
-void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]);
+/** The deep law in the form of nine constants, for gravity along a unit vector. */
+supine_patient_power supine_patient_deep(const double gravity[3]);
 
-/** Fits all three laws to rows, holds blocks of 40 mm out of each, and keeps one law.
- * @param frame       of the box coordinates
- * @param rows        [components * count]; their blocks are set
- * @param components  rows a point: 3 or 1
- * @param report      optional
+/** Fit a law and its correction to rows, and hold blocks of 40 mm out.
+ * @param frame    of the box coordinates
+ * @param rows     [single + 3 triples]; their blocks are set
+ * @param single   points of which one component is known, first among the rows
+ * @param triples  landmarks
+ * @param report   optional
  * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_fit(const supine_patient_frame *frame, supine_patient_row *rows,
-                                 size_t count, size_t components,
+                                 size_t single, size_t triples,
                                  const supine_patient_fit_options *options, supine_patient *patient,
                                  supine_patient_fit_report *report, supine_error *error);
 

@@ -9,8 +9,10 @@
 #include "precompute/patient/gain.h"
 
 #include "precompute/patient/matching.h"
+#include "sh/base/vec3.h"
 
 static const double gain_most = 2.0;
+static const double at_bound = 0.01;     /* of a gain: nearer to a bound it is not determined */
 static const double same_posture = 0.05; /* of the unit vectors' distance: 3 degrees */
 static const double matched_least = 0.3; /* of a surface's vertices */
 static const double settled = 1e-4;      /* of a scale, between rounds */
@@ -34,6 +36,7 @@ typedef struct state {
 typedef struct problem {
   const supine_patient_record *record;
   bool moved;
+  double above; /* how far the fuller state is below full, of the way to the emptier one */
   state *states;
   size_t state_count;
   size_t without_state, without_block; /* left out; SIZE_MAX: none */
@@ -53,7 +56,7 @@ static double squares_of(const problem *problem_, size_t which, double gain, dou
                          double *weight) {
   const state *s = &problem_->states[which];
   const supine_force_law law =
-      supine_patient_force(&problem_->record->patient, gain, problem_->record->state.gravity);
+      supine_patient_force(&problem_->record->patient, gain, problem_->record->state[1].gravity);
   const size_t n = problem_->moved ? UNKNOWNS : 1;
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
@@ -61,10 +64,9 @@ static double squares_of(const problem *problem_, size_t which, double gain, dou
   *weight = 0.0;
   for (size_t i = 0; i < s->count; ++i) {
     const point *p = &s->points[i];
-    const double ratio = ratio_at(p, &law);
-    const double row[UNKNOWNS] = {
-        ratio * (p->axis[0] * p->u[0] + p->axis[1] * p->u[1] + p->axis[2] * p->u[2]), p->axis[0],
-        p->axis[1], p->axis[2]};
+    const double along = supine_dot(p->axis, p->u);
+    const double row[UNKNOWNS] = {ratio_at(p, &law) * along, p->axis[0], p->axis[1], p->axis[2]};
+    const double value = p->value + problem_->above * along;
     if (which == problem_->without_state && p->block == problem_->without_block) {
       continue;
     }
@@ -72,9 +74,9 @@ static double squares_of(const problem *problem_, size_t which, double gain, dou
       for (size_t b = 0; b < n; ++b) {
         matrix[a * n + b] += p->weight * row[a] * row[b];
       }
-      right[a] += p->weight * row[a] * p->value;
+      right[a] += p->weight * row[a] * value;
     }
-    squares += p->weight * p->value * p->value;
+    squares += p->weight * value * value;
     *weight += p->weight;
   }
   double solved[UNKNOWNS];
@@ -163,9 +165,9 @@ static supine_status take_pairs(const problem *p, state *s, supine_error *error)
     for (size_t k = 0; k < 3; ++k) {
       to->parts[1 + k] = fmin(1.0, fmax(0.0, place->box[k]));
     }
-    to->parts[4] = frame_height(frame, p->record->state.gravity, place);
+    to->parts[4] = frame_height(frame, p->record->state[1].gravity, place);
     to->parts[5] = frame_height(frame, s->other->gravity, place);
-    supine_patient_displacement(&p->record->patient, pairs->from + 3 * (i / 3), to->u);
+    supine_patient_displacement(&p->record->patient, pairs->from + 3 * (i / 3), place->side, to->u);
   }
   free(rows);
   return SUPINE_OK;
@@ -177,7 +179,7 @@ static supine_status solve_heights(const problem *p, const state *s, const doubl
   const supine_lungs *rest = s->matching.rest;
   const size_t n = rest->mesh.vertex_count;
   double *heights = malloc(2 * n * sizeof *heights);
-  const double *g[2] = {p->record->state.gravity, s->other->gravity};
+  const double *g[2] = {p->record->state[1].gravity, s->other->gravity};
   if (heights == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
@@ -202,6 +204,25 @@ static supine_status solve_heights(const problem *p, const state *s, const doubl
   }
   free(heights);
   return status;
+}
+
+/* The fitted displacement of a vertex, whose row has what forces come to there. */
+static void displace(const supine_patient_record *record, const supine_patient_row *row,
+                     const double vertex[3], double u[3]) {
+  const supine_patient *patient = &record->patient;
+  double r[3];
+  if (!record->from_surface) {
+    supine_patient_displacement(patient, vertex, row->place.side, u);
+    return;
+  }
+  const double *c = patient->powers + 3;
+  const double force =
+      row->force[0] + c[0] * row->force[1] + c[1] * row->force[2] + c[2] * row->force[3];
+  supine_patient_direction(patient, &row->place, u);
+  supine_patient_correct(patient, &row->place, r);
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] = force * u[k] + r[k];
+  }
 }
 
 /* The vertices that take part, with what forces come to there. */
@@ -240,16 +261,7 @@ static supine_status take_surface(const problem *p, state *s, const supine_lungs
     }
     to->parts[4] = caught[2 * v];
     to->parts[5] = caught[2 * v + 1];
-    if (record->patient.law == SUPINE_PATIENT_PAPER && record->from_surface) {
-      const double *c = record->patient.powers + 3;
-      const double force = columns[0] + c[0] * columns[1] + c[1] * columns[2] + c[2] * columns[3];
-      supine_patient_paper_direction(&record->patient, rest->mesh.vertices + 3 * v, to->u);
-      for (size_t k = 0; k < 3; ++k) {
-        to->u[k] *= force;
-      }
-    } else {
-      supine_patient_displacement(&record->patient, rest->mesh.vertices + 3 * v, to->u);
-    }
+    displace(record, &s->matching.rows[i], rest->mesh.vertices + 3 * v, to->u);
   }
   free(stiffness);
   free(caught);
@@ -261,13 +273,13 @@ static supine_status match_surface(const problem *p, state *s, double gain, cons
                                    supine_error *error) {
   supine_patient_matching *m = &s->matching;
   const supine_force_law law =
-      supine_patient_force(&p->record->patient, gain, p->record->state.gravity);
+      supine_patient_force(&p->record->patient, gain, p->record->state[1].gravity);
   double rms;
   for (size_t i = 0; i < m->count; ++i) {
     const double ratio = ratio_at(&s->points[i], &law);
     for (size_t k = 0; k < 3; ++k) {
       m->moved[3 * i + k] = m->rest->mesh.vertices[3 * m->vertex[i] + k] +
-                            unknowns[0] * ratio * s->points[i].u[k] + unknowns[1 + k];
+                            (unknowns[0] * ratio - p->above) * s->points[i].u[k] + unknowns[1 + k];
     }
   }
   supine_patient_matching_find(m);
@@ -286,6 +298,24 @@ static supine_status match_surface(const problem *p, state *s, double gain, cons
     s->points[i].block = m->rows[i].block;
   }
   return SUPINE_OK;
+}
+
+void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
+  enum { STEPS = 30 };
+  for (size_t i = 0; i < count; ++i) {
+    double at[3];
+    double u[3];
+    double motion[3];
+    memcpy(at, points + 3 * i, sizeof at);
+    for (int step = 0; step < STEPS; ++step) {
+      supine_patient_displacement(patient, at, 0.0, u);
+      supine_patient_motion(patient, at, motion);
+      for (size_t k = 0; k < 3; ++k) {
+        at[k] = points[3 * i + k] - u[k] - motion[k];
+      }
+    }
+    memcpy(points + 3 * i, at, sizeof at);
+  }
 }
 
 /* --- all of it ------------------------------------------------------------------------------- */
@@ -361,13 +391,13 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
                                       size_t count, supine_patient_gain *found,
                                       supine_error *error) {
   state states[SUPINE_PATIENT_OTHERS_MAX] = {{0}};
-  problem p = {record, moved, states, count, SIZE_MAX, SIZE_MAX};
+  problem p = {record, moved, supine_patient_below_full(record), states, count, SIZE_MAX, SIZE_MAX};
   supine_status status = SUPINE_OK;
   *found = (supine_patient_gain){.gain = record->force.gain};
   for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
     double apart = 0.0;
     for (int a = 0; a < 3; ++a) {
-      apart += pow(others[k].gravity[a] - record->state.gravity[a], 2.0);
+      apart += pow(others[k].gravity[a] - record->state[1].gravity[a], 2.0);
     }
     found->told = found->told || sqrt(apart) >= same_posture;
     states[k].other = &others[k];
@@ -379,6 +409,8 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
   }
   if (status == SUPINE_OK) {
     conclude(&p, found);
+    found->open = found->told && (found->gain < at_bound || found->gain > gain_most - at_bound);
+    found->gain = found->open ? record->force.gain : found->gain;
   }
   for (size_t k = 0; k < count; ++k) {
     supine_patient_matching_free(&states[k].matching);

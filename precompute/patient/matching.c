@@ -8,14 +8,17 @@
 
 #include "precompute/patient/matching.h"
 
+#include "precompute/patient/stiffness.h"
+
 #include "precompute/physics/solve.h"
 #include "sh/base/parallel.h"
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5;   /* cosine between normals: 60 degrees */
-static const double biweight = 4.685;   /* of the scale: 95 % efficient on normal errors */
-static const double scale_least = 0.02; /* mm: no surface is known better */
+static const double compatible = 0.5;    /* cosine between normals: 60 degrees */
+static const double biweight = 4.685;    /* of the scale: 95 % efficient on normal errors */
+static const double surface_noise = 0.5; /* mm along the normal */
+static const double scale_least = 0.02;  /* mm: no surface is known better */
 
 supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs) {
   supine_patient_frame frame = {.midline = lungs->midline,
@@ -156,7 +159,9 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
     m->vertex[i] = v;
     memcpy(m->normals + 3 * i, all + 3 * v, 3 * sizeof(double));
     memcpy(m->moved + 3 * i, rest->mesh.vertices + 3 * v, 3 * sizeof(double));
-    m->rows[i].place = supine_patient_find(&m->frame, rest->mesh.vertices + 3 * v);
+    const double side = supine_patient_side_of(rest, v) == 0 ? 1.0 : -1.0;
+    m->rows[i].place = supine_patient_find(&m->frame, rest->mesh.vertices + 3 * v, side);
+    m->rows[i].noise = surface_noise;
   }
   free(all);
   const supine_status status = set_up_forces(m, model, error);

@@ -129,5 +129,12 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
 void supine_patient_pairs_free(supine_patient_pairs *pairs) {
   free(pairs->from);
   free(pairs->to);
+  free(pairs->side);
   *pairs = (supine_patient_pairs){0};
+}
+
+void supine_patient_pairs_swap(supine_patient_pairs *pairs) {
+  double *from = pairs->from;
+  pairs->from = pairs->to;
+  pairs->to = from;
 }

@@ -14,6 +14,7 @@ typedef struct supine_patient_pairs {
   size_t count;
   double *from; /**< [count, 3] at rest */
   double *to;   /**< [count, 3] in the other state */
+  double *side; /**< [count] +1 left lung, -1 right; NULL: by the midline */
 } supine_patient_pairs;
 
 /** Reads matched points from CSV with the columns x,y,z,to_x,to_y,to_z (from rest to the other
@@ -29,6 +30,13 @@ typedef struct supine_patient_pairs {
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
+
+/** Swap the two states. */
+void supine_patient_pairs_swap(supine_patient_pairs *pairs);
+
+/** Compute how much larger the other state is: the determinant of the affine map that fits best.
+ * @return 1 where the points determine none */
+double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
 /** Whether the pairs can be two states of one chest: judged by the affine map that fits them best.
  *

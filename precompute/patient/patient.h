@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * A patient's own law of displacement, from that person's scans and landmarks ([Santhanam2008]
- * IV-B), and how well it held out.
+ * IV-B): a law of nine constants, and a correction that carries what it leaves of this person.
  *
- * With X, Y, Z the box coordinates of lungs.h, side +1 left and -1 right, and u the displacement
- * from rest to the state that was fitted:
+ * With X, Y, Z the box coordinates of lungs.h over the fuller of two states, side +1 left and -1
+ * right, u is the displacement from the fuller state to the emptier one:
  *
- *     paper       u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6)
- *     affine      u = polynomial of degree 1 in the position
- *     quadratic   u = polynomial of degree 2 in X, Y, Z; mirrored between the lungs, and what each
- *                 lung has beyond that, both held down as far as held-out blocks ask for
+ *     u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6) + r
  *
- * The force is scaled to 1 at the box's centre, as only its product with the directions shows. */
+ * `deep` takes c2, c4, c6 to c9 and the ratios of the lengths from the deep law (model.h), `paper`
+ * fits all nine. The correction r is a sum of kernels (krige.h). The force is scaled to 1 at the
+ * box's centre, as only its product with the directions shows. */
 #ifndef SUPINE_PATIENT_H
 #define SUPINE_PATIENT_H
 
@@ -21,16 +20,15 @@
 #include "precompute/patient/pairs.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_PAPER = 0,
-  SUPINE_PATIENT_AFFINE,
-  SUPINE_PATIENT_QUADRATIC,
+  SUPINE_PATIENT_DEEP = 0,
+  SUPINE_PATIENT_PAPER,
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
-/** "paper", "affine", "quadratic". */
+/** "deep", "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
-/** Where box coordinates are counted from, mm. */
+/** The box of the fuller state, mm. */
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
   double midline;
@@ -38,29 +36,34 @@ typedef struct supine_patient_frame {
 } supine_patient_frame;
 
 enum {
-  SUPINE_PATIENT_TERMS = 10,     /**< of a polynomial of degree 2 in three variables */
-  SUPINE_PATIENT_POWERS = 6,     /**< c2, c4, c6, c7, c8, c9: not linear in the displacement */
-  SUPINE_PATIENT_POLYNOMIAL = 60 /**< three components, shared and by lung */
+  SUPINE_PATIENT_POWERS = 6, /**< c2, c4, c6, c7, c8, c9: not linear in the displacement */
+  SUPINE_PATIENT_STARTS = 6, /**< from which they are searched */
+  SUPINE_PATIENT_CONSTANTS = 9,
+  SUPINE_PATIENT_CENTRES_MAX = 600
 };
 
-/** Held-out and fitted errors, mm RMS, of the law and of what it is to be better than. */
-typedef struct supine_patient_scores {
-  double none, translation, affine, affine_lungs;
-  double law[SUPINE_PATIENT_LAW_COUNT];
-} supine_patient_scores;
+/** A kernel of the correction. */
+typedef struct supine_patient_centre {
+  double at[3];     /**< mm */
+  double side;      /**< of its lung */
+  double size;      /**< of the law's displacement there, mm */
+  double weight[3]; /**< 1/mm */
+} supine_patient_centre;
 
-/** How far apart six starts ended. */
-enum { SUPINE_PATIENT_STARTS = 6 };
+typedef struct supine_patient_correction {
+  size_t count; /**< 0: none */
+  double scale; /**< the law that sizes are counted in, over the law as it was fitted */
+  supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
+} supine_patient_correction;
 
 typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   double powers[SUPINE_PATIENT_POWERS]; /**< c2, c4, c6, c7, c8, c9 */
-  double lengths[3];                    /**< c1, c3, c5, mm */
-  /** Coefficients by component, term and (shared, by lung), mm; motion included. */
-  double polynomial[SUPINE_PATIENT_POLYNOMIAL];
+  double lengths[3];                    /**< c1, c3, c5, mm; negative where the lung empties */
   double motion[6]; /**< between the scans: translation (mm), small rotation (rad) about the box's
                        centre; u + motion is what was measured */
+  supine_patient_correction correction;
 } supine_patient;
 
 /** A place as the laws see it. */
@@ -70,7 +73,9 @@ typedef struct supine_patient_place {
   double arm[3]; /**< from the box's centre, mm */
 } supine_patient_place;
 
-supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3]);
+/** @param side  of the point's lung, +1 or -1; 0: that of the midline */
+supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
+                                         double side);
 
 /** The frame of points alone: their box, and 10 mm more on every side, as lungs end beyond their
  * landmarks.
@@ -78,20 +83,30 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline);
 
-/** u at a point, mm, without the motion between the scans. Outside the frame: the paper's law as at
- * its nearest face, polynomials in a straight line from there. */
-void supine_patient_displacement(const supine_patient *patient, const double point[3], double u[3]);
+/** Compute the nine constants, the force scaled to 1 at the box's centre. */
+void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]);
 
-/** (15)-(17) of the paper's law at a point, without the force, mm. */
-void supine_patient_paper_direction(const supine_patient *patient, const double point[3],
-                                    double d[3]);
+/** Compute (18) of the law at a place; outside the box as at its nearest face. */
+double supine_patient_force_at(const supine_patient *patient, const supine_patient_place *place);
 
-/** The motion between the scans at a point, mm. */
+/** Compute (15)-(17) of the law at a place, without the force, mm. */
+void supine_patient_direction(const supine_patient *patient, const supine_patient_place *place,
+                              double d[3]);
+
+/** Compute the law's displacement at a place, mm, without the correction and the motion. */
+void supine_patient_law_displacement(const supine_patient *patient,
+                                     const supine_patient_place *place, double u[3]);
+
+/** Compute the correction at a place, mm. */
+void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
+                            double r[3]);
+
+/** Compute u of a point, mm, without the motion between the scans.
+ * @param side  as supine_patient_find */
+void supine_patient_displacement(const supine_patient *patient, const double point[3], double side,
+                                 double u[3]);
+
+/** Compute the motion between the scans at a point, mm. */
 void supine_patient_motion(const supine_patient *patient, const double point[3], double u[3]);
-
-/** The terms of a polynomial of degree 2 at a place, and, optionally, their derivatives along the
- * box's axes. */
-void supine_patient_terms(const double box[3], double terms[SUPINE_PATIENT_TERMS],
-                          double (*slopes)[SUPINE_PATIENT_TERMS]);
 
 #endif

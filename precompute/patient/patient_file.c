@@ -12,7 +12,7 @@
 #include "sh/base/output.h"
 
 static const char format[] = "supine-patient";
-enum { VERSION = 1, TERMS = SUPINE_PATIENT_TERMS };
+enum { VERSION = 2, CENTRE = 8 };
 
 static json_t *numbers(const double *values, size_t count) {
   json_t *array = json_array();
@@ -22,9 +22,10 @@ static json_t *numbers(const double *values, size_t count) {
   return array;
 }
 
-static json_t *scan(const supine_patient_scan *of) {
-  return json_pack("{s:s, s:o, s:s}", "posture", of->posture, "gravity", numbers(of->gravity, 3),
-                   "volume", of->volume);
+static json_t *state(const supine_patient_record *record, size_t k) {
+  char text[SUPINE_PATIENT_STATE_TEXT];
+  (void)supine_state_print(&record->state[k], text, sizeof text);
+  return json_pack("{s:s, s:f}", "state", text, "volume_ml", record->volume[k]);
 }
 
 static const char *side_name(int side) {
@@ -32,22 +33,20 @@ static const char *side_name(int side) {
 }
 
 static json_t *scores(const supine_patient_scores *of) {
-  return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f}", "none", of->none, "translation",
-                   of->translation, "affine", of->affine, "affine_per_lung", of->affine_lungs,
-                   "paper", of->law[SUPINE_PATIENT_PAPER], "quadratic",
-                   of->law[SUPINE_PATIENT_QUADRATIC]);
+  return json_pack("{s:f, s:f, s:f, s:f, s:f}", "none", of->none, "translation", of->translation,
+                   "affine", of->affine, "law", of->law, "corrected", of->corrected);
 }
 
-static json_t *polynomial(const supine_patient *patient) {
-  json_t *all = json_object();
-  for (size_t a = 0; a < 3; ++a) {
-    const double *shared = patient->polynomial + 2 * a * TERMS;
-    const char axis[2] = {"xyz"[a], '\0'};
-    (void)json_object_set_new(all, axis,
-                              json_pack("{s:o, s:o}", "shared", numbers(shared, TERMS), "by_lung",
-                                        numbers(shared + TERMS, TERMS)));
+/* Seven numbers a centre: place, side, size and weights. */
+static json_t *correction(const supine_patient_correction *of) {
+  json_t *all = json_array();
+  for (size_t i = 0; i < of->count; ++i) {
+    const supine_patient_centre *c = &of->centre[i];
+    const double values[CENTRE] = {c->at[0], c->at[1],     c->at[2],     c->side,
+                                   c->size,  c->weight[0], c->weight[1], c->weight[2]};
+    (void)json_array_append_new(all, numbers(values, CENTRE));
   }
-  return all;
+  return json_pack("{s:f, s:o}", "scale", of->scale, "centres", all);
 }
 
 static void add_report(json_t *root, const supine_patient *patient,
@@ -57,7 +56,7 @@ static void add_report(json_t *root, const supine_patient *patient,
   double c[SUPINE_PATIENT_CONSTANTS];
   json_t *constants = json_object();
   supine_patient_constants(patient, c);
-  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
+  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && patient->law == SUPINE_PATIENT_PAPER; ++k) {
     (void)json_object_set_new(constants, names[k],
                               json_pack("{s:f, s:f, s:f, s:f}", "value", c[k], "standard_error",
                                         report->error[k], "low", report->low[k], "high",
@@ -70,9 +69,6 @@ static void add_report(json_t *root, const supine_patient *patient,
       root, "starts",
       json_pack("{s:o, s:i, s:f}", "rms_mm", numbers(report->starts, SUPINE_PATIENT_STARTS),
                 "agreeing", (int)report->starts_agreeing, "apart_mm", report->start_apart));
-  (void)json_object_set_new(
-      root, "ridge",
-      json_pack("{s:f, s:f}", "quadratic", report->ridge_quadratic, "lung", report->ridge_lung));
   (void)json_object_set_new(root, "blocks", json_integer((json_int_t)report->blocks));
   (void)json_object_set_new(root, "explained_fitted_percent",
                             json_real(100.0 * report->explained_fitted));
@@ -119,8 +115,10 @@ static json_t *further(const supine_patient_record *record) {
   json_t *all = json_array();
   for (size_t k = 0; k < record->told_count; ++k) {
     const supine_patient_told *told = &record->told[k];
-    (void)json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f}", "posture", told->posture,
-                                               "scale", told->scale, "left_rms_mm", told->left,
+    char text[SUPINE_PATIENT_STATE_TEXT];
+    (void)supine_state_print(&told->state, text, sizeof text);
+    (void)json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f}", "state", text, "scale",
+                                               told->scale, "left_rms_mm", told->left,
                                                "left_without_gain_mm", told->left_without));
   }
   return all;
@@ -135,15 +133,18 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   const supine_patient *patient = &record->patient;
   const supine_patient_frame *frame = &patient->frame;
   json_t *root = json_pack(
-      "{s:s, s:i, s:s, s:s, s:i, s:f, s:f, s:f, s:f, s:{s:o, s:o, s:f, s:s, s:s}, s:o, s:o, s:f}",
+      "{s:s, s:i, s:s, s:s, s:i, s:f, s:f, s:f, s:f, s:f, s:f, s:{s:o, s:o, s:f, s:s, s:s}, "
+      "s:{s:o, s:o}, s:o, s:o, s:f}",
       "format", format, "version", VERSION, "name", record->name, "law",
       supine_patient_law_names[patient->law], "points", (int)record->points, "held_out_rms_mm",
-      record->held_out, "held_out_baseline_mm", record->held_out_baseline, "fitted_rms_mm",
+      record->held_out, "held_out_baseline_mm", record->held_out_baseline, "expected_rms_mm",
+      record->expected, "band_95_percent_holds", 100.0 * record->band, "fitted_rms_mm",
       record->fitted, "explained_percent", 100.0 * record->explained, "frame", "minimum_mm",
       numbers(frame->minimum, 3), "maximum_mm", numbers(frame->maximum, 3), "midline_mm",
       frame->midline, "lungs", side_name(frame->only_side), "of",
-      record->from_surface ? "surface" : "landmarks", "rest", scan(&record->rest), "state",
-      scan(&record->state), "inflation", record->inflation);
+      record->from_surface ? "surface" : "landmarks", "emptier_frame", "minimum_mm",
+      numbers(record->emptier[0], 3), "maximum_mm", numbers(record->emptier[1], 3), "fuller",
+      state(record, 0), "emptier", state(record, 1), "reach_mm", record->reach);
   if (root == NULL) {
     return NULL;
   }
@@ -155,11 +156,12 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
                                       "rotation_rad", numbers(patient->motion + 3, 3)));
   (void)json_object_set_new(root, "lengths_mm", numbers(patient->lengths, 3));
   (void)json_object_set_new(root, "powers", numbers(patient->powers, SUPINE_PATIENT_POWERS));
-  (void)json_object_set_new(root, "polynomial_mm", polynomial(patient));
+  (void)json_object_set_new(root, "correction", correction(&patient->correction));
   if (record->told_count > 0) {
     (void)json_object_set_new(root, "further_states", further(record));
   }
   if (record->gain_told) {
+    (void)json_object_set_new(root, "gain_determined", json_boolean(!record->gain_open));
     (void)json_object_set_new(root, "gain_standard_error", json_real(record->gain_error));
   }
   if (record->expand.tried || supine_patient_is_uneven(record)) {
@@ -215,70 +217,75 @@ static bool take_numbers(const json_t *array, size_t count, double *values) {
   return right;
 }
 
-static bool take_scan(const json_t *object, supine_patient_scan *of) {
-  const char *posture = json_string_value(json_object_get(object, "posture"));
-  const char *volume = json_string_value(json_object_get(object, "volume"));
-  if (posture == NULL || volume == NULL || strlen(posture) >= SUPINE_PATIENT_TEXT ||
-      strlen(volume) >= SUPINE_PATIENT_TEXT) {
-    return false;
+static bool take_state(const json_t *object, supine_state *of, double *volume) {
+  const char *text = json_string_value(json_object_get(object, "state"));
+  *of = (supine_state){0};
+  *volume = json_number_value(json_object_get(object, "volume_ml"));
+  return text != NULL && isfinite(*volume) && supine_state_parse(text, of, NULL) == SUPINE_OK &&
+         (of->gravity[0] != 0.0 || of->gravity[1] != 0.0 || of->gravity[2] != 0.0);
+}
+
+static bool take_box(const json_t *object, double low[3], double high[3]) {
+  bool right = take_numbers(json_object_get(object, "minimum_mm"), 3, low) &&
+               take_numbers(json_object_get(object, "maximum_mm"), 3, high);
+  for (int k = 0; k < 3; ++k) {
+    right = right && high[k] > low[k];
   }
-  memcpy(of->posture, posture, strlen(posture) + 1);
-  memcpy(of->volume, volume, strlen(volume) + 1);
-  return take_numbers(json_object_get(object, "gravity"), 3, of->gravity) &&
-         fabs(sqrt(of->gravity[0] * of->gravity[0] + of->gravity[1] * of->gravity[1] +
-                   of->gravity[2] * of->gravity[2]) -
-              1.0) < 1e-6;
+  return right;
 }
 
 static bool take_frame(const json_t *object, supine_patient_record *record) {
   supine_patient_frame *frame = &record->patient.frame;
   const char *lungs = json_string_value(json_object_get(object, "lungs"));
   const char *of = json_string_value(json_object_get(object, "of"));
-  if (lungs == NULL || of == NULL ||
-      !take_numbers(json_object_get(object, "minimum_mm"), 3, frame->minimum) ||
-      !take_numbers(json_object_get(object, "maximum_mm"), 3, frame->maximum)) {
+  if (lungs == NULL || of == NULL || !take_box(object, frame->minimum, frame->maximum)) {
     return false;
   }
   frame->midline = json_number_value(json_object_get(object, "midline_mm"));
   frame->only_side = strcmp(lungs, "left") == 0 ? 1 : strcmp(lungs, "right") == 0 ? -1 : 0;
   record->from_surface = strcmp(of, "surface") == 0;
-  bool right = isfinite(frame->midline);
-  for (int k = 0; k < 3; ++k) {
-    right = right && frame->maximum[k] > frame->minimum[k];
-  }
-  return right && (frame->only_side != 0 ||
-                   (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
+  return isfinite(frame->midline) &&
+         (frame->only_side != 0 ||
+          (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
 }
 
 static bool take_law(const json_t *root, supine_patient *patient) {
   const char *law = json_string_value(json_object_get(root, "law"));
-  const json_t *polynomial_mm = json_object_get(root, "polynomial_mm");
   const json_t *motion = json_object_get(root, "motion");
   int k = 0;
   while (law != NULL && k < SUPINE_PATIENT_LAW_COUNT &&
          strcmp(law, supine_patient_law_names[k]) != 0) {
     ++k;
   }
-  bool right =
+  const bool right =
       law != NULL && k < SUPINE_PATIENT_LAW_COUNT &&
       take_numbers(json_object_get(root, "lengths_mm"), 3, patient->lengths) &&
       take_numbers(json_object_get(root, "powers"), SUPINE_PATIENT_POWERS, patient->powers) &&
       take_numbers(json_object_get(motion, "translation_mm"), 3, patient->motion) &&
       take_numbers(json_object_get(motion, "rotation_rad"), 3, patient->motion + 3);
-  for (size_t a = 0; a < 3 && right; ++a) {
-    const char axis[2] = {"xyz"[a], '\0'};
-    const json_t *of = json_object_get(polynomial_mm, axis);
-    double *shared = patient->polynomial + 2 * a * TERMS;
-    right = take_numbers(json_object_get(of, "shared"), TERMS, shared) &&
-            take_numbers(json_object_get(of, "by_lung"), TERMS, shared + TERMS);
-  }
   patient->law = (supine_patient_law)k;
+  return right;
+}
+
+static bool take_correction(const json_t *object, supine_patient_correction *of) {
+  const json_t *all = json_object_get(object, "centres");
+  of->count = json_array_size(all);
+  of->scale = json_number_value(json_object_get(object, "scale"));
+  bool right = json_is_array(all) && of->count <= SUPINE_PATIENT_CENTRES_MAX;
+  for (size_t i = 0; right && i < of->count; ++i) {
+    double v[CENTRE];
+    right = take_numbers(json_array_get(all, i), CENTRE, v);
+    of->centre[i] = (supine_patient_centre){
+        {v[0], v[1], v[2]}, v[3] < 0.0 ? -1.0 : 1.0, v[4], {v[5], v[6], v[7]}};
+    right = right && v[4] >= 0.0;
+  }
   return right;
 }
 
 static bool take_force(const json_t *object, supine_force_law *force) {
   *force = (supine_force_law){.base = json_number_value(json_object_get(object, "base")),
-                              .gain = json_number_value(json_object_get(object, "gain"))};
+                              .gain = json_number_value(json_object_get(object, "gain")),
+                              .pair = true};
   return json_is_number(json_object_get(object, "base")) &&
          json_is_number(json_object_get(object, "gain")) && isfinite(force->base) &&
          isfinite(force->gain) && take_numbers(json_object_get(object, "box"), 3, force->box);
@@ -313,9 +320,9 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   const char *found = json_string_value(json_object_get(root, "format"));
   const char *wrong = NULL;
   if (found == NULL || strcmp(found, format) != 0 || number(root, "version") != VERSION) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: not a patient's file of version %d, as 'supine fit' writes it",
-                            name, VERSION);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: not a patient's file of version %d: make it anew with 'supine fit'", name, VERSION);
   }
   memset(record, 0, sizeof *record);
   if (!take_frame(json_object_get(root, "frame"), record)) {
@@ -324,9 +331,17 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
     wrong = "law";
   } else if (!take_force(json_object_get(root, "force"), &record->force)) {
     wrong = "force";
-  } else if (!take_scan(json_object_get(root, "rest"), &record->rest) ||
-             !take_scan(json_object_get(root, "state"), &record->state)) {
-    wrong = "rest or state";
+  } else if (!take_correction(json_object_get(root, "correction"), &record->patient.correction)) {
+    wrong = "correction";
+  } else if (!take_state(json_object_get(root, "fuller"), &record->state[0], &record->volume[0]) ||
+             !take_state(json_object_get(root, "emptier"), &record->state[1], &record->volume[1])) {
+    wrong = "fuller or emptier";
+  } else if (!take_box(json_object_get(root, "emptier_frame"), record->emptier[0],
+                       record->emptier[1])) {
+    wrong = "emptier_frame";
+  } else if (!json_is_number(json_object_get(root, "reach_mm")) ||
+             !(number(root, "reach_mm") >= 0.0)) {
+    wrong = "reach_mm";
   } else if (!take_stiffness(json_object_get(root, "expandability"), &record->stiffness)) {
     wrong = "expandability";
   }
@@ -336,25 +351,15 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   }
   const char *whose = json_string_value(json_object_get(root, "name"));
   (void)snprintf(record->name, sizeof record->name, "%s", whose != NULL ? whose : "unnamed");
-  record->inflation = number(root, "inflation") < 0.0 ? -1.0 : 1.0;
+  record->reach = number(root, "reach_mm");
   record->points = (size_t)fmax(0.0, number(root, "points"));
   record->held_out = number(root, "held_out_rms_mm");
   record->held_out_baseline = number(root, "held_out_baseline_mm");
+  record->expected = number(root, "expected_rms_mm");
+  record->band = number(root, "band_95_percent_holds") / 100.0;
   record->fitted = number(root, "fitted_rms_mm");
   record->explained = number(root, "explained_percent") / 100.0;
   return SUPINE_OK;
-}
-
-supine_status supine_patient_parse(const char *name, const char *text,
-                                   supine_patient_record *record, supine_error *error) {
-  json_error_t where;
-  json_t *root = json_loads(text, 0, &where);
-  if (root == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%d: %s", name, where.line, where.text);
-  }
-  const supine_status status = decode(name, root, record, error);
-  json_decref(root);
-  return status;
 }
 
 supine_status supine_patient_read(const char *path, supine_patient_record *record,

@@ -1,72 +1,67 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * patient.json: a patient's law with the force that goes with it, how it was fitted and how well it
- * held out; and what it makes of a surface. */
+ * patient.json: a patient's law with the force and the states that go with it, how it was fitted
+ * and how well it held out; and the model that it makes of a surface. */
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
+
+#include <supine/state.h>
 
 #include "precompute/patient/applied.h"
 #include "precompute/patient/expand.h"
 #include "precompute/patient/fit.h"
 #include "precompute/physics/model.h"
+#include "precompute/physics/reference.h"
 
-enum { SUPINE_PATIENT_TEXT = 48 };
-
-/** One scan: which posture, and how full. */
-typedef struct supine_patient_scan {
-  char posture[SUPINE_PATIENT_TEXT]; /**< as the user wrote it */
-  char volume[SUPINE_PATIENT_TEXT];  /**< "full", "rest", mL as text, or empty: not said */
-  double gravity[3];
-} supine_patient_scan;
+enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
 /** What a further state told. */
 typedef struct supine_patient_told {
-  char posture[SUPINE_PATIENT_TEXT];
-  double scale;              /**< 1 where it is as far from rest as the fitted state */
+  supine_state state;
+  double scale;              /**< 1 where it is as far from the fuller state as the emptier one */
   double left, left_without; /**< mm RMS, with the gain and without */
 } supine_patient_told;
-
-enum { SUPINE_PATIENT_OTHERS_MAX = 8 };
 
 /** What patient.json holds. */
 typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT]; /**< whose */
   supine_patient patient;
-  supine_force_law force; /**< 1 at the box's centre in the state's posture */
-  supine_patient_scan rest, state;
-  double inflation;  /**< +1 where the state is the larger one, -1 where rest is */
-  bool from_surface; /**< the frame is a surface's box, else that of landmarks */
+  supine_force_law force; /**< 1 at the box's centre in the emptier state's posture */
+  double reach;           /**< spreading length of the force, mm */
+  supine_state state[2];  /**< the fuller and the emptier */
+  double volume[2];       /**< mL; 0: not known */
+  double emptier[2][3];   /**< its box, mm; the fuller one's is the frame */
+  bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
   size_t points;
-  double held_out, held_out_baseline, fitted, explained; /**< of the kept law, mm RMS and share */
-  supine_patient_stiffness stiffness;                    /**< counts 0: even */
+  double held_out, held_out_baseline, fitted, explained; /**< mm RMS and share */
+  double expected, band;               /**< mm RMS expected, share within the 95 % band; held out */
+  supine_patient_stiffness stiffness;  /**< counts 0: even */
   supine_patient_expand_report expand; /**< written, where it was tried; not read */
   supine_patient_applied applied;      /**< written, where there are blocks; not read */
   size_t told_count;                   /**< further states; written, not read */
   supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_told;    /**< some of them in another posture */
+  bool gain_open;    /**< they do not determine it: it ended at a bound */
   double gain_error; /**< standard error of the gain */
 } supine_patient_record;
 
 /** Whether the record has a stiffness of its own. */
 bool supine_patient_is_uneven(const supine_patient_record *record);
 
-/** The force of a patient's law: its slopes c7 to c9 for the paper's law, those of `law` for the
- * others; `gain` of it turns with gravity. Seen in one posture, any gain gives the same field. */
+/** Compute the force of a patient's law, of whose slopes `gain` turns with gravity. Seen in one
+ * posture, any gain gives the same field. */
 supine_force_law supine_patient_force(const supine_patient *patient, double gain,
                                       const double gravity[3]);
 
-/** +1 where the field swells the box it was fitted in, -1 where it shrinks it. */
-double supine_patient_inflation(const supine_patient *patient);
-
-/** Writes the record whole or not at all.
- * @param report   optional: all laws' scores, starts, constants and their intervals
+/** Write the record whole or not at all.
+ * @param report   optional: scores, starts, constants and their intervals
  * @param made_by  how
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const supine_patient_fit_report *report, const char *made_by,
                                    supine_error *error);
 
-/** The same as text, for standard output; free() it; NULL: no memory. */
+/** Print the same as text, for standard output; free() it; NULL: no memory. */
 char *supine_patient_text(const supine_patient_record *record,
                           const supine_patient_fit_report *report, const char *made_by);
 
@@ -74,21 +69,39 @@ char *supine_patient_text(const supine_patient_record *record,
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** The same from text, such as a basis file's metadata.
- * @param name  for messages */
-supine_status supine_patient_parse(const char *name, const char *text,
-                                   supine_patient_record *record, supine_error *error);
-
-/** The patient's law as directions d [N, 3], mm, of a surface: with the catch F of the record's
- * force in the fitted posture, F_i d_i = u_i, outwards where the lung grows.
+/** Set force, directions and reach of a model to the patient's. The record is kept by the caller
+ * for as long as the model. The corrected directions, with r the correction and f the force in the
+ * fitted posture, at least 0.2 of its mean, are
  *
- * @param model  its force is ignored and set to the record's; its stiffness counts, and is the
- *               record's own where it has one (stiffness.h): to be set before
- * @retval SUPINE_ERROR_MESH       the surface lies elsewhere than where the law was fitted, or is
- * the other lung
- * @retval SUPINE_ERROR_NUMERICAL  a vertex catches no force */
-supine_status supine_patient_directions(const supine_patient_record *record,
-                                        const supine_lungs *lungs, supine_model *model,
-                                        double *directions, supine_error *error);
+ *     d = (15)-(17) - r / f        so that f d is what the person's lungs move by
+ *
+ * Where the surface is not that of the fuller state, positions are those of its box. */
+void supine_patient_model(const supine_patient_record *record, supine_model *model);
+
+/** Compute the stiffness E [N] of a surface, relative.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_patient_set_stiffness(const supine_patient_record *record,
+                                           const supine_lungs *lungs, double *stiffness,
+                                           supine_error *error);
+
+/** Find the state that a surface shows, by its box.
+ * @param state  0 the fuller, 1 the emptier
+ * @retval SUPINE_ERROR_MESH  the surface lies elsewhere, or is the other lung */
+supine_status supine_patient_check_place(const supine_patient_record *record,
+                                         const supine_lungs *lungs, size_t *state,
+                                         supine_error *error);
+
+/** Compute how far the fuller state is below full inflation, as a share of the way from it to the
+ * emptier one; 0 where that is not known. Of a scan at rest the usual share of full is assumed. */
+double supine_patient_below_full(const supine_patient_record *record);
+
+/** Scale the shares at rest to the one that the two states show, where they show it. */
+void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);
+
+/** Find what a scan shows that is one of the two states.
+ * @param volume  of the scan, mL
+ * @return kind NONE where nothing tells how far it is from full inflation */
+supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
+                                const supine_resting *resting);
 
 #endif

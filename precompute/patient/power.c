@@ -307,3 +307,59 @@ double supine_patient_power_along(const supine_patient_power *fit, const supine_
   design_row(&one, logs, fit->powers, design);
   return design[0] * fit->linear[0] + design[1] * fit->linear[1] + design[2] * fit->linear[2];
 }
+
+void supine_patient_power_displacement(const supine_patient_power *fit,
+                                       const supine_patient_row *row, double u[3]) {
+  supine_patient_row one = *row;
+  double design[LINEAR_MAX];
+  double logs[3];
+  take_logs(row, logs);
+  one.axis[0] = one.axis[1] = one.axis[2] = 1.0;
+  design_row(&one, logs, fit->powers, design);
+  for (size_t a = 0; a < 3; ++a) {
+    u[a] = design[a] * fit->linear[a];
+  }
+}
+
+supine_status supine_patient_scale_fit(const supine_patient_row *rows, size_t count,
+                                       supine_patient_moved moved,
+                                       const supine_patient_power *shape, supine_patient_power *fit,
+                                       supine_error *error) {
+  const size_t n = moved == SUPINE_PATIENT_STILL ? 1 : moved == SUPINE_PATIENT_TRANSLATION ? 4 : 7;
+  double matrix[7 * 7] = {0.0};
+  double right[7] = {0.0};
+  for (size_t i = 0; i < count; ++i) {
+    const supine_patient_row *row = &rows[i];
+    double u[3];
+    double x[7];
+    supine_patient_power_displacement(shape, row, u);
+    x[0] = row->axis[0] * u[0] + row->axis[1] * u[1] + row->axis[2] * u[2];
+    memcpy(x + 1, row->axis, sizeof row->axis);
+    for (size_t a = 0; a < 3; ++a) {
+      x[4 + a] = row->axis[(a + 2) % 3] * row->place.arm[(a + 1) % 3] -
+                 row->axis[(a + 1) % 3] * row->place.arm[(a + 2) % 3];
+    }
+    for (size_t a = 0; a < n; ++a) {
+      for (size_t b = 0; b < n; ++b) {
+        matrix[a * n + b] += row->weight * x[a] * x[b];
+      }
+      right[a] += row->weight * x[a] * row->value;
+    }
+  }
+  const lapack_int size = (lapack_int)n;
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, size, right, size) != 0) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the points do not determine the law: they may lie in one plane");
+  }
+  *fit = *shape;
+  memset(fit->linear, 0, sizeof fit->linear);
+  for (size_t a = 0; a < 3; ++a) {
+    fit->linear[a] = right[0] * shape->linear[a];
+  }
+  memcpy(fit->linear + 3, right + 1, (n - 1) * sizeof *right);
+  fit->squares = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    fit->squares += rows[i].weight * pow(supine_patient_power_residual(fit, &rows[i]), 2.0);
+  }
+  return SUPINE_OK;
+}

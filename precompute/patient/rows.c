@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Rows of landmarks, and the blocks that they are held out by. */
 #include <math.h>
+#include <string.h>
 
 #include <gsl/gsl_rng.h>
+#include <lapacke.h>
 
 #include "precompute/patient/rows.h"
 
@@ -10,18 +12,23 @@
  * move alike to a few mm, so single ones left out would look better than they are. */
 static const double block_side = 40.0;
 
+/* How well a landmark is placed, mm per axis. */
+static const double landmark_noise = 2.0;
+
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows) {
   for (size_t i = 0; i < pairs->count; ++i) {
     const double *from = pairs->from + 3 * i;
-    const supine_patient_place place = supine_patient_find(frame, from);
+    const double side = pairs->side != NULL ? pairs->side[i] : 0.0;
+    const supine_patient_place place = supine_patient_find(frame, from, side);
     for (size_t a = 0; a < 3; ++a) {
       supine_patient_row *row = &rows[3 * i + a];
       *row = (supine_patient_row){
           .place = place,
           .force = {1.0, place.box[0] - 0.5, place.box[1] - 0.5, place.box[2] - 0.5},
           .value = pairs->to[3 * i + a] - from[a],
-          .weight = 1.0};
+          .weight = 1.0,
+          .noise = landmark_noise};
       row->axis[a] = 1.0;
     }
   }
@@ -81,4 +88,54 @@ supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned lon
   }
   gsl_rng_free(random);
   return SUPINE_OK;
+}
+
+/* axis . (t + M arm), arm in units of 100 mm. */
+static void affine_design(const supine_patient_row *row, double x[SUPINE_PATIENT_AFFINE]) {
+  for (size_t a = 0; a < 3; ++a) {
+    x[a] = row->axis[a];
+    for (size_t b = 0; b < 3; ++b) {
+      x[3 + 3 * a + b] = row->axis[a] * 0.01 * row->place.arm[b];
+    }
+  }
+}
+
+bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, const size_t *fold_of,
+                               size_t without, bool translation,
+                               double map[SUPINE_PATIENT_AFFINE]) {
+  enum { N = SUPINE_PATIENT_AFFINE };
+  double matrix[N * N] = {0.0};
+  double trace = 0.0;
+  memset(map, 0, N * sizeof *map);
+  for (size_t i = 0; i < count; ++i) {
+    double x[N];
+    if (fold_of != NULL && fold_of[i] == without) {
+      continue;
+    }
+    affine_design(&rows[i], x);
+    for (size_t a = 0; a < N; ++a) {
+      for (size_t b = 0; b < N; ++b) {
+        matrix[a * N + b] += rows[i].weight * x[a] * x[b];
+      }
+      map[a] += rows[i].weight * x[a] * rows[i].value;
+      trace += rows[i].weight * x[a] * x[a];
+    }
+  }
+  const lapack_int size = translation ? 3 : N;
+  for (size_t a = 0; a < N; ++a) {
+    matrix[a * N + a] += 1e-9 * trace; /* enough to solve where rows leave a term open */
+    map[a] = a < (size_t)size ? map[a] : 0.0;
+  }
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, N, map, N) == 0;
+}
+
+double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
+                                      const supine_patient_row *row) {
+  double x[SUPINE_PATIENT_AFFINE];
+  double left = -row->value;
+  affine_design(row, x);
+  for (size_t a = 0; a < SUPINE_PATIENT_AFFINE; ++a) {
+    left += x[a] * map[a];
+  }
+  return left;
 }

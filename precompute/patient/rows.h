@@ -12,6 +12,7 @@ typedef struct supine_patient_row {
   double axis[3];
   double value;  /* mm */
   double weight; /* of its square */
+  double noise;  /* standard deviation, mm */
   size_t block;
 } supine_patient_row;
 
@@ -72,35 +73,30 @@ double supine_patient_power_residual(const supine_patient_power *fit,
 /* How far a force of 1 moves a row's point along its axis, mm. */
 double supine_patient_power_along(const supine_patient_power *fit, const supine_patient_row *row);
 
-/* --- polynomials ----------------------------------------------------------------------------- */
+/* The law's displacement at a row's point, mm, without the motion. */
+void supine_patient_power_displacement(const supine_patient_power *fit,
+                                       const supine_patient_row *row, double u[3]);
 
-/* Normal equations of rows: enough to fit any polynomial and to score it. */
-typedef struct supine_patient_normals {
-  double matrix[SUPINE_PATIENT_POLYNOMIAL][SUPINE_PATIENT_POLYNOMIAL];
-  double right[SUPINE_PATIENT_POLYNOMIAL];
-  double squares; /* of the values, weighted */
-  double weight;
-} supine_patient_normals;
+/* Fit the length and the motion of a law whose exponents, slopes and ratios of lengths are known,
+ * `shape` in mm, by least squares.
+ * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine them */
+supine_status supine_patient_scale_fit(const supine_patient_row *rows, size_t count,
+                                       supine_patient_moved moved,
+                                       const supine_patient_power *shape, supine_patient_power *fit,
+                                       supine_error *error);
 
-void supine_patient_normals_add_row(supine_patient_normals *normals, const supine_patient_row *row);
-void supine_patient_normals_add(supine_patient_normals *normals,
-                                const supine_patient_normals *other);
+/* --- maps without a law ---------------------------------------------------------------------- */
 
-/* Ridge on each coefficient; INFINITY leaves it out. */
-void supine_patient_penalty_translation(double penalty[SUPINE_PATIENT_POLYNOMIAL]);
-void supine_patient_penalty_affine(bool by_lung, double penalty[SUPINE_PATIENT_POLYNOMIAL]);
+enum { SUPINE_PATIENT_AFFINE = 12 };
 
-/* quadratic: of second-degree terms; lung: of what tells one lung from the other. */
-void supine_patient_penalty_quadratic(double quadratic, double lung, bool one_lung,
-                                      double penalty[SUPINE_PATIENT_POLYNOMIAL]);
+/* Fit a translation or an affine map x -> t + M x, about the box's centre, to the rows of which
+ * fold_of is not `without` (NULL: all).
+ * @return false where the rows do not determine it */
+bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, const size_t *fold_of,
+                               size_t without, bool translation, double map[SUPINE_PATIENT_AFFINE]);
 
-/* @retval SUPINE_ERROR_NUMERICAL */
-supine_status supine_patient_polynomial_fit(const supine_patient_normals *normals,
-                                            const double penalty[SUPINE_PATIENT_POLYNOMIAL],
-                                            double coefficients[SUPINE_PATIENT_POLYNOMIAL]);
-
-/* What coefficients leave of the rows behind the normals, mm^2, weighted. */
-double supine_patient_polynomial_squares(const supine_patient_normals *normals,
-                                         const double coefficients[SUPINE_PATIENT_POLYNOMIAL]);
+/* What a map leaves of a row, mm. */
+double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
+                                      const supine_patient_row *row);
 
 #endif

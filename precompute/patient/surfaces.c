@@ -6,12 +6,15 @@
 
 #include "precompute/patient/surfaces.h"
 
+#include "precompute/patient/krige.h"
 #include "precompute/patient/matching.h"
+#include "sh/base/parallel.h"
 
 enum {
   VERTICES_MAX = 2000, /* that take part: a law of nine constants is not better known from more */
   ROUNDS_MAX = 60,
-  ROUND_STEPS = 4
+  ROUND_STEPS = 4,
+  GRAIN = 64
 };
 
 static const double settled = 2e-3;      /* mm RMS between two rounds */
@@ -22,8 +25,6 @@ static const double matched_least = 0.3;
 static const double nearer_least =
     0.6; /* of the distance as given: so near and reversed is no chance */
 static const double round_tolerance = 1e-4;
-/* mm^2 for each row, of polynomials while points are still being found: they would slide. */
-static const double sliding_ridge = 0.01;
 
 typedef supine_patient_matching matching;
 
@@ -32,58 +33,94 @@ typedef struct boxes {
   double low[2][3], high[2][3];
 } boxes;
 
-/* What a law found so far is. */
+/* A law found so far; of the deep one with its correction. */
 typedef struct estimate {
   supine_patient_law law;
   supine_patient_moved moved;
+  supine_patient_power shape; /* of the deep law */
   supine_patient_power power;
-  double polynomial[SUPINE_PATIENT_POLYNOMIAL];
+  supine_patient_row *thinned; /* of the correction */
+  supine_patient_krige *krige;
 } estimate;
 
-/* Displacement at a vertex that takes part: axis by axis, what a row there would be left of. */
-static void displace(const matching *m, const estimate *e, size_t i, double u[3]) {
-  supine_patient_row row = m->rows[i];
-  row.value = 0.0;
-  supine_patient patient = {.law = SUPINE_PATIENT_QUADRATIC,
-                            .frame = supine_patient_frame_of_lungs(m->rest)};
-  if (e->law != SUPINE_PATIENT_PAPER) {
-    memcpy(patient.polynomial, e->polynomial, sizeof patient.polynomial);
-    supine_patient_displacement(&patient, m->rest->mesh.vertices + 3 * m->vertex[i], u);
-    return;
-  }
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t k = 0; k < 3; ++k) {
-      row.axis[k] = a == k ? 1.0 : 0.0;
-    }
-    u[a] = supine_patient_power_residual(&e->power, &row);
-  }
+static void estimate_free(estimate *e) {
+  supine_patient_krige_destroy(e->krige);
+  free(e->thinned);
 }
 
+/* Where the law puts the vertices that take part. */
+typedef struct placing {
+  matching *m;
+  const estimate *e;
+  double *square; /* [count] of how far each went, mm^2 */
+} placing;
+
+static void place_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  placing *w = context;
+  matching *m = w->m;
+  const supine_patient_power *power = &w->e->power;
+  double *scratch = malloc((m->count + m->landmark_rows_count) * sizeof *scratch);
+  for (size_t i = begin; i < end && scratch != NULL; ++i) {
+    supine_patient_row row = m->rows[i];
+    row.value = 0.0;
+    w->square[i] = 0.0;
+    for (size_t a = 0; a < 3; ++a) {
+      for (size_t k = 0; k < 3; ++k) {
+        row.axis[k] = a == k ? 1.0 : 0.0;
+      }
+      const double u = w->e->krige == NULL
+                           ? supine_patient_power_residual(power, &row)
+                           : supine_patient_krige_predict(w->e->krige, &row, NULL, scratch);
+      const double at = m->rest->mesh.vertices[3 * m->vertex[i] + a] + u;
+      w->square[i] += pow(at - m->moved[3 * i + a], 2.0);
+      m->moved[3 * i + a] = at;
+    }
+  }
+  free(scratch);
+}
+
+/* The law's own constants, or the deep law's scale and its correction, fitted to the rows. */
 static supine_status refit(const matching *m, estimate *e, supine_error *error) {
   const size_t count = m->count + m->landmark_rows_count;
   if (e->law == SUPINE_PATIENT_PAPER) {
     return supine_patient_power_fit(m->rows, count, e->moved, e->power.powers, ROUND_STEPS,
                                     round_tolerance, &e->power, error);
   }
-  supine_patient_normals *normals = calloc(1, sizeof *normals);
-  double penalty[SUPINE_PATIENT_POLYNOMIAL];
-  if (normals == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for normal equations");
+  if (e->thinned == NULL) {
+    e->thinned = malloc(count * sizeof *e->thinned);
   }
-  for (size_t i = 0; i < count; ++i) {
-    supine_patient_normals_add_row(normals, &m->rows[i]);
+  if (e->thinned == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
   }
-  const double ridge = sliding_ridge * normals->weight;
-  const bool one = m->rest->lung_count == 1;
-  if (e->law == SUPINE_PATIENT_AFFINE) {
-    supine_patient_penalty_affine(false, penalty);
-  } else {
-    supine_patient_penalty_quadratic(ridge, ridge, one, penalty);
+  supine_patient_krige_destroy(e->krige);
+  e->krige = NULL;
+  const supine_patient_krige_options options = {.moved = e->moved, .noise_known = true};
+  const supine_status status =
+      supine_patient_scale_fit(m->rows, count, e->moved, &e->shape, &e->power, error);
+  return status != SUPINE_OK
+             ? status
+             : supine_patient_krige_create(&e->power, e->thinned,
+                                           supine_patient_krige_thin(m->rows, m->count,
+                                                                     m->landmark_rows_count / 3,
+                                                                     e->thinned),
+                                           &options, &e->krige, error);
+}
+
+/* Move the vertices; mm RMS by which they moved. */
+static supine_status place(matching *m, const estimate *e, double *change, supine_error *error) {
+  placing w = {.m = m, .e = e, .square = calloc(m->count, sizeof(double))};
+  if (w.square == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", m->count);
   }
-  const supine_status status = supine_patient_polynomial_fit(normals, penalty, e->polynomial);
-  free(normals);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "the surface fixes no polynomial");
+  supine_parallel_for(m->count, GRAIN, 0, place_range, &w);
+  *change = 0.0;
+  for (size_t i = 0; i < m->count; ++i) {
+    *change += w.square[i] / (double)m->count;
+  }
+  *change = sqrt(*change);
+  free(w.square);
+  return SUPINE_OK;
 }
 
 /* The first rows: each lung's box brought to the state's, axis by axis. */
@@ -100,6 +137,12 @@ static void start_rows(matching *m, const boxes *b) {
   }
 }
 
+/* Distances that are no outliers, mm, at least: kriging carries what a law misses, and would leave
+ * what is weighted down where it is. */
+static double scale_of(supine_patient_law law) {
+  return law == SUPINE_PATIENT_DEEP ? 1.0 : 0.0;
+}
+
 static supine_status settle(matching *m, const boxes *b, estimate *e,
                             supine_patient_surface_report *report, double *rms, size_t *rounds,
                             supine_error *error) {
@@ -109,18 +152,12 @@ static supine_status settle(matching *m, const boxes *b, estimate *e,
   for (*rounds = 0; status == SUPINE_OK && *rounds < ROUNDS_MAX; ++*rounds) {
     double change = 0.0;
     status = refit(m, e, error);
-    for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-      double u[3];
-      displace(m, e, i, u);
-      for (size_t k = 0; k < 3; ++k) {
-        const double at = m->rest->mesh.vertices[3 * m->vertex[i] + k] + u[k];
-        change += pow(at - m->moved[3 * i + k], 2.0) / (double)m->count;
-        m->moved[3 * i + k] = at;
-      }
+    if (status == SUPINE_OK) {
+      status = place(m, e, &change, error);
     }
     if (status == SUPINE_OK) {
       supine_patient_matching_find(m);
-      report->matched = supine_patient_matching_weigh(m, 0.0, rms);
+      report->matched = supine_patient_matching_weigh(m, scale_of(e->law), rms);
       if (report->matched < matched_least) {
         status = supine_error_set(error, SUPINE_ERROR_MESH,
                                   "only %.0f %% of the vertices find the other surface facing the "
@@ -128,7 +165,7 @@ static supine_status settle(matching *m, const boxes *b, estimate *e,
                                   100.0 * report->matched);
       }
     }
-    if (sqrt(change) < settled) {
+    if (change < settled) {
       break;
     }
   }
@@ -297,10 +334,10 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
   double *e = malloc(n * sizeof *e);
   supine_status status =
       e == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-                : supine_patient_fit(&m->frame, m->rows, m->count + m->landmark_rows_count, 1,
+                : supine_patient_fit(&m->frame, m->rows, m->count, m->landmark_rows_count / 3,
                                      wanted, &fit->patient, report, error);
   if (status == SUPINE_OK && fit->expand.kept) {
-    double *held = &report->held_out.law[SUPINE_PATIENT_PAPER];
+    double *held = &report->held_out.corrected;
     const double baseline = wanted->moved != SUPINE_PATIENT_STILL ? report->held_out.translation
                                                                   : report->held_out.none;
     *held = fit->expand.held_out[1];
@@ -315,55 +352,55 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
   return status;
 }
 
+/* Nearest points by the law that is wanted, then all that is to be said of it. */
+static supine_status run(matching *m, const supine_patient_surface_task *task, const boxes *b,
+                         const supine_patient_fit_options *wanted, estimate *e,
+                         supine_patient_surface_fit *fit, supine_error *error) {
+  supine_patient_surface_report *report = &fit->surface;
+  supine_status status = look_at_rest(m, report, error);
+  if (status == SUPINE_OK) {
+    status = check_axes(m, b, error);
+  }
+  if (status == SUPINE_OK) {
+    status = wanted->law == SUPINE_PATIENT_PAPER
+                 ? start_all(m, task, b, e, report, error)
+                 : settle(m, b, e, report, &report->after, &report->rounds, error);
+  }
+  if (status == SUPINE_OK && task->expandability) {
+    status = expand(m, task, e, fit, error);
+  }
+  return status == SUPINE_OK ? judge(m, task, wanted, fit, error) : status;
+}
+
 supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
                                          supine_patient_surface_fit *fit, supine_error *error) {
   matching m = {0};
   supine_patient_fit_options wanted = task->options;
   boxes b;
-  estimate e = {.law = SUPINE_PATIENT_PAPER};
+  memcpy(wanted.gravity, task->gravity, sizeof wanted.gravity);
+  if (task->expandability) { /* stiffness carries what the law leaves */
+    wanted.law = SUPINE_PATIENT_PAPER;
+    wanted.uncorrected = true;
+  }
+  estimate e = {.law = wanted.law, .moved = wanted.moved};
+  e.shape = supine_patient_deep(wanted.gravity);
   *fit = (supine_patient_surface_fit){0};
   memcpy(b.low[0], task->rest->minimum, sizeof b.low[0]);
   memcpy(b.high[0], task->rest->maximum, sizeof b.high[0]);
   supine_mesh_box(task->state, b.low[1], b.high[1]);
-  if (task->expandability && wanted.law_given && wanted.law != SUPINE_PATIENT_PAPER) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "expandability is of the paper's law: the %s law has no force that it "
-                            "could pass on",
-                            supine_patient_law_names[wanted.law]);
-  }
-  if (!wanted.law_given && (task->landmarks == NULL || task->expandability)) {
-    wanted.law_given = true;
-    wanted.law = SUPINE_PATIENT_PAPER;
-  }
   supine_status status = check_boxes(&b, error);
   if (status == SUPINE_OK) {
     status = supine_patient_matching_create(task->rest, task->state, task->model, VERTICES_MAX,
                                             task->landmarks != NULL ? task->landmarks->count : 0,
                                             &m, error);
   }
-  if (status == SUPINE_OK) {
-    if (task->landmarks != NULL) {
-      supine_patient_matching_append(&m, task->landmarks);
-    }
-    status = look_at_rest(&m, &fit->surface, error);
+  if (status == SUPINE_OK && task->landmarks != NULL) {
+    supine_patient_matching_append(&m, task->landmarks);
   }
   if (status == SUPINE_OK) {
-    status = check_axes(&m, &b, error);
+    status = run(&m, task, &b, &wanted, &e, fit, error);
   }
-  if (status == SUPINE_OK) {
-    status = start_all(&m, task, &b, &e, &fit->surface, error);
-  }
-  if (status == SUPINE_OK && task->expandability) {
-    status = expand(&m, task, &e, fit, error);
-  }
-  if (status == SUPINE_OK && (!wanted.law_given || wanted.law != SUPINE_PATIENT_PAPER)) {
-    size_t rounds = 0;
-    e.law = wanted.law_given ? wanted.law : SUPINE_PATIENT_QUADRATIC;
-    status = settle(&m, &b, &e, &fit->surface, &fit->surface.after, &rounds, error);
-  }
-  if (status == SUPINE_OK) {
-    status = judge(&m, task, &wanted, fit, error);
-  }
+  estimate_free(&e);
   supine_patient_matching_free(&m);
   return status;
 }

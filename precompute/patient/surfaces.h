@@ -33,11 +33,9 @@ typedef struct supine_patient_surface_task {
   const supine_model *model;             /**< stiffness and spreading of the force; its force and
                                               directions do not count */
   const supine_patient_pairs *landmarks; /**< optional, to be matched as well */
-  /** Without a law given: the paper's, as surfaces show no sliding; with landmarks whatever holds
-   * out best. */
-  supine_patient_fit_options options;
-  double gravity[3];  /**< of the other state */
-  bool expandability; /**< to be found as well (expand.h); of the paper's law alone */
+  supine_patient_fit_options options;    /**< the gravity below counts */
+  double gravity[3];                     /**< of the emptier state */
+  bool expandability; /**< to be found as well (expand.h): by the paper's law, uncorrected */
   supine_patient_progress *progress; /**< optional */
   void *progress_context;
 } supine_patient_surface_task;
@@ -55,7 +53,6 @@ typedef struct supine_patient_surface_fit {
 /** Fits a law to a surface in another state.
  * @retval SUPINE_ERROR_MESH  nothing overlaps (frames, units or sides differ), axes are reversed,
  * the same surface as rest, or next to no compatible points
- * @retval SUPINE_ERROR_ARGUMENT     expandability of another law than the paper's
  * @retval SUPINE_ERROR_INTERRUPTED  progress said so
  * @retval those of supine_patient_fit */
 supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,

@@ -32,8 +32,14 @@ static void apply(const map *by, const double *from, double *to) {
   }
 }
 
+/* Below this, mm RMS, nothing moved: landmarks and surfaces are not placed better. */
+static const double still = 0.05;
+
+/* A similarity whose scale is 1, beside the maps that are shown. */
+static const supine_patient_map rigid = SUPINE_PATIENT_MAP_COUNT;
+
 /* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, the last column of U
- * turned where that would mirror; scale tr(S) over the spread. */
+ * turned where that would mirror; scale tr(S) over the spread, or 1 where that is 0. */
 static bool similarity(double cross[9], double spread, double m[9]) {
   double s[3];
   double u[9];
@@ -45,8 +51,8 @@ static bool similarity(double cross[9], double spread, double m[9]) {
     cblas_dscal(3, -1.0, u + 2, 3);
     s[2] = -s[2];
   }
-  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, 3, 3, 3, (s[0] + s[1] + s[2]) / spread, u,
-              3, vt, 3, 0.0, m, 3);
+  const double scale = spread > 0.0 ? (s[0] + s[1] + s[2]) / spread : 1.0;
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, 3, 3, 3, scale, u, 3, vt, 3, 0.0, m, 3);
   return true;
 }
 
@@ -74,8 +80,9 @@ static bool fit_map(supine_patient_map kind, size_t count, const double *from, c
     }
   }
   bool right = true;
-  if (kind == SUPINE_PATIENT_MAP_SIMILARITY) {
-    right = similarity(cross, scatter[0] + scatter[4] + scatter[8], found->m);
+  if (kind == SUPINE_PATIENT_MAP_SIMILARITY || kind == rigid) {
+    const double spread = scatter[0] + scatter[4] + scatter[8];
+    right = similarity(cross, kind == rigid ? 0.0 : spread, found->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
     /* by columns, the rows of the map are the right-hand sides */
     right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter, 3, cross, 3) == 0;
@@ -101,43 +108,49 @@ static void summarise(double *distances, size_t count, supine_patient_distance *
   of->largest = distances[count - 1];
 }
 
-static void explain(supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
-  const double none = distance[SUPINE_PATIENT_MAP_NONE].rms;
+static void explain(supine_patient_moved moved,
+                    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
+  const double none = distance[moved == SUPINE_PATIENT_STILL ? SUPINE_PATIENT_MAP_NONE
+                                                             : SUPINE_PATIENT_MAP_TRANSLATION]
+                          .rms;
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    distance[k].explained = none > 0.0 ? 1.0 - pow(distance[k].rms / none, 2.0) : 0.0;
+    distance[k].explained = none > still ? 1.0 - pow(distance[k].rms / none, 2.0) : NAN;
   }
 }
 
-supine_status
-supine_patient_validate_points(const supine_patient_pairs *pairs, const double *predicted,
-                               supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                               supine_error *error) {
+/* The map that takes a motion between the scans out. */
+static supine_patient_map map_of(supine_patient_moved moved) {
+  return moved == SUPINE_PATIENT_RIGID         ? rigid
+         : moved == SUPINE_PATIENT_TRANSLATION ? SUPINE_PATIENT_MAP_TRANSLATION
+                                               : SUPINE_PATIENT_MAP_NONE;
+}
+
+supine_status supine_patient_validate_points(
+    const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
+    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
   if (space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
   }
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     map by;
-    if (k != SUPINE_PATIENT_MAP_PREDICTED &&
-        !fit_map((supine_patient_map)k, pairs->count, pairs->from, pairs->to, &by)) {
+    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
+    const double *from = own ? predicted : pairs->from;
+    if (!fit_map(own ? map_of(moved) : (supine_patient_map)k, pairs->count, from, pairs->to, &by)) {
       free(space);
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "the points determine no %s map: they lie in one plane",
-                              supine_patient_map_names[k]);
+                              own ? "rigid" : supine_patient_map_names[k]);
     }
     for (size_t i = 0; i < pairs->count; ++i) {
       double at[3];
       const double *to = pairs->to + 3 * i;
-      if (k == SUPINE_PATIENT_MAP_PREDICTED) {
-        memcpy(at, predicted + 3 * i, sizeof at);
-      } else {
-        apply(&by, pairs->from + 3 * i, at);
-      }
+      apply(&by, from + 3 * i, at);
       space[i] = sqrt(pow(at[0] - to[0], 2.0) + pow(at[1] - to[1], 2.0) + pow(at[2] - to[2], 2.0));
     }
     summarise(space, pairs->count, &distance[k]);
   }
-  explain(distance);
+  explain(moved, distance);
   free(space);
   return SUPINE_OK;
 }
@@ -189,9 +202,8 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
 }
 
 /* Vertices moved by the map of a kind that nearest points settle on. */
-static bool settle(supine_patient_map kind, const supine_mesh *rest,
+static bool settle(supine_patient_map kind, size_t n, const double *vertices,
                    const supine_inside_surface *tree, double *space, double *moved) {
-  const size_t n = rest->vertex_count;
   const size_t count = n < FITTED_MAX ? n : FITTED_MAX;
   double *from = space;
   double *at = from + 3 * count;
@@ -199,7 +211,7 @@ static bool settle(supine_patient_map kind, const supine_mesh *rest,
   double *distance = to + 3 * count;
   map by = {.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
   for (size_t i = 0; i < count; ++i) {
-    memcpy(from + 3 * i, rest->vertices + 3 * (i * n / count), 3 * sizeof(double));
+    memcpy(from + 3 * i, vertices + 3 * (i * n / count), 3 * sizeof(double));
   }
   for (int round = 0; round < (kind == SUPINE_PATIENT_MAP_NONE ? 0 : ROUNDS); ++round) {
     search s = {tree, at, distance, to};
@@ -212,7 +224,7 @@ static bool settle(supine_patient_map kind, const supine_mesh *rest,
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    apply(&by, rest->vertices + 3 * i, moved + 3 * i);
+    apply(&by, vertices + 3 * i, moved + 3 * i);
   }
   return true;
 }
@@ -234,14 +246,17 @@ static supine_status check_overlap(const supine_mesh *rest, const supine_mesh *s
   return SUPINE_OK;
 }
 
-supine_status supine_patient_validate_surface(
-    const supine_mesh *rest, const double *predicted, const supine_mesh *state, double *nearest,
-    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
+supine_status
+supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved moved,
+                                double *predicted, const supine_mesh *state, double *nearest,
+                                supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                                supine_error *error) {
   supine_inside_surface *tree = NULL;
   double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
-  double *moved = malloc(3 * rest->vertex_count * sizeof *moved);
+  const size_t n = rest->vertex_count;
+  double *at = malloc(3 * n * sizeof *at);
   supine_status status = check_overlap(rest, state, error);
-  if (status == SUPINE_OK && (space == NULL || moved == NULL)) {
+  if (status == SUPINE_OK && (space == NULL || at == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
                               rest->vertex_count);
   }
@@ -251,19 +266,22 @@ supine_status supine_patient_validate_surface(
   }
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
-    if (!own && !settle((supine_patient_map)k, rest, tree, space, moved)) {
+    if (!settle(own ? map_of(moved) : (supine_patient_map)k, n, own ? predicted : rest->vertices,
+                tree, space, at)) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the surface determines no %s map",
-                                supine_patient_map_names[k]);
+                                own ? "rigid" : supine_patient_map_names[k]);
     } else {
-      status = surface_distance(rest, own ? predicted : moved, state, tree, own ? nearest : NULL,
-                                &distance[k], error);
+      status = surface_distance(rest, at, state, tree, own ? nearest : NULL, &distance[k], error);
+    }
+    if (own && status == SUPINE_OK) {
+      memcpy(predicted, at, 3 * n * sizeof *at);
     }
   }
   if (status == SUPINE_OK) {
-    explain(distance);
+    explain(moved, distance);
   }
   supine_inside_surface_destroy(tree);
   free(space);
-  free(moved);
+  free(at);
   return status;
 }

@@ -5,7 +5,7 @@
 #define SUPINE_PATIENT_VALIDATE_H
 
 #include "mesh/mesh.h"
-#include "precompute/patient/pairs.h"
+#include "precompute/patient/rows.h"
 
 /** The prediction, and maps of the state at rest that are fitted to the other state itself: what a
  * prediction has to be better than. */
@@ -25,26 +25,30 @@ extern const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT];
 typedef struct supine_patient_distance {
   double mean, rms, p95;
   double largest;   /**< of surfaces: the Hausdorff distance */
-  double explained; /**< share of the squared distance without any map */
+  double explained; /**< share of the squared distance without any map, or of a translation where
+                         the motion between the scans is taken out; NAN where nothing moved */
 } supine_patient_distance;
 
-/** Distances of points that are known in both states.
+/** Compute distances of points that are known in both states.
+ * @param moved      motion between the scans that is taken out of the prediction, by least squares
  * @param predicted  [count, 3] where the pairs' first points were predicted to go
  * @retval SUPINE_ERROR_NUMERICAL (all in one plane), SUPINE_ERROR_MEMORY */
-supine_status
-supine_patient_validate_points(const supine_patient_pairs *pairs, const double *predicted,
-                               supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                               supine_error *error);
+supine_status supine_patient_validate_points(
+    const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
+    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
 
-/** Distances between surfaces of any meshing, of the vertices of each to the other surface. The
- * maps are fitted to nearest points, over and over.
- * @param rest       vertices at rest
- * @param predicted  [rest vertices, 3]
+/** Compute distances between surfaces of any meshing, of the vertices of each to the other surface.
+ * The maps are fitted to nearest points, over and over.
+ * @param rest       the surface that motion starts from
+ * @param moved      motion between the scans that is taken out of the prediction
+ * @param predicted  [rest vertices, 3]; the motion is added to it
  * @param nearest    optional [rest vertices, 3]: the state's point nearest to each predicted one
  * @retval SUPINE_ERROR_MESH  boxes that do not overlap
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status supine_patient_validate_surface(
-    const supine_mesh *rest, const double *predicted, const supine_mesh *state, double *nearest,
-    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
+supine_status
+supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved moved,
+                                double *predicted, const supine_mesh *state, double *nearest,
+                                supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                                supine_error *error);
 
 #endif

@@ -76,6 +76,9 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   default:
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no direction model %d", (int)law->model);
   }
+  if (law->correct != NULL) {
+    law->correct(law->context, lungs, directions);
+  }
   for (size_t i = 0; i < 3 * n; ++i) {
     if (directions[i] != 0.0) {
       return SUPINE_OK;

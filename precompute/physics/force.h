@@ -60,6 +60,9 @@ typedef struct supine_direction_law {
   supine_direction_model model;
   double c[6];
   const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; the caller's */
+  /** Corrects the directions [N, 3] of one person's lungs in place; NULL: they stay. */
+  void (*correct)(const void *context, const supine_lungs *lungs, double *directions);
+  const void *context; /**< of the correction; the caller's */
 } supine_direction_law;
 
 /** Reads vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each of

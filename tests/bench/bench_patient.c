@@ -43,7 +43,7 @@ static void scatter(unsigned long seed, const supine_patient *truth, supine_pati
     p[0] = (i % 2 == 0 ? 1.0 : -1.0) * (17.3 + 97.1 * gsl_rng_uniform(random));
     p[1] = -151.7 + 149.3 * gsl_rng_uniform(random);
     p[2] = -203.1 + 241.9 * gsl_rng_uniform(random);
-    supine_patient_displacement(truth, p, u);
+    supine_patient_displacement(truth, p, 0.0, u);
     for (size_t k = 0; k < 3; ++k) {
       pairs->to[3 * i + k] = p[k] + u[k] + gsl_ran_gaussian(random, 0.5);
     }
@@ -56,9 +56,9 @@ static void landmarks(void) {
                                 .frame = {{-125.0, -162.0, -214.0}, {125.0, 8.0, 49.0}, 0.0, 0},
                                 .powers = {2.1, 1.3, 1.6, 0.2, -0.7, 0.3},
                                 .lengths = {7.3, 5.9, 21.7}};
-  const supine_patient_fit_options options = {0};
+  const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER};
   supine_patient_pairs pairs = {LANDMARKS, malloc(3 * LANDMARKS * sizeof(double)),
-                                malloc(3 * LANDMARKS * sizeof(double))};
+                                malloc(3 * LANDMARKS * sizeof(double)), NULL};
   supine_patient_row *rows = malloc(3 * LANDMARKS * sizeof *rows);
   double expected[SUPINE_PATIENT_CONSTANTS];
   size_t within[2] = {0}; /* the intervals, three standard errors */
@@ -76,7 +76,7 @@ static void landmarks(void) {
     const double wall = supine_clock_seconds();
     const double begin = processor_seconds();
     supine_patient_rows_of_pairs(&truth.frame, &pairs, rows);
-    need(supine_patient_fit(&truth.frame, rows, LANDMARKS, 3, &options, &patient, &report, &error),
+    need(supine_patient_fit(&truth.frame, rows, 0, LANDMARKS, &options, &patient, &report, &error),
          &error);
     seconds[0] = fmin(seconds[0], supine_clock_seconds() - wall);
     seconds[1] = fmin(seconds[1], processor_seconds() - begin);
