@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A block of coefficients to and from the caller's array: rows are put in their places, and turned
- * where the coefficients of a field lie together. */
+/* A block of coefficients to the caller's array: rows are put in their places, and turned where the
+ * coefficients of a field lie together. */
 #include "sh/internal.h"
 
 /* turned[field, (band + 1)^2] from the rows of a block; eight fields, a cache line, at a time. */
@@ -32,19 +32,5 @@ void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batc
   for (size_t f = 0; f < fields; ++f) {
     supine_sh_row_write(plan->count, mode, work->spectra + f * plan->count,
                         coefficients + (begin + f) * batch->field_stride);
-  }
-}
-
-void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                          size_t begin, size_t fields, const double *coefficients, double *block) {
-  for (size_t i = 0; i < plan->count; ++i) {
-    const double *in = coefficients + plan->position[i] * batch->coefficient_stride;
-    double *row = block + i * plan->width;
-    for (size_t f = 0; f < fields; ++f) {
-      row[f] = in[(begin + f) * batch->field_stride];
-    }
-    for (size_t f = fields; f < plan->width; ++f) {
-      row[f] = 0;
-    }
   }
 }

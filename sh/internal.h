@@ -33,10 +33,9 @@ struct supine_sh_transform {
   size_t latitudes, longitudes;
   size_t pairs; /* latitudes / 2, rounded up */
   size_t width;
-  double *analysis;  /* for each (m, parity): [degrees, pairs], weights included */
-  double *synthesis; /* for each (m, parity): [pairs, degrees] */
-  size_t *position;  /* [count] index l*l + l + m of each row of a coefficient block */
-  fftw_plan fft;     /* [longitudes] complex, for `width` fields at once */
+  double *analysis; /* for each (m, parity): [degrees, pairs], weights included */
+  size_t *position; /* [count] index l*l + l + m of each row of a coefficient block */
+  fftw_plan fft;    /* [longitudes] complex, for `width` fields at once */
 };
 
 /* A thread's own arrays. */
@@ -57,7 +56,7 @@ static inline size_t supine_sh_group(size_t m, size_t parity, size_t sine) {
   return m == 0 ? parity : 4 * m - 2 + 2 * parity + sine;
 }
 
-/* legendre.c: fills analysis, synthesis and position. */
+/* legendre.c: fills analysis and position. */
 supine_status supine_sh_legendre(supine_sh_transform *plan, const supine_sh_grid *grid);
 
 /* product.c: y[rows, width] = t[rows, columns] x[columns, width]; t has row stride `t_stride`. */
@@ -73,22 +72,17 @@ void supine_sh_row_write(size_t fields, supine_sh_mode mode, const double *row, 
 /* Each thread, when it has written its last row. */
 void supine_sh_rows_finish(void);
 
-/* ring.c: rings of values to rows of spectra, and back. `fields` <= width of the block are there.
+/* ring.c: rings of values to rows of spectra. `fields` <= width of the block are there.
  * A pair's missing ring is NULL. `row` and `rows`: the pair's place among how many in a group. */
 void supine_sh_ring_forward(const supine_sh_transform *plan, const supine_sh_workspace *work,
                             size_t fields, size_t stride, const double *north, const double *south,
                             size_t row, size_t rows);
-void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_workspace *work,
-                            size_t fields, size_t stride, supine_sh_mode mode, double *north,
-                            double *south, size_t row, size_t rows);
 
 /* block.c: coefficients of the fields from `begin` on. Storing may overwrite the spectra, which
  * have at least as much space as the coefficients. */
 void supine_sh_block_store(const supine_sh_transform *plan, const supine_sh_batch *batch,
                            size_t begin, size_t fields, supine_sh_mode mode,
                            const supine_sh_workspace *work, double *coefficients);
-void supine_sh_block_load(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                          size_t begin, size_t fields, const double *coefficients, double *block);
 
 /* batch.c: fills in the defaults and refuses strides that overlap or overflow. */
 supine_status supine_sh_batch_check(const supine_sh_transform *plan, const supine_sh_batch *batch,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Legendre functions on the northern latitudes, as the matrices of the two transforms. */
+/* Legendre functions on the northern latitudes, as the matrix of the transform. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -23,12 +23,11 @@ static void fill_positions(supine_sh_transform *plan) {
   }
 }
 
-/* Latitude p's column of `analysis` and row of `synthesis`. GSL's SPHARM functions are orthonormal
+/* Latitude p's column of `analysis`. GSL's SPHARM functions are orthonormal
  * with exp(i m phi); a real harmonic of m > 0 is sqrt(2) times that. The FFT leaves twice each
- * cosine and sine of m > 0, and takes half. */
+ * cosine and sine of m > 0. */
 static void fill_latitude(supine_sh_transform *plan, size_t p, double weight, const double *value) {
   double *analysis = plan->analysis;
-  double *synthesis = plan->synthesis;
   for (size_t m = 0; m <= plan->band; ++m) {
     const double scale = m == 0 ? 1 : M_SQRT1_2;
     for (size_t parity = 0; parity < 2; ++parity) {
@@ -36,10 +35,8 @@ static void fill_latitude(supine_sh_transform *plan, size_t p, double weight, co
       for (size_t d = 0; d < degrees; ++d) {
         const double y = scale * value[gsl_sf_legendre_array_index(m + parity + 2 * d, m)];
         analysis[d * plan->pairs + p] = weight * y;
-        synthesis[p * degrees + d] = y;
       }
       analysis += degrees * plan->pairs;
-      synthesis += degrees * plan->pairs;
     }
   }
 }
@@ -48,10 +45,8 @@ supine_status supine_sh_legendre(supine_sh_transform *plan, const supine_sh_grid
   const size_t degrees = (plan->band + 1) * (plan->band + 2) / 2;
   double *value = malloc(gsl_sf_legendre_array_n(plan->band) * sizeof *value);
   plan->analysis = malloc(degrees * plan->pairs * sizeof *plan->analysis);
-  plan->synthesis = malloc(degrees * plan->pairs * sizeof *plan->synthesis);
   plan->position = malloc(plan->count * sizeof *plan->position);
-  if (value == NULL || plan->analysis == NULL || plan->synthesis == NULL ||
-      plan->position == NULL) {
+  if (value == NULL || plan->analysis == NULL || plan->position == NULL) {
     free(value);
     return SUPINE_ERROR_MEMORY;
   }

@@ -1,14 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* One pair of rings: values to cosine and sine rows along longitude, and back.
+/* One pair of rings: values to cosine and sine rows along longitude.
  *
  * z = sum + i difference; Z(m) = sum over k of z(k) exp(+2 pi i m k / longitudes). With sum's
  * cosine and sine integrals c, s and difference's d, t:
  *
  *     Z(m) + Z(-m) = 2 (c + i d)        Z(m) - Z(-m) = 2 (-t + i s)
- *
- * and backwards, from series instead of integrals,
- *
- *     Z(m) = ((c + t) + i (d - s)) / 2  Z(-m) = ((c - t) + i (d + s)) / 2
  *
  * The halves are in the matrices of legendre.c. */
 #include <string.h>
@@ -91,63 +87,5 @@ void supine_sh_ring_forward(const supine_sh_transform *plan, const supine_sh_wor
     split_order(width, work->ring_spectrum + 2 * m * width,
                 work->ring_spectrum + 2 * (plan->longitudes - m) * width, rows_m,
                 rows_m + 2 * group, rows_m + group, rows_m + 3 * group);
-  }
-}
-
-SUPINE_CLONES
-static void join(size_t width, const double *restrict even, const double *restrict odd,
-                 double *restrict z) {
-  for (size_t f = 0; f < width; ++f) {
-    z[2 * f] = even[f];
-    z[2 * f + 1] = odd[f];
-  }
-}
-
-SUPINE_CLONES
-static void join_order(size_t width, const double *restrict even, const double *restrict odd,
-                       const double *restrict even_sine, const double *restrict odd_sine,
-                       double *restrict plus, double *restrict minus) {
-  for (size_t f = 0; f < width; ++f) {
-    plus[2 * f] = even[f] + odd_sine[f];
-    plus[2 * f + 1] = odd[f] - even_sine[f];
-    minus[2 * f] = even[f] - odd_sine[f];
-    minus[2 * f + 1] = odd[f] + even_sine[f];
-  }
-}
-
-SUPINE_CLONES
-static void part(size_t width, const double *restrict z, double *restrict north,
-                 double *restrict south) {
-  for (size_t f = 0; f < width; ++f) {
-    north[f] = z[2 * f] + z[2 * f + 1];
-    south[f] = z[2 * f] - z[2 * f + 1];
-  }
-}
-
-/* Nine parameters: as its counterpart, with what to do with the lower ring. */
-void supine_sh_ring_inverse(const supine_sh_transform *plan, const supine_sh_workspace *work,
-                            size_t fields, size_t stride, supine_sh_mode mode, double *north,
-                            double *south, size_t row, size_t rows) {
-  double rings[2][SUPINE_SH_WIDTH_MAX];
-  const size_t width = plan->width;
-  const size_t group = rows * width;
-  const double *in = work->spectra + row * width;
-  join(width, in, in + group, work->ring_spectrum);
-  for (size_t m = 1; m <= plan->band; ++m) {
-    const double *rows_m = in + supine_sh_group(m, 0, 0) * group;
-    join_order(width, rows_m, rows_m + 2 * group, rows_m + group, rows_m + 3 * group,
-               work->ring_spectrum + 2 * m * width,
-               work->ring_spectrum + 2 * (plan->longitudes - m) * width);
-  }
-  const size_t gap = plan->longitudes - 2 * plan->band - 1; /* orders beyond the band */
-  memset(work->ring_spectrum + 2 * (plan->band + 1) * width, 0,
-         2 * gap * width * sizeof *work->ring_spectrum);
-  fftw_execute_dft(plan->fft, (fftw_complex *)work->ring_spectrum, (fftw_complex *)work->ring);
-  for (size_t k = 0; k < plan->longitudes; ++k) {
-    part(width, work->ring + 2 * k * width, rings[0], rings[1]);
-    supine_sh_row_write(fields, mode, rings[0], north + k * stride);
-    if (south != NULL) {
-      supine_sh_row_write(fields, mode, rings[1], south + k * stride);
-    }
   }
 }

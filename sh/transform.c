@@ -66,7 +66,6 @@ cleanup:
 void supine_sh_transform_destroy(supine_sh_transform *plan) {
   if (plan != NULL) {
     free(plan->analysis);
-    free(plan->synthesis);
     free(plan->position);
     if (plan->fft != NULL) {
       fftw_destroy_plan(plan->fft);

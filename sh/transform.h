@@ -3,7 +3,6 @@
  * The spherical-harmonic transform of many real fields at once, in double precision.
  *
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)         forward
- *     value(g) = sum over l <= band, m of coefficient(l, m) Y(l, m)(g)            inverse
  *
  * Fields are many and bands low, so the work is laid out across fields: FFTW along
  * longitude and a small matrix product for each order m along latitude, on blocks of fields that
@@ -69,9 +68,5 @@ supine_status supine_sh_forward(const supine_sh_transform *plan, const supine_sh
 supine_status supine_sh_forward_ring(const supine_sh_transform *plan, const supine_sh_batch *batch,
                                      size_t j, const double *ring, double *coefficients,
                                      supine_error *error);
-
-/** Coefficients to values on the whole grid, which are overwritten. Statuses as forward. */
-supine_status supine_sh_inverse(const supine_sh_transform *plan, const supine_sh_batch *batch,
-                                const double *coefficients, double *values, supine_error *error);
 
 #endif
