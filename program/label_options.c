@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Label maps in place of meshes. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sh/base/text.h"
 
 #include "mesh/image/image.h"
 #include "mesh/labels/labels.h"
@@ -11,8 +16,9 @@
 #define FILLS(member) SUPINE_FILLS(supine_label_options, member)
 
 const supine_option supine_command_label_options[] = {
-    {.help =
-         "Label maps (.nrrd, .nii, .nii.gz, .mha) in place of surfaces, one map or a mask a file:"},
+    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) in place of surfaces: one map, a mask a "
+             "file, or the "
+             "folder of masks that TotalSegmentator writes:"},
     {"labels", 0, "WHICH",
      "which labels are lungs; default: by those that are there, where they leave no doubt. "
      "lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), totalsegmentator (10 to 14), "
@@ -28,11 +34,16 @@ const supine_option supine_command_label_options[] = {
      .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
     {.name = NULL}};
 
+static bool is_folder(const char *path) {
+  struct stat about;
+  return stat(path, &about) == 0 && S_ISDIR(about.st_mode);
+}
+
 int supine_command_labels_check(const supine_label_options *options, const char *command,
                                 char **paths, size_t count, bool *maps) {
   size_t images = 0;
   for (size_t i = 0; i < count; ++i) {
-    images += supine_image_is_named(paths[i]);
+    images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
   }
   *maps = images == count;
   if (images > 0 && images < count) {
@@ -41,9 +52,47 @@ int supine_command_labels_check(const supine_label_options *options, const char 
   if (images == 0 && (options->labels != NULL || options->edge > 0.0 || options->close > 0.0 ||
                       options->surfaces != NULL)) {
     return supine_options_usage(command, "--labels, --edge, --close and --surfaces-out are of "
-                                         "label maps (.nrrd, .nii, .nii.gz)");
+                                         "label maps (.nrrd, .nii, .nii.gz, .mha)");
   }
   return SUPINE_EXIT_OK;
+}
+
+enum { LOBES = 5, LEFT_LOBES = 2 };
+
+/* The lobes of a folder of TotalSegmentator's masks. */
+typedef struct lobe_files {
+  char path[LOBES][PATH_MAX];
+  char *list[LOBES];
+  size_t count;
+  char labels[64]; /* which of them are left and right */
+} lobe_files;
+
+static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
+  static const char *const names[LOBES] = {"upper_lobe_left", "lower_lobe_left", "upper_lobe_right",
+                                           "middle_lobe_right", "lower_lobe_right"};
+  static const char *const endings[] = {".nii.gz", ".nii", ".nrrd", ".mha"};
+  const char *before = "left=";
+  found->count = 0;
+  found->labels[0] = '\0';
+  for (size_t lobe = 0; lobe < LOBES; ++lobe) {
+    before = lobe == LEFT_LOBES ? found->count > 0 ? ",right=" : "right=" : before;
+    for (size_t e = 0; e < sizeof endings / sizeof *endings; ++e) {
+      char *path = found->path[found->count];
+      const int length = snprintf(path, PATH_MAX, "%s/lung_%s%s", folder, names[lobe], endings[e]);
+      if (length < PATH_MAX && access(path, F_OK) == 0) {
+        found->list[found->count++] = path;
+        supine_text_add(found->labels, sizeof found->labels, "%s%zu", before, found->count);
+        before = "+";
+        break;
+      }
+    }
+  }
+  return found->count > 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_READ,
+                                "%s: no lung_upper_lobe_left.nii.gz or other lobe of "
+                                "TotalSegmentator in this folder; name the files themselves",
+                                folder);
 }
 
 static const char *side_name(const supine_labels_lung *lung) {
@@ -128,16 +177,23 @@ static supine_status save(const char *path, const supine_mesh *surfaces, size_t 
 
 int supine_command_labels_load(const supine_label_options *options, const char *command,
                                char **paths, size_t path_count, supine_command_maps *maps) {
-  supine_progress progress = supine_options_progress_begin("label map");
-  const supine_labels_options wanted = {.labels = options->labels,
-                                        .axes = maps->axes,
-                                        .edge = options->edge,
-                                        .close = options->close,
-                                        .progress = supine_options_progress_step,
-                                        .progress_context = &progress};
-  supine_labels_report report;
+  lobe_files lobes;
   supine_error error;
-  supine_status status = supine_labels_surfaces((const char *const *)paths, path_count, &wanted,
+  const bool folder = path_count == 1 && is_folder(paths[0]);
+  if (folder && find_lobes(paths[0], &lobes, &error) != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  supine_progress progress = supine_options_progress_begin("label map");
+  const supine_labels_options wanted = {
+      .labels = folder && options->labels == NULL ? lobes.labels : options->labels,
+      .axes = maps->axes,
+      .edge = options->edge,
+      .close = options->close,
+      .progress = supine_options_progress_step,
+      .progress_context = &progress};
+  supine_labels_report report;
+  supine_status status = supine_labels_surfaces((const char *const *)(folder ? lobes.list : paths),
+                                                folder ? lobes.count : path_count, &wanted,
                                                 maps->surfaces, &report, &error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK) {

@@ -149,6 +149,33 @@ if vtk:
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
 
+# A folder of TotalSegmentator's masks; outputs into a pipe; names that are not UTF-8.
+os.mkdir("segmentations")
+where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
+x, y, z = numpy.moveaxis(where, -1, 0)
+lungs = ((abs(x) - 66) / (numpy.where(x > 0, 58, 53) * (1 - .2 * z / 100))) ** 2 + ((y - .25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
+affine = numpy.diag([5.0, 4.0, 6.0, 1.0])
+affine[:3, 3] = [-141.3, -85.7, -113.9]
+for name, part in (("upper_lobe_left", (x < 0) & (z > 0)), ("lower_lobe_left", (x < 0) & (z <= 0)),
+                   ("upper_lobe_right", (x > 0) & (z > 30)), ("middle_lobe_right", (x > 0) & (z <= 30) & (z > -10)),
+                   ("lower_lobe_right", (x > 0) & (z <= -10))):
+    nibabel.save(nibabel.Nifti1Image((lungs & part).astype(numpy.uint8), affine), f"segmentations/lung_{name}.nii.gz")
+nibabel.save(nibabel.Nifti1Image(lungs.astype(numpy.uint8), affine), "segmentations/heart.nii.gz")
+said = run(supine, "solve", "segmentations", "--edge", "5", "--posture", "prone", "-o", "folder.ply")
+if "labels 1, 2 left; 3, 4, 5 right" not in said:
+    faults.append(f"folder of masks: {said}")
+for ending in ("ply", "obj", "stl", "vtp"):
+    run(supine, "deform", "l.safetensors", "--posture", "prone", "-o", f"a.{ending}")
+    for name in (f"-.{ending}",) + (("-",) if ending == "ply" else ()):
+        piped = subprocess.run([supine, "deform", "l.safetensors", "--posture", "prone", "-o", name],
+                               capture_output=True, check=False)
+        if piped.stdout != open(f"a.{ending}", "rb").read():
+            faults.append(f"-o {name}: {len(piped.stdout)} bytes; {piped.stderr}")
+shutil.copy("l.safetensors", b"n\xe9.safetensors")
+listed = subprocess.run([supine.encode(), b"info", b"n\xe9.safetensors", b"--json"], capture_output=True, check=False)
+if listed.returncode != 0 or '"n?.safetensors"' not in listed.stdout.decode("utf-8"):
+    faults.append(f"a name that is not UTF-8: {listed}")
+
 for fault in faults:
     print(fault)
 print(f"{len(faults)} faults")

@@ -24,6 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
+  char standard[16]; /* "-" with the first of an output's endings */
 } reading;
 
 static void collect(void *context, const supine_option *option, size_t base) {
@@ -143,6 +144,12 @@ static int say_rivals(const reading *r, const char *rivals) {
 }
 
 static int take_given(reading *r, row *taken, const char *text) {
+  const supine_option *option = taken->option;
+  if (option->file == SUPINE_FILE_OUT && option->endings != NULL && strcmp(text, "-") == 0) {
+    (void)snprintf(r->standard, sizeof r->standard, "-%.*s", (int)strcspn(option->endings, ", "),
+                   option->endings);
+    text = r->standard;
+  }
   const char *rivals = taken->option->rivals;
   for (size_t i = 0; rivals != NULL && i < r->count; ++i) {
     const char *word = r->rows[i].option->rivals;
@@ -301,6 +308,12 @@ static int check_outputs(const reading *r, const supine_arguments *given) {
   for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
     if (r->rows[i].given && r->rows[i].option->file >= SUPINE_FILE_OUT) {
       result = check_output(r, &r->rows[i], given);
+    }
+  }
+  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+    if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
+        supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard()) {
+      result = supine_options_usage(r->command->name, "standard output is closed");
     }
   }
   return result;

@@ -22,6 +22,21 @@ struct supine_output_stream {
 
 enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* more than outputs are open at once; bytes */
 
+/* Standard output as it was before supine_output_take_standard; -1: where it is. */
+static atomic_int standard_output = -1;
+
+bool supine_output_is_standard(const char *path) {
+  return path[0] == '-' && (path[1] == '\0' || path[1] == '.') && strchr(path, '/') == NULL;
+}
+
+bool supine_output_take_standard(void) {
+  (void)fflush(stdout);
+  if (atomic_load(&standard_output) < 0) {
+    atomic_store(&standard_output, fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1));
+  }
+  return atomic_load(&standard_output) >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0;
+}
+
 /* Temporary names that exist, for supine_output_abandon_all. */
 static char *_Atomic live[LIVE_MAX];
 
@@ -154,6 +169,10 @@ static int open_regular(supine_output *output) {
 
 static int open_descriptor(supine_output *output) {
   struct stat old;
+  if (output->standard) {
+    const int kept = atomic_load(&standard_output);
+    return fcntl(kept >= 0 ? kept : STDOUT_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  }
   if (stat(output->target, &old) != 0) {
     return open_regular(output);
   }
@@ -177,6 +196,7 @@ static int open_descriptor(supine_output *output) {
 
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error) {
   *output = (supine_output){0};
+  output->standard = supine_output_is_standard(path);
   output->path = strdup(path);
   output->target = follow_links(path);
   output->stream = malloc(sizeof *output->stream);
@@ -233,7 +253,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
   errno = 0;
   const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
   const bool known = fstat(stream->descriptor, &made) == 0;
-  const bool regular = known && S_ISREG(made.st_mode);
+  const bool regular = known && S_ISREG(made.st_mode) && !output->standard;
   if (!flushed || stream->code != 0 || !known || (regular && fsync(stream->descriptor) != 0)) {
     errno = stream->code != 0 ? stream->code : errno == 0 ? EIO : errno;
     return output_fail(output, error, "cannot write");
@@ -275,6 +295,10 @@ void supine_output_abandon(supine_output *output) {
 
 supine_status supine_output_try(const char *path, supine_error *error) {
   supine_output output;
+  struct stat old;
+  if (supine_output_is_standard(path) || (stat(path, &old) == 0 && S_ISFIFO(old.st_mode))) {
+    return SUPINE_OK; /* whoever reads from it would take a closed pipe for the end */
+  }
   const supine_status status = supine_output_open(path, &output, error);
   supine_output_abandon(&output);
   return status;

@@ -8,6 +8,7 @@
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 
+#include <stdbool.h>
 #include <stdio.h>
 
 #include <supine/status.h>
@@ -19,12 +20,13 @@ typedef struct supine_output {
   char *path;      /**< as the user wrote it */
   char *target;    /**< what it leads to, symbolic links followed */
   char *temporary; /**< its name until then; "" where it has none */
+  bool standard;   /**< standard output */
   struct supine_output_stream *stream;
 } supine_output;
 
 /** Begins a file. A new one gets the mode that the process's mask allows, an old one keeps its own;
  * a symbolic link stays, and what it leads to is replaced. A path that names a device or pipe is
- * written directly.
+ * written directly, and so is standard output.
  * @retval SUPINE_ERROR_WRITE  the folder is missing or not writable, the path is a folder, or a
  *                             file that nobody may write
  * @retval SUPINE_ERROR_MEMORY */
@@ -37,6 +39,13 @@ supine_status supine_output_commit(supine_output *output, supine_error *error);
 
 /** Drops the file; legal after open failed, after commit, and on a zeroed struct. */
 void supine_output_abandon(supine_output *output);
+
+/** Is it standard output: "-", or "-" and an ending that says in which format, as "-.ply"? */
+bool supine_output_is_standard(const char *path);
+
+/** Keeps standard output for supine_output_open alone: what is printed goes to standard error from
+ * here on. False where it is closed. */
+bool supine_output_take_standard(void);
 
 /** Could a file of this name be written? Nothing is left of trying.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY  as supine_output_open */
