@@ -118,6 +118,7 @@ static void add_reference(entries *list, const supine_reference *reference) {
 }
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
+  add(list, "route", "fields"); /* the run-time library evaluates them at gain 1 */
   add(list, "directions", "%s", fit->grid ? "grid" : "scattered");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);

@@ -221,10 +221,15 @@ static void check_stated_error(const supine_lungs *of, bool scalar, const char *
   double error2 = 0.0;
   double field2 = 0.0;
   for (size_t d = 0; d < others.direction_count; ++d) {
-    double weights[SUPINE_MODES_MAX];
-    const double scales[2] = {1.0, 1.0};
-    assert_int_equal(supine_basis_weights(basis, others.directions + 3 * d, weights), SUPINE_OK);
-    supine_deform(basis, POSED(basis, weights, scales), xyz);
+    const double *g = others.directions + 3 * d;
+    supine_state posture = {.gravity = {g[0], g[1], g[2]}}; /* the default volume: as given */
+    supine_pose pose;
+    assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_OK);
+    supine_deform(basis, &pose, xyz);
+    posture.volume.kind = SUPINE_VOLUME_REST; /* nothing knows it */
+    assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
+    posture.volume.kind = SUPINE_VOLUME_FULL;
+    assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
     for (size_t i = 0; i < 3 * n; ++i) {
       const double should = others.displacement[3 * n * d + i];
       const double is = (double)xyz[i] - (double)(float)of->mesh.vertices[i];
