@@ -9,11 +9,13 @@
 #include "precompute/projection/compression.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/kernels/tiles.h"
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 
 /* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
  * errors change in the second digit. */
 enum { ROWS = 4096, STATES = 192, HELD_OUT = 128, STEP = 3 };
+enum { TERMS_MAX = (SUPINE_NORMALS_FIELD_MAX + 1) * (SUPINE_NORMALS_FIELD_MAX + 2) / 2 };
 
 /* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
  * little differently. */
@@ -140,6 +142,20 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
+/* Exact normals of a row in every state by axis. States stand side by side in `across` [terms,
+ * HELD_OUT], for vector units; each sum is in the order of dot. */
+SUPINE_CLONES static void find_exact(const double *row, size_t terms, const double *across,
+                                     double (*exact)[HELD_OUT]) {
+  memset(exact, 0, 3 * sizeof *exact);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t a = 0; a < terms; ++a) {
+      for (size_t i = 0; i < HELD_OUT; ++i) {
+        exact[axis][i] += row[axis * terms + a] * across[a * HELD_OUT + i];
+      }
+    }
+  }
+}
+
 /* Angles off of each row in each held-out state, added at `angles`; returns how many. `modes` are
  * those that the file will hold, `weights` theirs. */
 static size_t measure(const supine_normals_rows *rows, size_t terms,
@@ -147,7 +163,11 @@ static size_t measure(const supine_normals_rows *rows, size_t terms,
                       const double *weights, double *angles) {
   size_t found = 0;
   double v[HELD_OUT][SUPINE_NORMALS_MOST];
+  double across[TERMS_MAX * HELD_OUT] = {0.0};
   for (size_t i = 0; i < states->count; ++i) {
+    for (size_t a = 0; a < terms; ++a) {
+      across[a * HELD_OUT + i] = states->phi[i * terms + a];
+    }
     for (size_t j = 0; j < count; ++j) {
       v[i][j] = dot(weights + j * terms, states->phi + i * terms, terms);
     }
@@ -157,14 +177,14 @@ static size_t measure(const supine_normals_rows *rows, size_t terms,
     for (size_t axis = 0; axis < 3; ++axis) {
       pack(modes + (3 * (size_t)rows->vertex[r] + axis) * count, count, packed[axis]);
     }
+    double exact[3][HELD_OUT];
+    find_exact(rows->terms + 3 * r * terms, terms, across, exact);
     for (size_t i = 0; i < states->count; ++i) {
-      double exact[3];
       double made[3];
       for (size_t axis = 0; axis < 3; ++axis) {
-        exact[axis] = dot(rows->terms + (3 * r + axis) * terms, states->phi + i * terms, terms);
         made[axis] = dot(v[i], packed[axis], count);
       }
-      angles[found++] = angle_between(exact, made);
+      angles[found++] = angle_between((double[]){exact[0][i], exact[1][i], exact[2][i]}, made);
     }
   }
   return found;
