@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/locate.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
@@ -115,6 +116,18 @@ static void add_reference(entries *list, const supine_reference *reference) {
   add(list, "full_volume_ml", "%.9g", reference->full_volume);
   add(list, "resting_shares", "left=%g,right=%g,supine=%g,prone=%g,inverted=%g,upright=%g",
       share[0], share[1], share[2], share[3], share[4], share[5]);
+}
+
+/* How far off positions are expected to be, and whether rest is a guess (supine/locate.h). */
+static void add_expected_error(entries *list, const supine_basis_content *content) {
+  const supine_resting usual = supine_reference_resting_default();
+  if (content->model != NULL) {
+    add(list, "expected_error_mm", "%g", SUPINE_EXPECTED_ERROR_MM);
+  }
+  if (content->reference != NULL &&
+      memcmp(&content->reference->resting, &usual, sizeof usual) != 0) {
+    add(list, "resting_known", "yes");
+  }
 }
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
@@ -245,6 +258,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (content->reference != NULL) {
     add_reference(&list, content->reference);
   }
+  add_expected_error(&list, content);
   if (content->fit != NULL) {
     add_fit(&list, content->fit);
   }

@@ -6,14 +6,13 @@
 
 #include "runtime/locate.h"
 
-static const double usual = 4.5;           /* c, mm */
 static const double resting_spread = 0.05; /* standard deviation of rest, of full inflation */
 const double supine_expected_shift = 0.01;
 
 double supine_expected_constant(const supine_basis *basis) {
   const char *text = supine_basis_metadata(basis, "expected_error_mm");
   const double stated = text == NULL ? 0 : strtod(text, NULL);
-  return stated > 0 && isfinite(stated) ? stated : usual;
+  return stated > 0 && isfinite(stated) ? stated : SUPINE_EXPECTED_ERROR_MM;
 }
 
 double supine_expected_reference(const supine_basis *basis) {
@@ -46,9 +45,11 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
 /* Is the volume at rest a guess? */
 static bool rest_is_assumed(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
+  const char *state = supine_basis_metadata(basis, "scan_state");
   return supine_basis_get_info(basis)->has_rest &&
          supine_basis_metadata(basis, "resting_known") == NULL &&
-         (scanned == NULL || strncmp(scanned, "rest", 4) != 0);
+         (scanned == NULL || strcmp(scanned, "rest") != 0) &&
+         (state == NULL || strstr(state, "rest") == NULL);
 }
 
 /* Does the volume count from rest? */

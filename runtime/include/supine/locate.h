@@ -25,9 +25,13 @@
 extern "C" {
 #endif
 
+/** c of files that do not say theirs, mm. */
+#define SUPINE_EXPECTED_ERROR_MM 4.5
+
 /** Compute the expected error of every vertex in a state, counted from another.
  *
- * A file's metadata "expected_error_mm" replaces c.
+ * A file's metadata "expected_error_mm" replaces c; "resting_known" says that rest is no guess, as
+ * does a scan at rest.
  * @param from   NULL: the scan
  * @param sigma  [N] mm, written
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's fields, whose error
