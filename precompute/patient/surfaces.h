@@ -29,9 +29,9 @@ typedef struct supine_patient_surface_report {
 /** What a law is fitted to. */
 typedef struct supine_patient_surface_task {
   const supine_lungs *rest;
-  const supine_mesh *state;              /**< the same lungs, mm, same frame */
-  const supine_model *model;             /**< stiffness and spreading of the force; its force and
-                                              directions do not count */
+  const supine_mesh *state;  /**< the same lungs, mm, same frame */
+  const supine_model *model; /**< stiffness and spreading of the force; the force itself is
+                                  held where expandability is to be found */
   const supine_patient_pairs *landmarks; /**< optional, to be matched as well */
   supine_patient_fit_options options;    /**< the gravity below counts */
   double gravity[3];                     /**< of the emptier state */
