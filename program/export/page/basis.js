@@ -236,23 +236,19 @@ function gainsFor(basis, cubics, volumes, total) {
 const spread = (gains) => Float64Array.from(gains.flatMap((gain) => [gain, gain, gain]));
 
 /** Everything about one moment: the modes' weights, three gains of each lung, and the mL that each
- * lung holds (`held`) and gains over rest in that posture (`gained`). `depth` is mL above rest where
- * the surface is closed, else mm of the largest displacement when supine. `folds` where the surface
- * would fold before it holds that. */
+ * lung holds (`held`), gas and tissue. `depth` is mL above rest where the surface is closed, else mm of
+ * the largest displacement when supine. `folds` where the surface would fold before it holds that. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   if (!basis.hasVolume) {
     const gains = spread(Array(basis.lungs).fill((depth / basis.breathLargest) * basis.breathScale));
-    return { gravity, weights, gains, held: null, gained: null, folds: false };
+    return { gravity, weights, gains, held: null, folds: false };
   }
   const cubics = basis.references.map((_, lung) => lungCubic(basis, lung, weights));
   const volumes = volumesFor(basis, gravity);
-  const rest = sumOf(volumes.rest);
-  const now = gainsFor(basis, cubics, volumes, rest + depth);
-  const still = gainsFor(basis, cubics, volumes, rest);
-  const held = now.map((gain, lung) => basis.references[lung] + cubicAt(cubics[lung], gain));
-  const gained = held.map((ml, lung) => ml - basis.references[lung] - cubicAt(cubics[lung], still[lung]));
-  return { gravity, weights, gains: spread(now), held, gained, folds: !now.every(Number.isFinite) };
+  const gains = gainsFor(basis, cubics, volumes, sumOf(volumes.rest) + depth);
+  const held = gains.map((gain, lung) => basis.references[lung] + cubicAt(cubics[lung], gain));
+  return { gravity, weights, gains: spread(gains), held, folds: !gains.every(Number.isFinite) };
 }
 
 /** What supine.glsl multiplies by: the weights, three gains of each lung, and the weights of the normal's

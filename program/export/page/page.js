@@ -314,9 +314,8 @@ function start() {
       $('play').setAttribute('aria-pressed', String(state.playing));
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
     });
-    const gains = state.moment?.gained?.map((gain, i) => `${basis.lungNames[i]} +${gain.toFixed(0)} mL`).join('   ').replaceAll('+-', '\u2212');
-    const rest = restFor(basis, gravity) - state.supineRest;
-    write('gains', gains ? `${gains}${basis.resting ? `   at rest ${rest < 0 ? '\u2212' : '+'}${Math.abs(rest).toFixed(0)} mL against supine` : ''}` : 'open surface: the largest displacement, supine, instead of a volume');
+    const held = state.moment?.held?.map((ml, lung) => `${basis.lungNames[lung]} ${ml.toFixed(0)} mL`).join('   ');
+    write('held', held ? `${held}, gas and tissue` : 'open surface: the largest displacement, supine, instead of a volume');
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
     changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
     if (state.beside) {

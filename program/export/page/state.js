@@ -78,8 +78,7 @@ class State {
     this.unit = basis.hasVolume ? 'mL' : 'mm';
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
     this.depth = this.tidal;
-    this.supineRest = restFor(basis, gravityOf(POSTURES[0].q));
-    this.depthMax = Math.max(2 * this.tidal, -this.supineRest);
+    this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
