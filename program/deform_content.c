@@ -73,7 +73,7 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* name, lung, x, y, z and where that is now. */
+/* name, lung, x, y, z and where that is now; over 60 lines, one a column. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_pose *pose, const supine_reference_pose *from,
                                   const supine_expected *expected,
@@ -261,6 +261,7 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return status;
 }
 
+/* Eight parameters, as the command has them. */
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
                                   const supine_reference_pose *from, bool other,
