@@ -103,19 +103,37 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* Where volumes count from, and what was assumed of the scan. */
-static void add_reference(entries *list, const supine_reference *reference) {
-  static const char *const kinds[] = {"none", "full", "rest", "volume"};
-  const double *g = reference->scan.gravity;
-  const double *share = reference->resting.share;
-  add(list, "scanned", "%s", kinds[reference->scan.kind]);
-  if (reference->scan.kind > SUPINE_SCAN_FULL) {
-    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+/* A number for each lung, separated by commas. */
+static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
+  if (count == 2) {
+    add(list, key, "%.9g,%.9g", values[0], values[1]);
+  } else {
+    add(list, key, "%.9g", values[0]);
   }
-  add(list, "scan_volume_ml", "%.9g", reference->scan_volume);
-  add(list, "full_volume_ml", "%.9g", reference->full_volume);
-  add(list, "resting_shares", "left=%g,right=%g,supine=%g,prone=%g,inverted=%g,upright=%g",
-      share[0], share[1], share[2], share[3], share[4], share[5]);
+}
+
+/* Where volumes count from, and what was assumed of the scan. */
+static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
+  const double *g = reference->scan.state.gravity;
+  const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
+  char text[160];
+  char shares[256];
+  double volume[2];
+  (void)supine_state_print(&reference->scan.state, text, sizeof text);
+  add(list, "scanned", "%s",
+      reference->scan.state.volume.ml != 0.0 ? "volume"
+      : full                                 ? "full"
+                                             : "rest");
+  add(list, "scan_state", "%s", text);
+  add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    volume[lung] = share[lung] * reference->scan_volume[lung];
+  }
+  add_by_lung(list, "scan_volume_ml", reference->lung_count, volume);
+  add(list, "full_volume_ml", "%.9g", reference->full_volume[0] + reference->full_volume[1]);
+  add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
+  supine_reference_resting_print(&reference->resting, shares, sizeof shares);
+  add(list, "resting_shares", "%s", shares);
 }
 
 /* How far off positions are expected to be, and whether rest is a guess (supine/locate.h). */
@@ -146,23 +164,15 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
     add(list, "lungs", "%s", supine_lungs_name(lungs, 0));
   }
   if (lungs->topology.closed) {
-    char text[64];
-    int used = 0;
+    double volume[2];
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      const supine_mesh part = {lungs->mesh.vertex_count, lungs->mesh.vertices,
-                                lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
-                                lungs->mesh.triangles + 3 * lungs->triangle_begin[lung]};
-      used += snprintf(text + used, sizeof text - (size_t)used, "%s%.3f", lung > 0 ? "," : "",
-                       1e-3 * share[lung] * supine_mesh_volume(&part));
+      const supine_mesh part = supine_lungs_part(lungs, lung);
+      volume[lung] = 1e-3 * share[lung] * supine_mesh_volume(&part);
     }
-    add(list, "reference_volume_ml", "%s", text);
+    add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   }
   if (share[0] != 1.0 || share[1] != 1.0) {
-    if (lungs->lung_count == 2) {
-      add(list, "lung_share", "%.9g,%.9g", share[0], share[1]);
-    } else {
-      add(list, "lung_share", "%.9g", share[0]);
-    }
+    add_by_lung(list, "lung_share", lungs->lung_count, share);
   }
 }
 
@@ -195,7 +205,7 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                           .linear = forms != NULL ? forms->linear : NULL,
                                           .quadratic = forms != NULL ? forms->quadratic : NULL,
                                           .cubic = forms != NULL ? forms->cubic : NULL,
-                                          .resting = content->resting};
+                                          .resting = content->resting_total};
   return supine_normals_modes_create(&surface, normals, error);
 }
 
@@ -256,7 +266,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     add_model(&list, lungs, content->model);
   }
   if (content->reference != NULL) {
-    add_reference(&list, content->reference);
+    add_reference(&list, content->reference, share);
   }
   add_expected_error(&list, content);
   if (content->fit != NULL) {
@@ -315,7 +325,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
         (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
   }
   if (content->resting != NULL) {
-    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, content->resting};
+    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting};
   }
   if (content->table != NULL) {
     const supine_error_table *table = content->table;

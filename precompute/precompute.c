@@ -9,7 +9,6 @@
 #include "precompute/precompute.h"
 
 #include "precompute/basis_file.h"
-#include "precompute/physics/solve.h"
 #include "precompute/projection/compression.h"
 #include "precompute/projection/held_out.h"
 #include "precompute/rest.h"
@@ -46,7 +45,8 @@ typedef struct pipeline {
   supine_held_out held_out;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[9];           /* mL from the reference at rest, harmonics; where that is known */
+  double resting[2][9];    /* mL from the reference at rest by lung, harmonics; where it is known */
+  double resting_total[9]; /* of the lungs together */
   supine_accuracy_state state; /* that errors in mm are stated at */
   supine_error_table table;
 } pipeline;
@@ -111,19 +111,16 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* A scan that was not full is where the compressed field must lead, to the last bit: its own error
- * at the scan's gravity is taken off the full surface, which is none the worse for it.
+/* Move the full surface so that the compressed field leads to the scan to the last bit: by what the
+ * field errs at the scan's gravity, and by what the fixed point left.
  *
- *     p + s F d = scan = p' + s F' d,   p' = p + s (F - F') d */
+ *     p' = scan - s F' d */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
-  const supine_model *model = &p->options->model;
-  const supine_scan *scan = &p->reference.scan;
   const supine_compression *field = &p->compression;
   const size_t n = lungs->mesh.vertex_count;
-  supine_solution truth = {0};
   double weights[SUPINE_MODES_MADE_MAX];
-  if (!(p->reference.known && p->reference.scan_volume < 0.0)) {
+  if (!p->reference.known || lungs->scanned == NULL) {
     return SUPINE_OK;
   }
   double *y = malloc(supine_sh_count(field->band) * sizeof *y);
@@ -135,32 +132,30 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     free(y);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  supine_status status = supine_physics_solve(lungs, model, scan->gravity, &truth, error);
-  if (status == SUPINE_OK) {
-    (void)supine_sh_evaluate(field->band, scan->gravity, y); /* of unit length */
-    supine_projection_compression_weights(field, y, weights);
-    for (size_t i = 0; i < n; ++i) {
-      double miss = truth.catch_[i];
-      for (size_t k = 0; k < field->mode_count; ++k) {
-        miss -= weights[k] * (double)field->coefficients[i * field->mode_count + k];
-      }
-      for (size_t k = 0; k < 3; ++k) {
-        p->anchored.mesh.vertices[3 * i + k] =
-            lungs->mesh.vertices[3 * i + k] +
-            p->reference.scan_scale * miss * p->directions[3 * i + k];
-      }
-    }
-    const double gained =
-        1e-3 * (supine_mesh_volume(&p->anchored.mesh) - supine_mesh_volume(&lungs->mesh));
-    p->reference.full_volume = p->options->reference->full_volume + gained;
-    p->reference.anchored = gained;
-    p->reference.scan_volume = p->options->reference->scan_volume - gained;
-    p->lungs = &p->anchored;
-    supine_physics_volume_forms_free(&p->column_forms);
-  }
-  supine_physics_solution_free(&truth);
+  (void)supine_sh_evaluate(field->band, p->reference.scan.state.gravity, y); /* of unit length */
+  supine_projection_compression_weights(field, y, weights);
   free(y);
-  return status;
+  for (size_t i = 0; i < n; ++i) {
+    double amount = 0.0;
+    for (size_t k = 0; k < field->mode_count; ++k) {
+      amount += weights[k] * (double)field->coefficients[i * field->mode_count + k];
+    }
+    amount *= p->reference.scan_scale[lungs->lung_count == 2 && i >= lungs->lung_begin[1]];
+    for (size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      p->anchored.mesh.vertices[k] = lungs->scanned[k] - amount * p->directions[k];
+    }
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const supine_mesh after = supine_lungs_part(&p->anchored, lung);
+    const supine_reference *before = p->options->reference;
+    const double gained = 1e-3 * supine_mesh_volume(&after) - before->full_volume[lung];
+    p->reference.full_volume[lung] = before->full_volume[lung] + gained;
+    p->reference.anchored[lung] = gained;
+    p->reference.scan_volume[lung] = before->scan_volume[lung] - gained;
+  }
+  p->lungs = &p->anchored;
+  supine_physics_volume_forms_free(&p->column_forms);
+  return SUPINE_OK;
 }
 
 /* Finds the volume forms of the coefficients: those of the projection's columns carried along where
@@ -198,9 +193,13 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   if (!p->reference.known) {
     return SUPINE_OK;
   }
-  p->state.resting = p->resting;
-  return supine_precompute_rest(p->lungs, &options->model, &p->reference, &p->compression,
-                                &p->forms, p->resting, error);
+  const supine_status status = supine_precompute_rest(
+      &p->reference, options->model.share, &p->compression, &p->forms, p->resting, error);
+  for (size_t t = 0; t < 9; ++t) {
+    p->resting_total[t] = p->resting[0][t] + p->resting[1][t]; /* 0 where there is no second */
+  }
+  p->state.resting = p->resting_total;
+  return status;
 }
 
 static size_t held_out_default(const pipeline *p) {
@@ -281,7 +280,8 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                             p->forms.linear != NULL ? &p->turned_over : NULL,
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
-                                        .resting = p->state.resting,
+                                        .resting = p->reference.known ? p->resting[0] : NULL,
+                                        .resting_total = p->state.resting,
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,

@@ -168,7 +168,7 @@ static int compress_fields(const supine_lungs *lungs, const request *wanted, con
   size_t mode_count = 0;
   supine_error error;
   int result = SUPINE_EXIT_OK;
-  if (supine_fields_load(wanted->fields, lungs, &wanted->model.load, &fields, &error) !=
+  if (supine_fields_load(wanted->fields, lungs, &wanted->model.source.load, &fields, &error) !=
           SUPINE_OK ||
       supine_precompute_fields(lungs, &fields, &options, made_by, wanted->path, &report,
                                &mode_count, &error) != SUPINE_OK) {
@@ -185,12 +185,12 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   supine_progress progress = supine_options_progress_begin(name);
   supine_precompute_report report;
   supine_error error;
-  wanted->basis.model = wanted->model.model;
-  wanted->basis.reference = &wanted->model.reference;
+  wanted->basis.model = wanted->model.prepared.model;
+  wanted->basis.reference = &wanted->model.prepared.reference;
   wanted->basis.made_by = made_by;
   wanted->basis.assumed = wanted->model.assumed;
   wanted->basis.findings = wanted->model.findings.text;
-  wanted->basis.frame = wanted->model.frame;
+  wanted->basis.frame = wanted->model.made_from.frame;
   wanted->basis.progress = supine_options_progress_step;
   wanted->basis.progress_context = &progress;
   supine_options_signals_catch(true);
@@ -216,7 +216,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  wanted->model.law_choice = SUPINE_LAW_DEEP; /* what the options below say of constants */
+  wanted->model.choice.law = SUPINE_LAW_DEEP; /* what the options below say of constants */
   wanted->basis.patient = *text;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
@@ -235,12 +235,12 @@ static void begin(void *chosen) {
 /* Constants beside a patient's: which of the two is meant? Only before loading, which fills in what
  * was not given. */
 static int check_patient(const request *wanted) {
-  const supine_model_options *options = &wanted->model;
-  const supine_model *model = &options->model;
+  const supine_model_choice *choice = &wanted->model.choice;
+  const supine_model *model = &choice->model;
   const struct {
     bool given;
     const char *option;
-  } brought[] = {{options->law_choice != SUPINE_LAW_COUNT, "law"},
+  } brought[] = {{choice->law != SUPINE_LAW_COUNT, "law"},
                  {!isnan(model->force.base), "base"},
                  {!isnan(model->force.gain), "gain"},
                  {!isnan(model->force.box[0]), "box-force"},
@@ -261,7 +261,7 @@ static int check_patient(const request *wanted) {
 
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
-  supine_lungs lungs = {0};
+  const supine_lungs *lungs = &wanted->model.made_from.lungs;
   supine_error error;
   char *text = NULL;
   static supine_patient_record record; /* some 40 kB */
@@ -278,14 +278,13 @@ static int run(void *chosen, const supine_arguments *given) {
   }
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->fields != NULL, &lungs);
+                                       wanted->fields != NULL);
   }
   if (result == SUPINE_EXIT_OK) {
-    result = wanted->fields != NULL ? compress_fields(&lungs, wanted, given->made_by)
-                                    : compute(&lungs, wanted, given->made_by);
+    result = wanted->fields != NULL ? compress_fields(lungs, wanted, given->made_by)
+                                    : compute(lungs, wanted, given->made_by);
   }
   free(text);
-  supine_lungs_free(&lungs);
   supine_command_model_options_free(&wanted->model);
   return result;
 }

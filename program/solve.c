@@ -19,7 +19,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_volume_options volume;
+  supine_state state; /* its volume the default where none was given: rest */
   bool has_scale, has_vertex, as_scanned, pitcher_catcher;
   double scale;
   size_t vertex;
@@ -28,7 +28,8 @@ typedef struct request {
 static const supine_option table[] = {
     {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
-    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
+    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP, SUPINE_FILLS(request, state),
+     .read = supine_options_read_volume, .rivals = "breath"},
     {"scale", 0, "MM",
      "largest displacement instead, mm; negative: the other way. Default where no rest is known: F "
      "d as it is, F what a vertex catches of the force, d in mm",
@@ -57,13 +58,13 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (column == NULL ||
-      supine_physics_model_network(lungs, &wanted->model.model, &network) != SUPINE_OK ||
+      supine_physics_model_network(lungs, &wanted->model.prepared.model, &network) != SUPINE_OK ||
       supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
-  status =
-      supine_physics_equilibrium_set_stiffness(equilibrium, wanted->model.model.stiffness, error);
+  status = supine_physics_equilibrium_set_stiffness(equilibrium,
+                                                    wanted->model.prepared.model.stiffness, error);
   if (status == SUPINE_OK) {
     status = supine_physics_transfer_column(equilibrium, wanted->vertex, column, error);
   }
@@ -85,72 +86,77 @@ cleanup:
   return status;
 }
 
-/* The breath scale at which lungs rest: that of the pair, healthy (see precompute/rest.h). */
-static supine_status resting_scale(const supine_lungs *lungs, const request *wanted,
-                                   const double g[3], double *scale, supine_error *error) {
-  const supine_reference *reference = &wanted->model.reference;
-  const bool alone = lungs->lung_count == 1;
-  supine_model healthy = wanted->model.model;
-  double cubic[3] = {0.0, 0.0, 0.0};
-  supine_status status = SUPINE_OK;
-  healthy.share[0] = healthy.share[1] = 1.0;
-  for (int image = 0; image < (alone ? 2 : 1) && status == SUPINE_OK; ++image) {
-    const double seen[3] = {image == 0 ? g[0] : -g[0], g[1], g[2]};
-    supine_solution solution = {0};
-    status = supine_physics_solve(lungs, &healthy, seen, &solution, error);
-    for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
-      cubic[i] += solution.cubic[i];
-    }
-    supine_physics_solution_free(&solution);
+/* mL that each lung is to hold beyond its healthy reference surface. */
+static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
+                                  double *ml, supine_error *error) {
+  const double *g = state->gravity;
+  const double full = reference->full_volume[0] + reference->full_volume[1];
+  double part[2];
+  double total = state->volume.ml;
+  switch (state->volume.kind) {
+  case SUPINE_VOLUME_ABSOLUTE:
+    break;
+  case SUPINE_VOLUME_SCAN:
+    total += full + reference->scan_volume[0] + reference->scan_volume[1];
+    break;
+  case SUPINE_VOLUME_FULL:
+    total += supine_reference_full(reference, g, part);
+    break;
+  default:
+    total += supine_reference_rest(reference, g, part);
   }
-  const double share = supine_reference_along_axes(reference->resting.share, g);
-  return status == SUPINE_OK
-             ? supine_volume_scale(cubic,
-                                   (share - 1.0) * (alone ? 2.0 : 1.0) * reference->full_volume,
-                                   scale, error)
-             : status;
+  if (state->lung_count > 0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--volume: 'supine solve' takes the volume of all lungs together");
+  }
+  supine_reference_share_out(reference, g, total, ml);
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    ml[lung] -= reference->full_volume[lung];
+  }
+  return SUPINE_OK;
 }
 
-/* The breath scale that was asked for, or 1. */
-static supine_status find_scale(const supine_lungs *lungs, const request *wanted, const double g[3],
-                                const supine_solution *solution, double *scale,
-                                supine_error *error) {
-  const supine_reference *reference = &wanted->model.reference;
-  supine_volume volume = wanted->volume.state.volume;
-  const bool told = volume.kind != SUPINE_VOLUME_DEFAULT;
-  *scale = 1.0;
+/* The scale of each lung: --scale, the state's volume, or 1. */
+static supine_status find_scales(const supine_lungs *lungs, const request *wanted,
+                                 const supine_solution *solution, double *scale,
+                                 supine_error *error) {
+  const supine_reference *reference = &wanted->model.prepared.reference;
+  const supine_volume *volume = &wanted->state.volume;
+  scale[0] = scale[1] = 1.0;
   if (wanted->has_scale) {
     const double largest = supine_physics_solution_largest(solution);
-    *scale = wanted->scale / largest;
+    scale[0] = scale[1] = wanted->scale / largest;
     return largest > 0.0
                ? SUPINE_OK
                : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
   }
-  if (!told && !reference->known) {
+  if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
   }
   if (!solution->has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "--volume needs a closed surface: close it, or give --scale");
   }
-  volume.kind = told ? volume.kind : SUPINE_VOLUME_REST;
-  if (!reference->known && volume.kind <= SUPINE_VOLUME_FULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "rest and full are unknown of a scan taken as it is: give scan+ML or an "
-        "absolute volume, as 2600mL");
+  if (!reference->known) { /* breaths are added to the scan, at one scale */
+    const double held =
+        volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+    const supine_status status =
+        volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
+            ? supine_volume_scale(solution->cubic, volume->ml - held, scale, error)
+            : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                               "rest and full are unknown of a scan taken as it is: give scan+ML "
+                               "or an absolute volume, as 2600mL");
+    scale[1] = scale[0];
+    return status;
   }
-  double state = volume.kind == SUPINE_VOLUME_SCAN       ? reference->scan_volume
-                 : volume.kind == SUPINE_VOLUME_ABSOLUTE ? -1e-3 * supine_mesh_volume(&lungs->mesh)
-                                                         : 0.0;
-  if (volume.kind == SUPINE_VOLUME_REST && reference->known) {
-    const supine_status status = resting_scale(lungs, wanted, g, scale, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
-    state = supine_volume_at(solution->cubic, *scale);
+  double ml[2];
+  supine_status status = find_volumes(reference, &wanted->state, ml, error);
+  for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
+    status = supine_volume_scale(solution->lung_cubic[lung],
+                                 wanted->model.prepared.model.share[lung] * ml[lung], &scale[lung],
+                                 error);
   }
-  return supine_volume_scale(solution->cubic, state + volume.ml, scale, error);
+  return status;
 }
 
 /* Share of the largest force that a node may still hold. */
@@ -202,21 +208,23 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
 }
 
 static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
-                                    const double g[3], supine_error *error) {
+                                    supine_error *error) {
+  const double *g = wanted->state.gravity;
   supine_solution solution = {0};
   supine_mesh deformed = lungs->mesh;
   supine_mesh rest = lungs->mesh;
-  double scale = 1.0;
+  double scale[2];
   deformed.vertices = NULL;
   rest.vertices = NULL;
-  supine_status status = supine_physics_solve(lungs, &wanted->model.model, g, &solution, error);
+  const supine_model *model = &wanted->model.prepared.model;
+  supine_status status = supine_physics_solve(lungs, model, g, &solution, error);
   if (status == SUPINE_OK && wanted->pitcher_catcher) {
-    status = iterate(lungs, &wanted->model.model, g, &solution, error);
+    status = iterate(lungs, model, g, &solution, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = find_scale(lungs, wanted, g, &solution, &scale, error);
+  status = find_scales(lungs, wanted, &solution, scale, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -227,18 +235,24 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_tissue_rest(lungs, wanted->model.model.share, rest.vertices);
-  supine_physics_solution_apply(&solution, &rest, scale, deformed.vertices);
+  supine_tissue_rest(lungs, wanted->model.prepared.model.share, rest.vertices);
+  for (size_t i = 0; i < solution.vertex_count; ++i) {
+    solution.catch_[i] *= scale[lungs->lung_count == 2 && i >= lungs->lung_begin[1]];
+  }
+  supine_physics_solution_apply(&solution, &rest, 1.0, deformed.vertices);
   supine_mesh_save_options save = {.rest = rest.vertices};
   if (wanted->as_scanned) {
-    save.axes = wanted->model.frame.axes;
-    save.millimetres_per_unit = wanted->model.frame.millimetres_per_unit;
+    save.axes = wanted->model.made_from.frame.axes;
+    save.millimetres_per_unit = wanted->model.made_from.frame.millimetres_per_unit;
   }
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
-    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g, largest displacement %.3f mm",
-                 wanted->path, g[0], g[1], g[2], scale,
-                 fabs(scale) * supine_physics_solution_largest(&solution));
+    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g", wanted->path, g[0], g[1], g[2],
+                 scale[0]);
+    if (lungs->lung_count == 2 && scale[1] != scale[0]) {
+      (void)printf(" and %.6g", scale[1]);
+    }
+    (void)printf(", largest displacement %.3f mm", supine_physics_solution_largest(&solution));
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",
                    1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
@@ -259,32 +273,30 @@ static void begin(void *chosen) {
 
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
-  double g[3] = {0.0, 0.0, 0.0};
-  supine_lungs lungs = {0};
+  supine_error error;
+  const supine_lungs *lungs = &wanted->model.made_from.lungs;
   int result = SUPINE_EXIT_OK;
   if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
     return supine_options_usage(name, "%s: the name must end in " SUPINE_MESH_ENDINGS,
                                 wanted->path);
   }
   if (!wanted->has_vertex) {
-    result = supine_options_orientation_finish(&wanted->orientation, name, g);
+    result = supine_options_orientation_finish(&wanted->orientation, name, wanted->state.gravity);
   }
   if (result == SUPINE_EXIT_OK) {
     result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->has_vertex, &lungs);
+                                       wanted->has_vertex);
   }
   if (result == SUPINE_EXIT_OK && wanted->as_scanned &&
-      wanted->model.frame.millimetres_per_unit == 0.0) {
+      wanted->model.made_from.frame.millimetres_per_unit == 0.0) {
     supine_options_say(name, "--as-scanned: the surfaces came in different axes");
     result = SUPINE_EXIT_INPUT;
   }
   if (result == SUPINE_EXIT_OK) {
-    supine_error error;
-    const supine_status status = wanted->has_vertex ? write_column(&lungs, wanted, &error)
-                                                    : write_solution(&lungs, wanted, g, &error);
+    const supine_status status = wanted->has_vertex ? write_column(lungs, wanted, &error)
+                                                    : write_solution(lungs, wanted, &error);
     result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   }
-  supine_lungs_free(&lungs);
   supine_command_model_options_free(&wanted->model);
   return result;
 }

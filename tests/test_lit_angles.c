@@ -36,7 +36,7 @@ static const double p999_near = 1.4;
 
 /* The basis of lungs at full inflation, of the usual law but for `soften`. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
-  const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 15, .modes = modes, .held_out = 20};

@@ -20,7 +20,7 @@ enum { SUPINE, PRONE, LEFT, RIGHT, UPRIGHT };
 
 static void check_pair(const char *left, const char *right, supine_axes axes) {
   const char *const names[] = {left, right};
-  const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 23, .modes = 16, .held_out = 20};

@@ -116,7 +116,7 @@ static void test_solve_lesion_factor_one_writes_the_same_bytes(void **state) {
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
   assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
   assert_int_equal(solve("--lesion", "120,-150,-100,40,1", ply), SUPINE_EXIT_OK);
-  assert_string_equal(text, "");
+  assert_null(strstr(text, "lesion"));
   assert_true(same_bytes(out, ply));
   assert_int_equal(solve("--lung", "left:1", ply), SUPINE_EXIT_OK);
   assert_true(same_bytes(out, ply));
@@ -134,14 +134,15 @@ static void test_solve_lesion_factor_one_writes_the_same_bytes(void **state) {
 static void test_solve_lesion_outside_is_warned(void **state) {
   (void)state;
   assert_int_equal(solve("--lesion", "900,0,0,30,4", out), SUPINE_EXIT_OK);
-  assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is outside the lungs"));
+  assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is "));
+  assert_non_null(strstr(text, "mm from the nearest vertex"));
 }
 
 static void test_solve_lesion_deep_inside_says_why_it_changes_nothing(void **state) {
   (void)state;
   assert_int_equal(solve("--lesion", "56,-111,-79,5,4", out), SUPINE_EXIT_OK);
-  assert_non_null(strstr(text, "the lesion at 56,-111,-79 is inside the lungs"));
-  assert_non_null(strstr(text, "a larger RADIUS would"));
+  assert_non_null(strstr(text, "the lesion at 56,-111,-79 is"));
+  assert_non_null(strstr(text, "with a radius of 5 mm it changes nothing"));
 }
 
 static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
@@ -202,125 +203,6 @@ static void test_solve_expandability_file_of_ones_equals_uniform(void **state) {
   assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
   assert_int_equal(solve("--expandability", csv, ply), SUPINE_EXIT_OK);
   assert_true(same_bytes(out, ply));
-  (void)unlink(ply);
-}
-
-static void put_u32(FILE *file, uint32_t value) {
-  for (int b = 0; b < 4; ++b) {
-    (void)fputc((int)(value >> (8 * b) & 255), file);
-  }
-}
-
-static void put_float(FILE *file, double value, bool big) {
-  const float single = (float)value;
-  uint32_t bits = 0;
-  memcpy(&bits, &single, sizeof bits);
-  for (int b = 0; b < 4; ++b) {
-    (void)fputc((int)(bits >> (8 * (big ? 3 - b : b)) & 255), file);
-  }
-}
-
-/* The lungs as a PLY file whose vertices carry their expandability, exp of z, between two other
- * properties; in RAS or LPS, ASCII or binary. */
-static void write_ply(const char *path, const char *format, bool ras, double spoil) {
-  supine_mesh mesh = {0};
-  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
-  FILE *file = fopen(path, "wb");
-  assert_non_null(file);
-  (void)fprintf(file,
-                "ply\nformat %s 1.0\ncomment SPACE=%s\nelement vertex %zu\nproperty uchar red\n"
-                "property float x\nproperty float y\nproperty float z\nproperty float softness\n"
-                "property uchar blue\nelement face %zu\nproperty list uchar int vertex_indices\n"
-                "end_header\n",
-                format, ras ? "RAS" : "LPS", mesh.vertex_count, mesh.triangle_count);
-  const double turn = ras ? -1.0 : 1.0;
-  const bool ascii = strcmp(format, "ascii") == 0;
-  const bool big = strcmp(format, "binary_big_endian") == 0;
-  for (size_t i = 0; i < mesh.vertex_count; ++i) {
-    const double *p = mesh.vertices + 3 * i;
-    const double numbers[4] = {turn * p[0], turn * p[1], p[2],
-                               i == 3 && spoil != 1.0 ? spoil : exp(0.01 * p[2])};
-    if (ascii) {
-      (void)fprintf(file, "1 %.9g %.9g %.9g %.9g 2\n", numbers[0], numbers[1], numbers[2],
-                    numbers[3]);
-      continue;
-    }
-    (void)fputc(1, file);
-    for (size_t k = 0; k < 4; ++k) {
-      put_float(file, numbers[k], big);
-    }
-    (void)fputc(2, file);
-  }
-  for (size_t t = 0; t < mesh.triangle_count; ++t) {
-    const uint32_t *c = mesh.triangles + 3 * t;
-    if (ascii) {
-      (void)fprintf(file, "3 %u %u %u\n", c[0], c[1], c[2]);
-      continue;
-    }
-    (void)fputc(3, file);
-    for (size_t k = 0; k < 3; ++k) {
-      put_u32(file, big ? __builtin_bswap32(c[k]) : c[k]);
-    }
-  }
-  assert_int_equal(fclose(file), 0);
-  supine_mesh_free(&mesh);
-}
-
-static int solve_ply(const char *mesh, const char *value, const char *path) {
-  const char *const words[] = {"solve", mesh, "--posture",       "supine", "--volume", "scan+400",
-                               "-o",    path, "--expandability", value,    NULL};
-  return run(&supine_command_solve, words);
-}
-
-/* Positions of the vertices of two files, mm. */
-static double largest_difference(const char *first, const char *second) {
-  supine_mesh a = {0};
-  supine_mesh b = {0};
-  assert_int_equal(supine_mesh_load(first, NULL, &a, NULL, NULL), SUPINE_OK);
-  assert_int_equal(supine_mesh_load(second, NULL, &b, NULL, NULL), SUPINE_OK);
-  assert_int_equal(a.vertex_count, b.vertex_count);
-  double largest = 0.0;
-  for (size_t i = 0; i < 3 * a.vertex_count; ++i) {
-    largest = fmax(largest, fabs(a.vertices[i] - b.vertices[i]));
-  }
-  supine_mesh_free(&a);
-  supine_mesh_free(&b);
-  return largest;
-}
-
-static void test_solve_ply_property_equals_the_same_numbers_in_a_csv(void **state) {
-  (void)state;
-  char mesh_path[80];
-  char ply[80];
-  supine_mesh mesh = {0};
-  (void)snprintf(mesh_path, sizeof mesh_path, "%s.mesh.ply", other);
-  (void)snprintf(ply, sizeof ply, "%s.ply", other);
-  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
-  FILE *file = fopen(csv, "wb");
-  assert_non_null(file);
-  (void)fputs("a\n", file);
-  for (size_t i = 0; i < mesh.vertex_count; ++i) {
-    (void)fprintf(file, "%.9g\n", exp(0.01 * mesh.vertices[3 * i + 2]));
-  }
-  assert_int_equal(fclose(file), 0);
-  supine_mesh_free(&mesh);
-  assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_OK);
-  static const char *const formats[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-  for (size_t f = 0; f < 3; ++f) {
-    write_ply(mesh_path, formats[f], f != 1, 1.0);
-    if (solve_ply(mesh_path, "ply:softness", ply) != SUPINE_EXIT_OK) {
-      fail_msg("%s", text);
-    }
-    assert_true(largest_difference(out, ply) < 1e-3);
-  }
-  assert_int_equal(solve_ply(mesh_path, "uniform", ply), SUPINE_EXIT_OK);
-  assert_true(largest_difference(out, ply) > 0.1);
-  assert_int_equal(solve_ply(mesh_path, "ply:hardness", ply), SUPINE_EXIT_INPUT);
-  assert_non_null(strstr(text, "no property 'hardness'"));
-  write_ply(mesh_path, "ascii", false, -2.0);
-  assert_int_equal(solve_ply(mesh_path, "ply:softness", ply), SUPINE_EXIT_INPUT);
-  assert_non_null(strstr(text, "softness of vertex 3 is -2"));
-  (void)unlink(mesh_path);
   (void)unlink(ply);
 }
 
@@ -426,7 +308,6 @@ int main(void) {
       cmocka_unit_test(test_solve_bad_tissue_options_are_usage_errors),
       cmocka_unit_test(test_solve_bad_expandability_file_names_vertex),
       cmocka_unit_test(test_solve_expandability_file_of_ones_equals_uniform),
-      cmocka_unit_test(test_solve_ply_property_equals_the_same_numbers_in_a_csv),
       cmocka_unit_test(test_precompute_collapsed_lung_breathes_its_share_exactly),
       cmocka_unit_test(test_lung_that_is_not_there_is_refused),
   };

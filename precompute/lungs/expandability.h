@@ -42,23 +42,6 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error);
 
-/** a of the model's vertices that a PLY file has, from a property of its vertices of any number
- * type; vertices are recognised by their position. For a model of several files: once for each.
- *
- * @param property  its name in the file
- * @param axes      of the file, LPS or RAS, as loading it reported
- * @param millimetres_per_unit  of the file; 0: 1
- * @param a         [N], zeroed by the caller before the first file; 0 stays where none has the
- * vertex
- * @retval SUPINE_ERROR_READ    missing
- * @retval SUPINE_ERROR_FORMAT  not a PLY file, truncated, no such property, a value that is not
- *                              positive and finite (the file's vertex is named)
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_tissue_expandability_load_ply(const char *path, const char *property,
-                                                   supine_axes axes, double millimetres_per_unit,
-                                                   const supine_lungs *lungs, double *a,
-                                                   supine_error *error);
-
 /** E = 1/a; `stiffness` may be `a`.
  * @retval SUPINE_ERROR_ARGUMENT  an a that is not positive and finite (vertex named) */
 supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,

@@ -256,6 +256,7 @@ cleanup:
 void supine_lungs_free(supine_lungs *lungs) {
   supine_mesh_free(&lungs->mesh);
   supine_mesh_topology_free(&lungs->topology);
+  free(lungs->scanned);
   *lungs = (supine_lungs){0};
 }
 

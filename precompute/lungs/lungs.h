@@ -18,7 +18,9 @@ typedef struct supine_lungs {
   bool turned[2];           /**< its triangles faced inwards and were turned round */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
-  double midline; /**< x of the sagittal plane that X is measured from, mm */
+  double *scanned; /**< [N, 3] vertices as scanned where `mesh` was taken from there to full
+                        inflation (reference.h); else NULL */
+  double midline;  /**< x of the sagittal plane that X is measured from, mm */
 } supine_lungs;
 
 /** Joins surfaces into a model.
@@ -45,6 +47,13 @@ void supine_lungs_free(supine_lungs *lungs);
 /** "left" or "right". */
 static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lung) {
   return lungs->side[lung] > 0 ? "left" : "right";
+}
+
+/** One lung as a mesh that shares the arrays; its triangles index all vertices. */
+static inline supine_mesh supine_lungs_part(const supine_lungs *lungs, size_t lung) {
+  const size_t begin = lungs->triangle_begin[lung];
+  return (supine_mesh){lungs->mesh.vertex_count, lungs->mesh.vertices,
+                       lungs->triangle_begin[lung + 1] - begin, lungs->mesh.triangles + 3 * begin};
 }
 
 /** The box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the back to

@@ -90,10 +90,7 @@ supine_status supine_lungs_check_midline(const supine_lungs *lungs, bool two_sid
 
 void supine_lungs_face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lungs->topology.closed && lung < lungs->lung_count; ++lung) {
-    const size_t first = lungs->triangle_begin[lung];
-    const supine_mesh part = {lungs->mesh.vertex_count, lungs->mesh.vertices,
-                              lungs->triangle_begin[lung + 1] - first,
-                              lungs->mesh.triangles + 3 * first};
+    const supine_mesh part = supine_lungs_part(lungs, lung);
     lungs->turned[lung] = supine_mesh_volume(&part) < 0.0;
     for (size_t t = 0; lungs->turned[lung] && t < part.triangle_count; ++t) {
       const uint32_t second = part.triangles[3 * t + 1];

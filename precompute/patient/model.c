@@ -168,10 +168,11 @@ static double full_volume(const supine_patient_record *record, size_t state, dou
                           const supine_resting *resting) {
   const supine_state *of = &record->state[state];
   const double held = volume > 0.0 ? volume : record->volume[state];
-  return held <= 0.0                             ? 0.0
-         : of->volume.kind == SUPINE_VOLUME_FULL ? held - of->volume.ml
+  return held <= 0.0 ? 0.0
+         : of->volume.kind == SUPINE_VOLUME_FULL
+             ? (held - of->volume.ml) / supine_reference_full_share(of->gravity)
          : of->volume.kind == SUPINE_VOLUME_REST
-             ? (held - of->volume.ml) / supine_reference_along_axes(resting->share, of->gravity)
+             ? (held - of->volume.ml) / supine_reference_resting_total(resting, of->gravity)
              : 0.0;
 }
 
@@ -194,9 +195,10 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
     }
     const double share = (record->volume[k] - of->volume.ml) / full;
     if (share > share_least && share < share_most) {
-      const double assumed = supine_reference_along_axes(resting->share, of->gravity);
+      const double assumed = supine_reference_resting_total(resting, of->gravity);
       for (size_t a = 0; a < 6; ++a) {
-        resting->share[a] *= share / assumed;
+        resting->share[0][a] *= share / assumed;
+        resting->share[1][a] *= share / assumed;
       }
     }
   }
@@ -205,17 +207,12 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting) {
   const supine_state *of = &record->state[state];
-  supine_scan scan = {.kind = SUPINE_SCAN_NONE};
-  double full = full_volume(record, state, volume, resting);
-  full = full > 0.0 ? full : full_volume(record, 1 - state, 0.0, resting);
-  memcpy(scan.gravity, of->gravity, sizeof scan.gravity);
-  if (of->volume.ml == 0.0 && of->volume.kind == SUPINE_VOLUME_FULL) {
-    scan.kind = SUPINE_SCAN_FULL;
-  } else if (of->volume.ml == 0.0 && of->volume.kind == SUPINE_VOLUME_REST) {
-    scan.kind = SUPINE_SCAN_REST;
-  } else if (full > 0.0) {
-    scan.kind = SUPINE_SCAN_VOLUME;
-    scan.volume = fmin(0.0, volume - full);
+  supine_scan scan = {.state = *of};
+  const double full = full_volume(record, 1 - state, 0.0, resting);
+  scan.known = of->volume.kind == SUPINE_VOLUME_REST || of->volume.kind == SUPINE_VOLUME_FULL;
+  if (!scan.known && full > 0.0) {
+    scan.known = true;
+    scan.state.volume = (supine_volume){SUPINE_VOLUME_FULL, fmin(0.0, volume - full)};
   }
   return scan;
 }

@@ -100,7 +100,7 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
 
 /** Find what a scan shows that is one of the two states.
  * @param volume  of the scan, mL
- * @return kind NONE where nothing tells how far it is from full inflation */
+ * @return not known where nothing tells how far it is from full inflation */
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting);
 

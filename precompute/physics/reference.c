@@ -7,147 +7,149 @@
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
+#include "precompute/physics/inflate.h"
 #include "precompute/physics/reference.h"
-#include "precompute/physics/solve.h"
-#include "precompute/physics/volume_forms.h"
 
-enum { STEPS_MAX = 100 };
+static const double tissue_share = 0.1; /* of the full volume: nothing is emptier */
 
-static const double settled = 1e-4;      /* mm between steps: a fiftieth of what is promised */
-static const double tissue_share = 0.1;  /* of the full volume: nothing is emptier */
-static const double folded_share = 0.01; /* of the triangles: the surface is no lung's any more */
-
-/* Refuses a way up on which the surface folds, with the volume at which it does. */
-static supine_status check_folds(const supine_lungs *lungs, const supine_mesh *scan, double gain,
-                                 supine_error *error) {
-  const double share = supine_mesh_turned_over(scan, lungs->mesh.vertices);
-  if (share <= folded_share) {
+supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
+                                          supine_error *error) {
+  supine_scan read = {true, {.gravity = {0.0, 1.0, 0.0}}};
+  if (strcmp(text, "none") == 0) {
+    *scan = (supine_scan){0};
     return SUPINE_OK;
   }
-  const size_t count = 3 * scan->vertex_count;
-  double *between = malloc(count * sizeof *between);
-  if (between == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to look for folds");
+  const supine_status status = supine_state_parse(text, &read.state, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  double whole = 0.0;
-  double folded = 1.0;
-  while (folded - whole > 1e-3) {
-    const double part = 0.5 * (whole + folded);
-    for (size_t i = 0; i < count; ++i) {
-      between[i] = scan->vertices[i] + part * (lungs->mesh.vertices[i] - scan->vertices[i]);
+  const supine_volume_kind kind = read.state.volume.kind;
+  if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s': the mesh has its volume; say what it shows: full, POSTURE:rest, "
+                            "either with +ML or -ML of the lungs together, or none",
+                            text);
+  }
+  *scan = read;
+  return SUPINE_OK;
+}
+
+/* What lung `lung` holds as a share of its reference volume: resting.h's lines. */
+static double line(double rest, double full, double t) {
+  return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
+}
+
+double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml) {
+  double sum = 0.0;
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    ml[lung] = (reference->full_volume[lung] - reference->anchored[lung]) *
+               supine_reference_resting_share(&reference->resting, reference->side[lung], g);
+    sum += ml[lung];
+  }
+  return sum;
+}
+
+double supine_reference_full(const supine_reference *reference, const double g[3], double *ml) {
+  double sum = 0.0;
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    ml[lung] = reference->full_volume[lung] * supine_reference_full_share(g);
+    sum += ml[lung];
+  }
+  return sum;
+}
+
+void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
+                                double *ml) {
+  double full[2];
+  double rest[2];
+  const double at_full = supine_reference_full(reference, g, full);
+  const double at_rest = supine_reference_rest(reference, g, rest);
+  const double t =
+      total < at_rest ? total / at_rest - 1.0 : (total - at_rest) / (at_full - at_rest);
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    ml[lung] = line(rest[lung], full[lung], t);
+  }
+}
+
+/* Find the reference volumes F of lungs whose scan held `volume`, from the t of resting.h at which
+ * the scan is as far from rest, or from full, as its state says. */
+static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
+  const supine_state *state = &found->scan.state;
+  const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
+  const double full = supine_reference_full_share(state->gravity);
+  double low = -1.0;
+  double high = 1.0;
+  double t = from_rest ? 0.0 : 1.0;
+  for (int halving = 0; halving < 60; ++halving) {
+    double beyond = 0.0; /* mL of the scan beyond rest, or full, if this were t */
+    for (size_t lung = 0; lung < found->lung_count; ++lung) {
+      const double rest =
+          supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);
+      found->full_volume[lung] = volume[lung] / line(rest, full, t);
+      beyond += volume[lung] - found->full_volume[lung] * (from_rest ? rest : full);
     }
-    *(supine_mesh_turned_over(scan, between) > folded_share ? &folded : &whole) = part;
+    if (state->volume.ml == 0.0) {
+      break;
+    }
+    *(beyond < state->volume.ml ? &low : &high) = t;
+    t = 0.5 * (low + high);
   }
-  free(between);
-  return supine_error_set(
-      error, SUPINE_ERROR_NUMERICAL,
-      "the scan folds on its way up to full inflation: %.3g %% of its triangles "
-      "turn over, the first %g %% some %.0f of the %.0f mL above the scan. Is "
-      "it fuller than was said? Give its state, or take it as it is",
-      100.0 * share, 100.0 * folded_share, folded * gain, gain);
-}
-
-/* One step of the fixed point: the field of the full surface so far, laid on the scan. Eight
- * parameters: what is known of the scan, and what the step changes. */
-static supine_status step(supine_lungs *lungs, const supine_lungs *scan, const supine_model *model,
-                          const double g[3], double gain, double *scale, double *change,
-                          supine_error *error) {
-  supine_solution field = {0};
-  supine_volume_forms forms = {0};
-  const double one = 1.0;
-  double cubic[3];
-  *change = 0.0;
-  supine_status status = supine_physics_solve(lungs, model, g, &field, error);
-  if (status == SUPINE_OK) {
-    status = supine_physics_volume_forms_create(scan, NULL, field.directions, field.catch_, 1,
-                                                &forms, error);
+  double held = 0.0;
+  double whole = 0.0;
+  for (size_t lung = 0; lung < found->lung_count; ++lung) {
+    held += volume[lung];
+    whole += found->full_volume[lung];
+    found->scan_volume[lung] = volume[lung] - found->full_volume[lung];
   }
-  if (status == SUPINE_OK) {
-    supine_physics_volume_forms_contract(&forms, &one, cubic);
-    status = supine_volume_scale(cubic, gain, scale, error);
+  const bool beyond_full = state->volume.ml > 0.0 && high == 1.0;
+  if (beyond_full || held < tissue_share * whole) {
+    char text[160];
+    (void)supine_state_print(state, text, sizeof text);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a scan of %.0f mL cannot be '%s': %s. Change --scanned", held, text,
+                            beyond_full ? "that is beyond full inflation"
+                                        : "that leaves less than the tissue alone, 10 % of full");
   }
-  for (size_t i = 0; status == SUPINE_OK && i < 3 * lungs->mesh.vertex_count; ++i) {
-    const double full = scan->mesh.vertices[i] + *scale * field.catch_[i / 3] * field.directions[i];
-    *change = fmax(*change, fabs(full - lungs->mesh.vertices[i]));
-    lungs->mesh.vertices[i] = full;
-  }
-  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
-  supine_physics_volume_forms_free(&forms);
-  supine_physics_solution_free(&field);
-  return status;
-}
-
-/* Takes the lungs up by `gain` mL; `found` gets its steps and how far they went. */
-static supine_status inflate(supine_lungs *lungs, const supine_model *model, const double g[3],
-                             double gain, supine_reference *found, supine_error *error) {
-  const size_t count = 3 * lungs->mesh.vertex_count;
-  supine_model healthy = *model; /* shares are taken after the field was found */
-  healthy.share[0] = healthy.share[1] = 1.0;
-  supine_lungs scan = *lungs;
-  double change = INFINITY;
-  supine_status status = SUPINE_OK;
-  scan.mesh.vertices = malloc(count * sizeof(double));
-  if (scan.mesh.vertices == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", count / 3);
-  }
-  memcpy(scan.mesh.vertices, lungs->mesh.vertices, count * sizeof(double));
-  while (status == SUPINE_OK && change > settled && found->steps < STEPS_MAX) {
-    double scale = 0.0;
-    status = step(lungs, &scan, &healthy, g, gain, &scale, &change, error);
-    found->scan_scale = -scale;
-    ++found->steps;
-  }
-  if (status == SUPINE_OK) {
-    status = check_folds(lungs, &scan.mesh, gain, error);
-  }
-  if (status == SUPINE_OK && change > settled) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "no full surface %.0f mL above the scan: after %d steps it still "
-                              "moves by %.3g mm. Is the scan fuller than was said?",
-                              gain, STEPS_MAX, change);
-  }
-  for (size_t i = 0; i < count; i += 3) {
-    const double *p = lungs->mesh.vertices + i;
-    const double *q = scan.mesh.vertices + i;
-    found->moved = fmax(found->moved, supine_distance(p, q));
-  }
-  free(scan.mesh.vertices);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error) {
-  supine_reference found = {.scan = *scan, .resting = *resting};
+  supine_reference found = {.scan = *scan,
+                            .resting = *resting,
+                            .lung_count = lungs->lung_count,
+                            .side = {lungs->side[0], lungs->side[1]}};
   *reference = found;
-  if (!lungs->topology.closed && scan->kind > SUPINE_SCAN_FULL) {
+  const supine_volume *volume = &scan->state.volume;
+  const bool full = volume->kind == SUPINE_VOLUME_FULL && volume->ml == 0.0;
+  if (!lungs->topology.closed && scan->known && !full) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "an open surface has no volume to take up to full inflation: close it, "
                             "or say that it is full");
   }
-  if (!lungs->topology.closed || scan->kind == SUPINE_SCAN_NONE) {
+  if (!lungs->topology.closed || !scan->known) {
     return SUPINE_OK;
   }
-  const double volume = 1e-3 * supine_mesh_volume(&lungs->mesh);
-  found.known = true;
-  found.full_volume = volume;
-  if (scan->kind == SUPINE_SCAN_REST) {
-    found.full_volume = volume / supine_reference_along_axes(resting->share, scan->gravity);
-  } else if (scan->kind == SUPINE_SCAN_VOLUME) {
-    found.full_volume = volume - scan->volume;
+  double held[2] = {0.0, 0.0};
+  bool apart = false;
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(lungs, lung);
+    held[lung] = 1e-3 * supine_mesh_volume(&part);
   }
-  if (!(found.full_volume >= volume) || volume < tissue_share * found.full_volume) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a scan of %.0f mL cannot be %+.0f mL from full: full is no less, and "
-                            "tissue alone is %g %% of it",
-                            volume, volume - found.full_volume, 100.0 * tissue_share);
+  supine_status status = find_full(&found, held, error);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    apart = apart || found.scan_volume[lung] != 0.0;
   }
-  found.scan_volume = volume - found.full_volume;
-  supine_status status = SUPINE_OK;
-  if (found.scan_volume < 0.0) {
-    status = inflate(lungs, model, scan->gravity, -found.scan_volume, &found, error);
+  if (status == SUPINE_OK && apart) {
+    status = supine_reference_inflate(lungs, model, &found, error);
   }
   if (status == SUPINE_OK) {
+    status = supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
+                                             found.full_volume, error);
+  }
+  found.known = status == SUPINE_OK;
+  if (found.known) {
     *reference = found;
   }
   return status;

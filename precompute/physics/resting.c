@@ -1,51 +1,105 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The resting volume as a function of gravity. */
+/* Volumes at rest and full as functions of gravity. */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include <supine/posture.h>
 
-#include "precompute/physics/reference.h"
+#include "precompute/physics/resting.h"
 #include "sh/base/csv.h"
 
-/* Where the shares come from, tissue included (gas + tissue over full gas + tissue):
+/* Where the shares come from, tissue included (gas + tissue over full gas + tissue, supine). Totals
+ * first, then the left and the right lung:
  *
- *   upright  functional residual capacity 3.39 L of 7.21 L (GLI 2021, Hall et al., Eur Respir J 57:
- *            2000289, man of 45 years and 1.78 m) and 0.86 L of tissue (Denison 1986, Thorax
- *            41:620, n 12): 0.53
- *   supine   0.806 L (SD 0.293) below that (Lumb & Nimmo 1991, Anesth Analg 73:422, n 13): 0.43.
- *            With a third less tissue (rebreathing, 0.54 L) and of the supine full volume, 8 % less
- *            (Elliott 1994, J Appl Physiol 77:2005, n 4): 0.435; Elliott's own -32 %: 0.42
+ *   supine   functional residual capacity 3.39 L of 7.21 L upright (GLI 2021, Hall et al., Eur
+ *            Respir J 57: 2000289, man of 45 years and 1.78 m), 0.86 L of tissue (Denison 1986,
+ *            Thorax 41:620, n 12), less 0.806 L (SD 0.293; Lumb & Nimmo 1991, Anesth Analg 73:422,
+ *            n 13): 0.43
  *   prone, on either side  0.35 L above supine (Lumb & Nimmo; not told apart): 0.47
+ *   upright  15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
  *   head down  no volume in litres was found; end-expiratory volume follows the sine of a tilt feet
  *            down and is at or near its least when horizontal ("Effects of body tilting on
- *            respiratory mechanics", J Appl Physiol 1956): as supine, 0.43 */
-supine_resting supine_reference_resting_default(void) {
-  return (supine_resting){{0.47, 0.47, 0.43, 0.47, 0.43, 0.53}};
-}
+ *            respiratory mechanics", J Appl Physiol 1956): as supine
+ *
+ * The lungs' proportions are those tabled after Svanberg 1957. The left lung's 0.563 on the right
+ * side follows from the lower lung's part of a breath there; no other check of it was found. */
+static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
+                                               {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
 static const double least_share = 0.1; /* tissue alone */
 static const double most_share = 1.0;
 
+/* What the left lung has of both lungs' full volume; only to share out what is told of both. */
+static const double left_part = 0.45;
+
+supine_resting supine_reference_resting_default(void) {
+  return usual;
+}
+
+static bool is_share(double share) {
+  return share > least_share && share <= most_share;
+}
+
+/* Read "0.43", "0.42/0.44" or "2600mL" for the axis. */
+static bool read_value(supine_resting *resting, size_t axis, const char *text) {
+  char *end = NULL;
+  const double first = strtod(text, &end);
+  double share[2] = {first, first};
+  if (end == text) {
+    return false;
+  }
+  if (strcmp(end, "mL") == 0) {
+    resting->ml[axis] = first;
+    return first > 0.0 && isfinite(first);
+  }
+  if (*end == '/') {
+    const char *second = end + 1;
+    share[1] = strtod(second, &end);
+    if (end == second) {
+      return false;
+    }
+  } else {
+    const double both = left_part * usual.share[0][axis] + (1.0 - left_part) * usual.share[1][axis];
+    share[0] *= usual.share[0][axis] / both;
+    share[1] *= usual.share[1][axis] / both;
+  }
+  resting->share[0][axis] = share[0];
+  resting->share[1][axis] = share[1];
+  resting->ml[axis] = 0.0;
+  return *end == '\0' && is_share(first) && is_share(share[0]) && is_share(share[1]);
+}
+
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
-                                           double share, supine_error *error) {
+                                           const char *value, supine_error *error) {
   double g[3];
+  supine_resting set = *resting;
   if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "no posture '%s' to rest in; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
-  if (!(share > least_share && share <= most_share)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s at rest: a share of the full volume lies above %g and at most "
-                            "at %g, not %g",
-                            posture, least_share, most_share, share);
-  }
-  for (size_t k = 0; k < 3; ++k) {
-    if (g[k] != 0.0) { /* named postures lie along the axes */
-      resting->share[2 * k + (g[k] < 0.0)] = share;
+  for (size_t k = 0; k < 3; ++k) { /* named postures lie along the axes */
+    if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s at rest: '%s' is neither a share of the full volume above %g and "
+                              "at most %g (0.43; left and right lung 0.42/0.44) nor a volume as CT "
+                              "shows it (2600mL)",
+                              posture, value, least_share, most_share);
     }
   }
+  *resting = set;
   return SUPINE_OK;
+}
+
+void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
+  static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
+  size_t used = 0;
+  for (size_t axis = 0; axis < 6 && used < size; ++axis) {
+    used += (size_t)snprintf(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
+                             names[axis], resting->share[0][axis], resting->share[1][axis]);
+  }
 }
 
 supine_status supine_reference_resting_load(const char *path, supine_resting *resting,
@@ -56,18 +110,64 @@ supine_status supine_reference_resting_load(const char *path, supine_resting *re
   supine_status status = supine_csv_open(path, columns, 2, 2, &csv, error);
   while (status == SUPINE_OK && (status = supine_csv_next(&csv, &more, error)) == SUPINE_OK &&
          more) {
-    double share = 0.0;
     supine_error inner = {0};
-    status = supine_csv_number(&csv, 1, "share", &share, error);
-    if (status == SUPINE_OK) {
-      status = supine_reference_resting_set(resting, supine_csv_text(&csv, 0), share, &inner);
-      if (status != SUPINE_OK) {
-        (void)supine_error_set(error, status, "%s: line %zu: %s", path, csv.line, inner.message);
-      }
+    status = supine_reference_resting_set(resting, supine_csv_text(&csv, 0),
+                                          supine_csv_text(&csv, 1), &inner);
+    if (status != SUPINE_OK) {
+      (void)supine_error_set(error, status, "%s: line %zu: %s", path, csv.line, inner.message);
     }
   }
   supine_csv_close(&csv);
   return status;
+}
+
+supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
+                                              const int *side, const double *full,
+                                              supine_error *error) {
+  double sum = 0.0;
+  size_t told = 0;
+  double factor[6];
+  for (size_t axis = 0; axis < 6; ++axis) {
+    double rest = 0.0;
+    for (size_t lung = 0; lung < count; ++lung) {
+      rest += full[lung] * resting->share[side[lung] < 0][axis];
+    }
+    factor[axis] = resting->ml[axis] / rest;
+    sum += factor[axis];
+    told += resting->ml[axis] > 0.0;
+  }
+  for (size_t axis = 0; axis < 6 && told > 0; ++axis) {
+    for (size_t k = 0; k < 2; ++k) {
+      double *share = &resting->share[k][axis];
+      if (resting->ml[axis] > 0.0) {
+        *share *= factor[axis];
+      } else if (*share == usual.share[k][axis]) {
+        *share = fmin(*share * sum / (double)told, most_share);
+      }
+    }
+    if (!is_share(resting->share[0][axis]) || !is_share(resting->share[1][axis])) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "lungs whose full volume is %.0f mL do not hold %.0f mL at rest: "
+                              "change --resting, or what --scanned says of the scan",
+                              full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis]);
+    }
+    resting->ml[axis] = 0.0;
+  }
+  return SUPINE_OK;
+}
+
+double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]) {
+  return supine_reference_along_axes(resting->share[side < 0], g);
+}
+
+double supine_reference_resting_total(const supine_resting *resting, const double g[3]) {
+  return left_part * supine_reference_along_axes(resting->share[0], g) +
+         (1.0 - left_part) * supine_reference_along_axes(resting->share[1], g);
+}
+
+double supine_reference_full_share(const double g[3]) {
+  const double up = fmax(0.0, -g[2]);
+  return 1.0 + SUPINE_FULL_UPRIGHT_GAIN * up * up;
 }
 
 double supine_reference_along_axes(const double values[6], const double g[3]) {

@@ -19,6 +19,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    const double g[3], supine_solution *solution,
                                    supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
+  static const double one = 1.0;
   supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   supine_volume_forms forms = {0};
@@ -40,11 +41,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     goto cleanup;
   }
   status = supine_physics_directions(lungs, &model->direction, made.directions, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
-  if (status != SUPINE_OK) {
+  if (status != SUPINE_OK || (status = supine_physics_equilibrium_set_stiffness(
+                                  equilibrium, model->stiffness, error)) != SUPINE_OK) {
     goto cleanup;
   }
   const supine_gravities gravity = {1, g, range, range + 1};
@@ -55,11 +53,13 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     goto cleanup;
   }
   if (made.has_volume) {
-    const double one = 1.0;
     status = supine_physics_volume_forms_create(lungs, model->share, made.directions, made.catch_,
                                                 1, &forms, error);
     if (status != SUPINE_OK) {
       goto cleanup;
+    }
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      supine_physics_volume_forms_contract_lung(&forms, lung, &one, made.lung_cubic[lung]);
     }
     supine_physics_volume_forms_contract(&forms, &one, made.cubic);
   }

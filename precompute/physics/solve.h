@@ -14,6 +14,7 @@ typedef struct supine_solution {
   double *directions; /**< [N, 3] d, mm */
   bool has_volume;    /**< the surface is closed, and cubic is set */
   double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
+  double lung_cubic[2][3]; /**< of each lung */
   supine_solve_report report;
 } supine_solution;
 

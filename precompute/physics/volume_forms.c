@@ -262,12 +262,22 @@ supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, 
   return SUPINE_OK;
 }
 
-void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
-                                          double cubic[3]) {
+void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
+                                               const double *weights, double cubic[3]) {
   const size_t n = forms->column_count;
   cubic[0] = cubic[1] = cubic[2] = 0.0;
+  supine_volume_add(n, forms->linear + lung * n, forms->quadratic + lung * n * n,
+                    forms->cubic + lung * n * n * n, weights, cubic);
+}
+
+void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
+                                          double cubic[3]) {
+  double part[3];
+  cubic[0] = cubic[1] = cubic[2] = 0.0;
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
-    supine_volume_add(n, forms->linear + lung * n, forms->quadratic + lung * n * n,
-                      forms->cubic + lung * n * n * n, weights, cubic);
+    supine_physics_volume_forms_contract_lung(forms, lung, weights, part);
+    for (size_t i = 0; i < 3; ++i) {
+      cubic[i] += part[i];
+    }
   }
 }

@@ -54,4 +54,8 @@ supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, 
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
+/** The same of one lung. */
+void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
+                                               const double *weights, double cubic[3]);
+
 #endif

@@ -422,7 +422,7 @@ static void print_lit(const peers *p, size_t from) {
 /* The made lungs by the default options. */
 static supine_basis *made_basis(supine_error *error) {
   const char *path = "bench_runtime.safetensors";
-  const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 23, .modes = 16, .held_out = 20};

@@ -362,7 +362,7 @@ static void postures_at_rest(void) {
                {"001", "covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS},
                {"002", "covid/covid002_left.ply", "covid/covid002_right.ply", SUPINE_AXES_RAS},
                {"005", "covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS}};
-  static const supine_scan full = {.kind = SUPINE_SCAN_FULL};
+  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
   FILE *csv = begin_csv("postures",
                         "pair,posture,move mean mm,move max mm,lower half mm,upper third mm,left %,"

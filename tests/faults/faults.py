@@ -44,7 +44,7 @@ phantom --vertices 100 -o out/a.obj
 precompute lungs.ply --band 2 -o out/a.safetensors
 precompute lungs.stl --band 2 --law paper --modes harmonics -o out/a.safetensors
 precompute lungs.obj --band 2 --law paper --reach 10 --soften 1 -o out/a.safetensors
-precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned supine:-500 -o out/a.safetensors
+precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned full-500 -o out/a.safetensors
 precompute mask.nrrd --labels left=1,right=2 --edge 20 --band 2 -o out/a.safetensors
 precompute lungs.ply --fields fields.csv -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors

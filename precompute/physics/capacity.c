@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What full lungs hold, and doubts about a scan's state. */
+#include <math.h>
+#include <stdio.h>
+
+#include "precompute/physics/capacity.h"
+#include "sh/base/text.h"
+
+static const double tissue = 860.0; /* mL */
+
+/* Below this share of what they should hold, or below this volume, lungs are not likely full; above
+ * that, no adult's. */
+static const double least_share = 0.75;
+static const double least_ml = 3500.0;
+static const double most_ml = 10000.0;
+
+static const double left_part = 0.45; /* of both lungs */
+
+/* Volumes of rest that differ by more than this share contradict each other. */
+static const double contradicts = 0.05;
+
+void supine_reference_capacity(const supine_person *person, double range[2]) {
+  static const struct {
+    double slope, offset;                                                 /* L per m, L */
+    double usual[2];                                                      /* heights, cm */
+  } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* women, men */
+  range[0] = INFINITY;
+  range[1] = 0.0;
+  for (int sex = 0; sex < 2; ++sex) {
+    if (person->sex != SUPINE_SEX_UNKNOWN && (int)person->sex != sex + 1) {
+      continue;
+    }
+    for (int end = 0; end < 2; ++end) {
+      const double height = person->height > 0.0 ? person->height : of[sex].usual[end];
+      const double upright = 1e3 * (of[sex].slope * 1e-2 * height - of[sex].offset);
+      const double full = upright / (1.0 + SUPINE_FULL_UPRIGHT_GAIN) + tissue;
+      range[0] = fmin(range[0], full);
+      range[1] = fmax(range[1], full);
+    }
+  }
+}
+
+/* What the lungs of a reference have of a pair's volume. */
+static double part_of_pair(const supine_reference *reference) {
+  return reference->lung_count == 2 ? 1.0 : reference->side[0] > 0 ? left_part : 1.0 - left_part;
+}
+
+void supine_reference_compare(const supine_reference *reference, const supine_person *person,
+                              char *text, size_t size) {
+  const double part = part_of_pair(reference);
+  double range[2];
+  supine_reference_capacity(person, range);
+  const bool known = person->height > 0.0 && person->sex != SUPINE_SEX_UNKNOWN;
+  supine_text_add(text, size, known ? "expected %.0f" : "an adult's %.0f to %.0f", part * range[0],
+                  part * range[1]);
+}
+
+void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
+                            const supine_resting *told, char *text, size_t size) {
+  const supine_state *state = &reference->scan.state;
+  const double part = part_of_pair(reference);
+  double range[2];
+  double full = 0.0;
+  double held = 0.0;
+  char expected[64] = "";
+  text[0] = '\0';
+  supine_reference_capacity(person, range);
+  supine_reference_compare(reference, person, expected, sizeof expected);
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    full += reference->full_volume[lung];
+    held += reference->full_volume[lung] + reference->scan_volume[lung];
+  }
+  for (size_t axis = 0; axis < 6 && state->volume.kind == SUPINE_VOLUME_REST; ++axis) {
+    const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
+    const double ml = told->ml[axis] + state->volume.ml;
+    if (along > 1.0 - 1e-9 && told->ml[axis] > 0.0 && fabs(held - ml) > contradicts * ml) {
+      supine_text_add(text, size,
+                      "the scan holds %.0f mL, where --resting and --scanned say %.0f mL: change "
+                      "one of them",
+                      held, ml);
+    }
+  }
+  const char *also = text[0] == '\0' ? "" : "; ";
+  if (full < part * fmax(least_share * range[0], least_ml)) {
+    supine_text_add(
+        text, size,
+        "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was not at full "
+        "inflation, say what it shows, as --scanned supine:rest or full-1000",
+        also, full, expected);
+  } else if (full > part * most_ml) {
+    supine_text_add(
+        text, size,
+        "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was fuller than "
+        "rest, say so, as --scanned full or supine:rest+1000, or change --resting",
+        also, full, expected);
+  }
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * What the lungs of a person hold at full inflation, and whether a scan can be what it is said to
+ * be. Total lung capacity of adults by height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
+ * 16, 1993): men 7.99 H - 7.08 L, women 6.60 H - 5.79 L, standard deviation 0.7 and 0.6 L; measured
+ * upright, so less SUPINE_FULL_UPRIGHT_GAIN; and 0.86 L of tissue (Denison 1986, Thorax 41:620). */
+#ifndef SUPINE_CAPACITY_H
+#define SUPINE_CAPACITY_H
+
+#include "precompute/physics/reference.h"
+
+typedef enum supine_sex { SUPINE_SEX_UNKNOWN = 0, SUPINE_SEX_FEMALE, SUPINE_SEX_MALE } supine_sex;
+
+/** What is known of a person. */
+typedef struct supine_person {
+  double height; /**< cm; 0: unknown */
+  supine_sex sex;
+} supine_person;
+
+/** Find what both lungs hold at full inflation, supine, gas and tissue, mL: from the smallest to
+ * the largest usual adult of whom no more is known, or twice the same. */
+void supine_reference_capacity(const supine_person *person, double range[2]);
+
+/** Add what lungs like these should hold when full, in words: "expected 6500", "an adult's 4573 to
+ * 8525". */
+void supine_reference_compare(const supine_reference *reference, const supine_person *person,
+                              char *text, size_t size);
+
+/** Compare the reference with the person, and the scan with what was said of rest.
+ * @param text  the doubt, in words; empty where there is none */
+void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
+                            const supine_resting *told, char *text, size_t size);
+
+#endif

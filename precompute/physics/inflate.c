@@ -1,0 +1,231 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* From a scan up to full inflation: Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of
+ * p -> scan - s F(g; p) d(p). Of the last steps' residuals r that combination is taken which leaves
+ * least, and the same combination of their images is where the next step begins. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_linalg.h>
+
+#include "sh/base/vec3.h"
+#include <supine/volume.h>
+
+#include "precompute/physics/inflate.h"
+#include "precompute/physics/solve.h"
+#include "precompute/physics/volume_forms.h"
+
+enum { SOLVES_MAX = 30, DEPTH = 4 };
+
+/* Steps end where the residual's RMS is as small, mm, or no longer halves below the larger bound:
+ * where a triangle all but closes on the way up, a few vertices about it go on trembling by some
+ * 0.03 mm. */
+static const double settled = 5e-4;
+static const double trembling = 5e-3;
+static const double folded_share = 0.01; /* of the triangles: the surface is no lung's any more */
+static const double ridge = 1e-12;       /* relative, so that equal residuals do no harm */
+
+typedef struct ascent {
+  supine_lungs lungs; /* as far as they are, with vertices of the caller's */
+  supine_lungs scan;
+  supine_model model;
+  supine_reference *found;
+  size_t size;           /* 3 N */
+  double *image;         /* [size] of the lungs' vertices */
+  double *last;          /* [size] the image before */
+  double *residual;      /* [size] the residual before */
+  double rms;            /* of the residual, mm */
+  double *images;        /* [DEPTH, size] differences of images */
+  double *residuals;     /* [DEPTH, size] of residuals */
+  size_t begun, history; /* differences ever kept; in use */
+} ascent;
+
+/* Refuse a way up on which the surface folds, with the volume at which it does. */
+static supine_status check_folds(const ascent *a, double gain, supine_error *error) {
+  const double *from = a->scan.mesh.vertices;
+  const double *to = a->lungs.mesh.vertices;
+  const double share = supine_mesh_turned_over(&a->scan.mesh, to);
+  double whole = 0.0;
+  double folded = 1.0;
+  while (share > folded_share && folded - whole > 1e-3) {
+    const double part = 0.5 * (whole + folded);
+    for (size_t i = 0; i < a->size; ++i) {
+      a->image[i] = from[i] + part * (to[i] - from[i]);
+    }
+    *(supine_mesh_turned_over(&a->scan.mesh, a->image) > folded_share ? &folded : &whole) = part;
+  }
+  return share <= folded_share
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the scan folds on its way up to full inflation: %.3g %% of its "
+                                "triangles turn over, the first %g %% some %.0f of the %.0f mL "
+                                "above the scan. If it is fuller than --scanned says, change that "
+                                "or --resting; --scanned none takes it as it is",
+                                100.0 * share, 100.0 * folded_share, folded * gain, gain);
+}
+
+/* The field of the lungs so far, laid on the scan, each lung with the scale at which it holds its
+ * reference volume. */
+static supine_status find_image(ascent *a, supine_error *error) {
+  supine_solution field = {0};
+  supine_volume_forms forms = {0};
+  a->rms = 0.0;
+  ++a->found->solves;
+  supine_mesh_box(&a->lungs.mesh, a->lungs.minimum, a->lungs.maximum);
+  supine_status status =
+      supine_physics_solve(&a->lungs, &a->model, a->found->scan.state.gravity, &field, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_volume_forms_create(&a->scan, NULL, field.directions, field.catch_, 1,
+                                                &forms, error);
+  }
+  for (size_t lung = 0; lung < a->scan.lung_count && status == SUPINE_OK; ++lung) {
+    const double one = 1.0;
+    double cubic[3];
+    double scale = 0.0;
+    supine_physics_volume_forms_contract_lung(&forms, lung, &one, cubic);
+    status = supine_volume_scale(cubic, -a->found->scan_volume[lung], &scale, error);
+    a->found->scan_scale[lung] = -scale;
+    for (size_t i = 3 * a->scan.lung_begin[lung];
+         status == SUPINE_OK && i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
+      a->image[i] = a->scan.mesh.vertices[i] + scale * field.catch_[i / 3] * field.directions[i];
+      const double residual = a->image[i] - a->lungs.mesh.vertices[i];
+      a->rms += residual * residual;
+    }
+  }
+  a->rms = sqrt(a->rms / (double)(a->size / 3));
+  supine_physics_volume_forms_free(&forms);
+  supine_physics_solution_free(&field);
+  return status;
+}
+
+static double product(const double *a, const double *b, size_t size) {
+  double sum = 0.0;
+  for (size_t i = 0; i < size; ++i) {
+    sum += a[i] * b[i];
+  }
+  return sum;
+}
+
+/* Keep the step's differences to the one before. */
+static void remember(ascent *a) {
+  double *images = a->images + a->begun % DEPTH * a->size;
+  double *residuals = a->residuals + a->begun % DEPTH * a->size;
+  const bool first = a->found->solves == 1;
+  for (size_t i = 0; i < a->size; ++i) {
+    const double residual = a->image[i] - a->lungs.mesh.vertices[i];
+    images[i] = a->image[i] - a->last[i];
+    residuals[i] = residual - a->residual[i];
+    a->last[i] = a->image[i];
+    a->residual[i] = residual;
+  }
+  if (!first) {
+    ++a->begun;
+    a->history = a->history < DEPTH ? a->history + 1 : DEPTH;
+  }
+}
+
+/* Put the lungs where the next step begins. */
+static supine_status advance(ascent *a, supine_error *error) {
+  double matrix[DEPTH * DEPTH];
+  double weights[DEPTH] = {0.0};
+  const size_t n = a->history;
+  for (size_t j = 0; j < n; ++j) {
+    const double *r = a->residuals + j * a->size;
+    weights[j] = product(r, a->residual, a->size);
+    for (size_t k = 0; k <= j; ++k) {
+      matrix[j * n + k] = matrix[k * n + j] = product(r, a->residuals + k * a->size, a->size);
+    }
+    matrix[j * n + j] *= 1.0 + ridge;
+  }
+  if (n > 0) {
+    gsl_matrix_view system = gsl_matrix_view_array(matrix, n, n);
+    gsl_vector_view right = gsl_vector_view_array(weights, n);
+    if (gsl_linalg_HH_svx(&system.matrix, &right.vector) != 0) {
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "equal steps on the way up");
+    }
+  }
+  double *to = a->lungs.mesh.vertices;
+  memcpy(to, a->image, a->size * sizeof *to);
+  for (size_t j = 0; j < n; ++j) {
+    const double *image = a->images + j * a->size;
+    for (size_t i = 0; i < a->size; ++i) {
+      to[i] -= weights[j] * image[i];
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status iterate(ascent *a, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  while (status == SUPINE_OK && a->found->solves < SOLVES_MAX) {
+    const double before = a->rms;
+    status = find_image(a, error);
+    if (status == SUPINE_OK &&
+        (a->rms <= settled || (a->rms <= trembling && a->rms > 0.5 * before))) {
+      memcpy(a->lungs.mesh.vertices, a->image, a->size * sizeof(double));
+      return SUPINE_OK;
+    }
+    if (status == SUPINE_OK) {
+      remember(a);
+      status = advance(a, error);
+    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) { /* too bold a step */
+      a->history = 0;
+      a->begun = 0;
+      memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));
+      status = SUPINE_OK;
+    }
+  }
+  return status == SUPINE_OK
+             ? supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "no full surface was found: after %d steps it still moves by %.3g "
+                                "mm RMS. If the scan is fuller than --scanned says, change that or "
+                                "--resting; --scanned none takes it as it is",
+                                SOLVES_MAX, a->rms)
+             : status;
+}
+
+supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
+                                       supine_reference *found, supine_error *error) {
+  ascent a = {.lungs = *lungs,
+              .scan = *lungs,
+              .model = *model,
+              .found = found,
+              .size = 3 * lungs->mesh.vertex_count};
+  const size_t bytes = a.size * sizeof(double);
+  supine_status status = SUPINE_OK;
+  a.model.share[0] = a.model.share[1] = 1.0; /* taken after the field was found */
+  a.scan.mesh.vertices = malloc(bytes);
+  a.image = malloc(bytes);
+  a.last = calloc(a.size, sizeof *a.last);
+  a.residual = calloc(a.size, sizeof *a.residual);
+  a.images = malloc(DEPTH * bytes);
+  a.residuals = malloc(DEPTH * bytes);
+  if (a.scan.mesh.vertices == NULL || a.image == NULL || a.last == NULL || a.residual == NULL ||
+      a.images == NULL || a.residuals == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", a.size / 3);
+    goto cleanup;
+  }
+  memcpy(a.scan.mesh.vertices, lungs->mesh.vertices, bytes);
+  status = iterate(&a, error);
+  if (status == SUPINE_OK) {
+    status = check_folds(&a, -found->scan_volume[0] - found->scan_volume[1], error);
+  }
+  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+  for (size_t i = 0; i < a.size; i += 3) {
+    found->moved =
+        fmax(found->moved, supine_distance(lungs->mesh.vertices + i, a.scan.mesh.vertices + i));
+  }
+  if (status == SUPINE_OK) {
+    free(lungs->scanned);
+    lungs->scanned = a.scan.mesh.vertices;
+    a.scan.mesh.vertices = NULL;
+  }
+cleanup:
+  free(a.scan.mesh.vertices);
+  free(a.image);
+  free(a.last);
+  free(a.residual);
+  free(a.images);
+  free(a.residuals);
+  return status;
+}

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Law, tissue, directions, scan state: the steps from lungs to a model. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/text.h"
+#include "sh/base/vec3.h"
+
+#include "precompute/prepare.h"
+
+supine_model_choice supine_precompute_choice_default(void) {
+  supine_model_choice choice = {.law = SUPINE_LAW_COUNT,
+                                .model = supine_physics_model(SUPINE_LAW_PAPER),
+                                .resting = supine_reference_resting_default()};
+  choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
+  choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
+  return choice;
+}
+
+/* Select the law; explicit constants override its own. */
+static supine_model choose_law(const supine_model_choice *choice) {
+  const bool none = choice->has_scan && !choice->scan.known;
+  const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
+                                                    ? (supine_law)choice->law
+                                                    : (none ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP));
+  supine_model model = choice->model;
+  if (choice->own != NULL) {
+    return model;
+  }
+  model.law = law.law;
+  model.force.pair = law.force.pair;
+  model.reach = isnan(model.reach) ? law.reach : model.reach;
+  model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
+  model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
+  if (isnan(model.force.box[0])) {
+    memcpy(model.force.box, law.force.box, sizeof law.force.box);
+  }
+  if (isnan(model.direction.c[0])) {
+    memcpy(model.direction.c, law.direction.c, sizeof law.direction.c);
+  }
+  return model;
+}
+
+static double *allocate(size_t count, supine_status *status, supine_error *error) {
+  double *values = malloc(count * sizeof *values);
+  if (values == NULL) {
+    *status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu numbers", count);
+  }
+  return values;
+}
+
+static supine_status set_expandability(const supine_lungs *lungs, const supine_model_choice *choice,
+                                       supine_prepared *p, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  supine_status status = SUPINE_OK;
+  const bool told = choice->expandability != NULL ||
+                    choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
+  if (choice->stiffness != NULL && told) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the patient's law brings its own stiffness: leave --expandability "
+                            "out");
+  }
+  if (choice->stiffness == NULL && !told) {
+    return SUPINE_OK;
+  }
+  double *a = p->stiffness = allocate(n, &status, error);
+  p->model.stiffness = a;
+  if (a != NULL) {
+    status =
+        choice->expandability != NULL
+            ? supine_tissue_expandability_load(choice->expandability, n, a, error)
+            : supine_tissue_expandability_regional(lungs, &choice->expandability_law, a, error);
+  }
+  return status == SUPINE_OK ? supine_tissue_expandability_stiffness(n, a, a, error) : status;
+}
+
+static supine_status set_directions(const supine_lungs *lungs, const supine_model_choice *choice,
+                                    supine_prepared *p, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  if (choice->directions == NULL) {
+    return SUPINE_OK;
+  }
+  p->vectors = allocate(3 * lungs->mesh.vertex_count, &status, error);
+  p->model.direction.vectors = p->vectors;
+  return status == SUPINE_OK ? supine_physics_directions_load(
+                                   choice->directions, lungs->mesh.vertex_count, p->vectors, error)
+                             : status;
+}
+
+/* Say why a lesion changes nothing: stiffness belongs to vertices, and it reaches none. */
+static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
+                           supine_findings *findings) {
+  const double *c = lesion->centre;
+  double nearest = INFINITY;
+  for (size_t i = 0; i < 3 * lungs->mesh.vertex_count; i += 3) {
+    nearest = fmin(nearest, supine_distance(lungs->mesh.vertices + i, c));
+  }
+  supine_findings_add(findings,
+                      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the "
+                      "surface: with a radius of %g mm it changes nothing",
+                      c[0], c[1], c[2], nearest, lesion->radius);
+}
+
+static supine_status set_lesions(const supine_lungs *lungs, const supine_model_choice *choice,
+                                 supine_prepared *p, supine_findings *findings,
+                                 supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  supine_status status = SUPINE_OK;
+  if (choice->lesion_count == 0) {
+    return SUPINE_OK;
+  }
+  p->lesions = allocate(n, &status, error);
+  p->model.lesions = p->lesions;
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    p->lesions[i] = 1.0;
+  }
+  for (size_t l = 0; l < choice->lesion_count && status == SUPINE_OK; ++l) {
+    size_t reached = 0;
+    status = supine_tissue_add_lesion(lungs, &choice->lesions[l], p->lesions, &reached, error);
+    if (status == SUPINE_OK && reached == 0) {
+      warn_of_lesion(lungs, &choice->lesions[l], findings);
+    }
+  }
+  return status;
+}
+
+static supine_status set_shares(const supine_lungs *lungs, const supine_model_choice *choice,
+                                supine_prepared *p, supine_error *error) {
+  static const char *const names[] = {"left", "right"};
+  supine_status status = SUPINE_OK;
+  for (size_t side = 0; side < 2 && status == SUPINE_OK; ++side) {
+    size_t lung = 0;
+    while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
+      ++lung;
+    }
+    if (choice->share[side] > 0.0) {
+      status =
+          lung == lungs->lung_count
+              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                 "--lung %s: the model has no %s lung", names[side], names[side])
+              : supine_tissue_collapse(lungs, lung, choice->share[side], p->model.share, error);
+    }
+  }
+  return status;
+}
+
+/* Say what was assumed, so that the user can check it. */
+static void summarize(const supine_model_choice *choice, supine_prepared *p) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_resting usual = supine_reference_resting_default();
+  const supine_reference *reference = &p->reference;
+  const size_t size = sizeof p->summary;
+  char state[160];
+  double ml[2];
+  supine_text_add(p->summary, size, "%s law; scan ",
+                  choice->own != NULL ? choice->own : supine_physics_law_names[p->model.law]);
+  if (!reference->known) {
+    supine_text_add(p->summary, size, "taken as the reference of every posture");
+    return;
+  }
+  (void)supine_state_describe(&reference->scan.state, state, sizeof state);
+  const double full = reference->full_volume[0] + reference->full_volume[1];
+  const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
+  if (held != full) {
+    supine_text_add(p->summary, size, "%s, %.0f mL; ", state, held);
+  }
+  supine_text_add(p->summary, size, "%sfull inflation %.0f mL (", held != full ? "" : "at ", full);
+  supine_reference_compare(reference, &choice->person, p->summary, size);
+  supine_text_add(p->summary, size, "); rest supine %.0f mL (%s)",
+                  supine_reference_rest(reference, supine, ml),
+                  memcmp(&usual, &choice->resting, sizeof usual) == 0
+                      ? "healthy people's share; --resting changes it"
+                      : "by --resting");
+}
+
+supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
+                                        supine_prepared *prepared, supine_findings *findings,
+                                        supine_error *error) {
+  supine_prepared *p = prepared;
+  supine_scan scan = choice->scan;
+  char doubt[512];
+  p->model = choose_law(choice);
+  if (!choice->has_scan && p->model.law != SUPINE_LAW_PAPER) {
+    (void)supine_reference_scan_parse("full", &scan, NULL);
+  }
+  if (p->model.law == SUPINE_LAW_PAPER && scan.known) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--law paper adds breaths to the scan as it is: leave --scanned out, "
+                            "or take --law deep");
+  }
+  supine_status status = set_expandability(lungs, choice, p, error);
+  status = status == SUPINE_OK ? set_directions(lungs, choice, p, error) : status;
+  status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
+  status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
+  status = status == SUPINE_OK ? supine_reference_find(lungs, &p->model, &scan, &choice->resting,
+                                                       &p->reference, error)
+                               : status;
+  if (status == SUPINE_OK) {
+    summarize(choice, p);
+  }
+  if (status == SUPINE_OK && p->reference.known) {
+    supine_reference_doubt(&p->reference, &choice->person, &choice->resting, doubt, sizeof doubt);
+    if (doubt[0] != '\0') {
+      supine_findings_add(findings, "warning: %s", doubt);
+    }
+  }
+  return status;
+}
+
+void supine_precompute_prepared_free(supine_prepared *prepared) {
+  free(prepared->stiffness);
+  free(prepared->lesions);
+  free(prepared->vectors);
+  *prepared = (supine_prepared){0};
+}

@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Surfaces and label maps to lungs. */
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sh/base/parallel.h"
+#include "sh/base/text.h"
+
+#include "mesh/image/image.h"
+#include "precompute/lungs/gate.h"
+#include "precompute/source.h"
+
+/* The files under way; a map holds two lungs at most. */
+typedef struct reading {
+  const supine_source_options *options;
+  char **paths;
+  size_t count; /* surfaces */
+  supine_mesh *meshes;
+  supine_mesh_report *reports;
+  supine_error *errors; /* status SUPINE_OK where loading went well */
+  supine_axes axes;     /* of the files' coordinates, or of a map's header */
+  bool has_midline;
+  double midline;
+} reading;
+
+static void load_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const reading *r = context;
+  for (size_t i = begin; i < end; ++i) {
+    r->errors[i].status = supine_mesh_load(r->paths[i], &r->options->load, &r->meshes[i],
+                                           &r->reports[i], &r->errors[i]);
+  }
+}
+
+static void find_in_mesh(const char *path, const supine_mesh_report *report,
+                         supine_findings *findings) {
+  if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
+    supine_findings_add(
+        findings, "%s: note: dropped %zu degenerate face%s and %zu unreferenced vert%s", path,
+        report->degenerate_faces, report->degenerate_faces == 1 ? "" : "s",
+        report->unreferenced_vertices, report->unreferenced_vertices == 1 ? "ex" : "ices");
+  }
+  if (report->comment_names_ras) {
+    supine_findings_add(findings,
+                        "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
+                        "the right, add --axes RAS",
+                        path);
+  }
+}
+
+static supine_status load_meshes(reading *r, supine_findings *findings, supine_error *error) {
+  supine_parallel_for(r->count, 1, r->count, load_range, r);
+  for (size_t i = 0; i < r->count; ++i) {
+    if (r->errors[i].status != SUPINE_OK) {
+      return supine_error_set(error, r->errors[i].status, "%s", r->errors[i].message);
+    }
+    find_in_mesh(r->paths[i], &r->reports[i], findings);
+  }
+  r->axes = r->reports[0].axes;
+  return SUPINE_OK;
+}
+
+static void find_in_map(const char *path, const supine_labels_report *report,
+                        supine_findings *findings) {
+  if (report->frames_differ) {
+    supine_findings_add(findings,
+                        "%s: warning: its qform and sform do not agree; the sform was taken", path);
+  }
+  for (size_t i = 0; i < report->lung_count; ++i) {
+    const supine_labels_lung *lung = &report->lung[i];
+    const char *side = lung->side > 0 ? "left" : "right";
+    if (lung->cut > 0) {
+      supine_findings_add(findings,
+                          "%s: warning: the %s lung is cut off at the image's border (%zu voxel%s)",
+                          path, side, lung->cut, lung->cut == 1 ? "" : "s");
+    }
+    if (lung->tunnels > 0) {
+      supine_findings_add(findings,
+                          "%s: note: %ld %s lead%s through the %s lung, or hollows in it to the "
+                          "outside; --close MM closes narrow ones",
+                          path, lung->tunnels, lung->tunnels == 1 ? "channel" : "channels",
+                          lung->tunnels == 1 ? "s" : "", side);
+    }
+  }
+}
+
+static bool is_folder(const char *path) {
+  struct stat about;
+  return stat(path, &about) == 0 && S_ISDIR(about.st_mode);
+}
+
+enum { LOBES = 5, LEFT_LOBES = 2 };
+
+/* The lobes of a folder of TotalSegmentator's masks. */
+typedef struct lobe_files {
+  char path[LOBES][PATH_MAX];
+  char *list[LOBES];
+  size_t count;
+  char labels[64]; /* which of them are left and right */
+} lobe_files;
+
+static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
+  static const char *const names[LOBES] = {"upper_lobe_left", "lower_lobe_left", "upper_lobe_right",
+                                           "middle_lobe_right", "lower_lobe_right"};
+  static const char *const endings[] = {".nii.gz", ".nii", ".nrrd", ".mha"};
+  const char *before = "left=";
+  found->count = 0;
+  found->labels[0] = '\0';
+  for (size_t lobe = 0; lobe < LOBES; ++lobe) {
+    before = lobe == LEFT_LOBES ? found->count > 0 ? ",right=" : "right=" : before;
+    for (size_t e = 0; e < sizeof endings / sizeof *endings; ++e) {
+      char *path = found->path[found->count];
+      const int length = snprintf(path, PATH_MAX, "%s/lung_%s%s", folder, names[lobe], endings[e]);
+      if (length < PATH_MAX && access(path, F_OK) == 0) {
+        found->list[found->count++] = path;
+        supine_text_add(found->labels, sizeof found->labels, "%s%zu", before, found->count);
+        before = "+";
+        break;
+      }
+    }
+  }
+  return found->count > 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_READ,
+                                "%s: no lung_upper_lobe_left.nii.gz or other lobe of "
+                                "TotalSegmentator in this folder; name the files themselves",
+                                folder);
+}
+
+/* A lung alone has its inner face for a midline. */
+static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
+                               supine_error *error) {
+  supine_labels_options wanted = r->options->labels;
+  const bool folder = r->count == 1 && is_folder(r->paths[0]);
+  lobe_files lobes;
+  if (folder && find_lobes(r->paths[0], &lobes, error) != SUPINE_OK) {
+    return SUPINE_ERROR_READ;
+  }
+  wanted.labels = folder && wanted.labels == NULL ? lobes.labels : wanted.labels;
+  wanted.axes = r->options->load.axes;
+  if (r->options->load.millimetres_per_unit != 0.0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--units is for surfaces: a label map's header says them");
+  }
+  const supine_status status = supine_labels_surfaces((const char *const *)r->paths, r->count,
+                                                      &wanted, r->meshes, &source->report, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  r->count = source->report.lung_count;
+  r->axes = source->report.coordinates;
+  for (size_t i = 0; i < r->count; ++i) {
+    r->reports[i] = (supine_mesh_report){.axes = SUPINE_AXES_LPS, .axes_from_tag = true};
+  }
+  if (r->count == 1 && !r->has_midline) {
+    double low[3];
+    double high[3];
+    supine_mesh_box(&r->meshes[0], low, high);
+    r->midline = source->report.lung[0].side > 0 ? low[0] : high[0];
+    r->has_midline = true;
+  }
+  find_in_map(r->paths[0], &source->report, findings);
+  return SUPINE_OK;
+}
+
+/* The frame that all files share. */
+static supine_scan_frame frame_of(const reading *r) {
+  for (size_t i = 1; i < r->count; ++i) {
+    if (r->reports[i].axes != r->reports[0].axes) {
+      return (supine_scan_frame){0};
+    }
+  }
+  const double unit = r->options->load.millimetres_per_unit;
+  return (supine_scan_frame){r->reports[0].axes, unit == 0.0 ? 1.0 : unit};
+}
+
+/* Say how the files were read, so that the user can check it. */
+static void summarize(const reading *r, supine_source *source) {
+  const supine_mesh_load_options *load = &r->options->load;
+  const supine_mesh_report *report = &r->reports[0];
+  const supine_lungs *lungs = &source->lungs;
+  const size_t size = sizeof source->summary;
+  char letters[4];
+  supine_mesh_axes_letters(report->axes, letters);
+  supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters,
+                  load->axes != SUPINE_AXES_AUTO ? "as told"
+                  : report->axes_from_tag        ? "the file's tag"
+                                                 : "assumed",
+                  load->millimetres_per_unit == 0.0 ? 1.0 : load->millimetres_per_unit);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    supine_text_add(source->summary, size, "; %s lung in", supine_lungs_name(lungs, lung));
+    for (size_t axis = 0; axis < 3; ++axis) {
+      double low = INFINITY;
+      double high = -INFINITY;
+      for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
+        low = fmin(low, lungs->mesh.vertices[3 * i + axis]);
+        high = fmax(high, lungs->mesh.vertices[3 * i + axis]);
+      }
+      supine_text_add(source->summary, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",",
+                      "xyz"[axis], low, high);
+    }
+    supine_text_add(source->summary, size, " mm");
+  }
+}
+
+/* Whether all files are maps, or none. */
+static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
+                                 bool *is_map, supine_error *error) {
+  const supine_labels_options *labels = &options->labels;
+  size_t images = 0;
+  for (size_t i = 0; i < count; ++i) {
+    images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
+  }
+  *is_map = images == count;
+  if (images > 0 && images < count) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "label maps or surfaces, not both");
+  }
+  if (images == 0 && (labels->labels != NULL || labels->edge > 0.0 || labels->close > 0.0 ||
+                      options->surfaces_out != NULL)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--labels, --edge, --close and --surfaces-out are of label maps "
+                            "(.nrrd, .nii, .nii.gz, .mha)");
+  }
+  return SUPINE_OK;
+}
+
+static supine_status join(reading *r, supine_source *source, supine_findings *findings,
+                          supine_error *error) {
+  const supine_lungs_source told = {.name = r->paths[0],
+                                    .axes = r->axes,
+                                    .axes_given = r->options->load.axes != SUPINE_AXES_AUTO,
+                                    .units_given = r->options->load.millimetres_per_unit != 0.0,
+                                    .midline = r->has_midline ? &r->midline : NULL};
+  supine_status status = supine_lungs_gate(r->meshes, r->count, &told, &source->lungs,
+                                           &source->axes_hold, findings, error);
+  if (status == SUPINE_OK && r->options->surfaces_out != NULL) {
+    status = supine_mesh_save(r->options->surfaces_out, &source->lungs.mesh, NULL, error);
+  }
+  if (status == SUPINE_OK) {
+    source->frame = frame_of(r);
+    summarize(r, source);
+  }
+  return status;
+}
+
+supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
+                                            size_t count, supine_source *source,
+                                            supine_findings *findings, supine_error *error) {
+  const size_t most = count > 2 ? count : 2;
+  reading r = {.options = options,
+               .paths = paths,
+               .count = count,
+               .has_midline = options->has_midline,
+               .midline = options->midline};
+  supine_status status = check_kinds(options, paths, count, &source->is_map, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  r.meshes = calloc(most, sizeof *r.meshes);
+  r.reports = calloc(most, sizeof *r.reports);
+  r.errors = calloc(most, sizeof *r.errors);
+  status = r.meshes == NULL || r.reports == NULL || r.errors == NULL
+               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu files", count)
+           : source->is_map ? load_maps(&r, source, findings, error)
+                            : load_meshes(&r, findings, error);
+  if (status == SUPINE_OK) {
+    status = join(&r, source, findings, error);
+  }
+  for (size_t i = 0; r.meshes != NULL && i < most; ++i) {
+    supine_mesh_free(&r.meshes[i]);
+  }
+  free(r.meshes);
+  free(r.reports);
+  free(r.errors);
+  return status;
+}
+
+void supine_precompute_source_free(supine_source *source) {
+  supine_lungs_free(&source->lungs);
+  *source = (supine_source){0};
+}
