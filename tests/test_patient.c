@@ -513,23 +513,25 @@ static void test_scan_of_fitted_states_is_known(void **state) {
   supine_resting resting = supine_reference_resting_default();
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_patient_resting(&record, &resting);
-  assert_true(fabs(supine_reference_along_axes(resting.share, supine) - 2410.25 / 5321.5) < 1e-12);
-  assert_int_equal(supine_patient_scan(&record, 0, 5321.5, &resting).kind, SUPINE_SCAN_FULL);
-  assert_int_equal(supine_patient_scan(&record, 1, 2410.25, &resting).kind, SUPINE_SCAN_REST);
+  assert_true(fabs(supine_reference_resting_total(&resting, supine) - 2410.25 / 5321.5) < 1e-12);
+  supine_scan scan = supine_patient_scan(&record, 0, 5321.5, &resting);
+  assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_FULL);
+  scan = supine_patient_scan(&record, 1, 2410.25, &resting);
+  assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   assert_true(supine_patient_below_full(&record) == 0.0);
   /* Half a litre above rest: full inflation by the usual share. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
   resting = supine_reference_resting_default();
-  const double full = 2410.25 / supine_reference_along_axes(resting.share, supine);
-  const supine_scan scan = supine_patient_scan(&record, 0, 2910.25, &resting);
-  assert_int_equal(scan.kind, SUPINE_SCAN_VOLUME);
-  assert_true(fabs(scan.volume - (2910.25 - full)) < 1e-9);
+  const double full = 2410.25 / supine_reference_resting_total(&resting, supine);
+  scan = supine_patient_scan(&record, 0, 2910.25, &resting);
+  assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
+  assert_true(scan.state.volume.ml == 500.0);
   assert_true(fabs(supine_patient_below_full(&record) - (full - 2910.25) / 500.0) < 1e-9);
   /* Volumes alone tell of no rest. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2910.25};
   record.state[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2410.25};
-  assert_int_equal(supine_patient_scan(&record, 1, 2410.25, &resting).kind, SUPINE_SCAN_NONE);
+  assert_false(supine_patient_scan(&record, 1, 2410.25, &resting).known);
   supine_patient_pairs_free(&pairs);
 }
 
