@@ -254,6 +254,10 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   EXPECT(0, "rest supine 2580 mL (healthy people's share; --resting changes it)",
          "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
+  EXPECT(0, "displacement 0.000 mm from the scan",
+         "deform low.safetensors --posture supine --volume scan --from scan -o low.obj");
+  EXPECT(0, "displacement 0.000 mm from supine at full inflation",
+         "deform low.safetensors --posture prone --volume full --from full -o low.obj");
   EXPECT(0, "assumed: RAS axes (as told), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "ras.ply",

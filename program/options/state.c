@@ -20,7 +20,7 @@ int supine_options_read_volume(const char *command, const char *text, void *fiel
 static int read_from(const char *command, const char *text, void *field) {
   supine_state *state = field;
   supine_error error;
-  *state = (supine_state){.gravity = {0.0, 1.0, 0.0}};
+  *state = (supine_state){.gravity = {0.0}}; /* no posture: see supine_options_reference */
   return supine_state_parse(text, state, &error) == SUPINE_OK
              ? SUPINE_EXIT_OK
              : supine_options_usage(command, "--from: %s", error.message);
@@ -51,12 +51,22 @@ const supine_option supine_options_from[] = {
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error) {
-  static const supine_state supine_at_rest = {.gravity = {0.0, 1.0, 0.0},
-                                              .volume = {SUPINE_VOLUME_REST, 0.0}};
-  const bool scan = !from->given && !(compares && supine_basis_get_info(basis)->has_rest);
-  const supine_state state = from->given ? from->state
-                             : scan      ? supine_basis_scan(basis)
-                                         : supine_at_rest;
+  supine_state state = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
+  bool scan = !from->given && !(compares && supine_basis_get_info(basis)->has_rest);
+  if (from->given) {
+    const double *g = from->state.gravity;
+    const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
+    state = from->state;
+    if (!posed) { /* a volume alone: of the scan in its own posture, else supine */
+      const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
+      const supine_state in = supine_basis_scan(basis);
+      const double supine[3] = {0.0, 1.0, 0.0};
+      memcpy(state.gravity, own ? in.gravity : supine, sizeof state.gravity);
+      scan = own && state.volume.ml == 0.0;
+    }
+  } else if (scan) {
+    state = supine_basis_scan(basis);
+  }
   supine_error inner;
   const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
   reference->state = state;
