@@ -66,6 +66,10 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
   }
   double *a = p->stiffness = allocate(n, &status, error);
   p->model.stiffness = a;
+  if (a != NULL && choice->stiffness != NULL) {
+    memcpy(a, choice->stiffness, n * sizeof *a);
+    return SUPINE_OK;
+  }
   if (a != NULL) {
     status =
         choice->expandability != NULL
