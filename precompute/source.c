@@ -147,8 +147,9 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--units is for surfaces: a label map's header says them");
   }
-  const supine_status status = supine_labels_surfaces((const char *const *)r->paths, r->count,
-                                                      &wanted, r->meshes, &source->report, error);
+  const supine_status status = supine_labels_surfaces(
+      (const char *const *)(folder ? lobes.list : r->paths), folder ? lobes.count : r->count,
+      &wanted, r->meshes, &source->report, error);
   if (status != SUPINE_OK) {
     return status;
   }

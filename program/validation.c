@@ -171,12 +171,18 @@ static void search_range(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
-/* mm RMS from predicted vertices to the surface at a scale. */
+/* mm RMS from predicted vertices to the surface at a scale: all gains in proportion, so that each
+ * lung keeps its part. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale, search *look,
                                  double *positions, double *rms, supine_error *error) {
   supine_pose pose = outcome->pose;
-  supine_pose_fill(&pose, scale);
+  for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
+    pose.gains[i / 3][i % 3] *= outcome->scale != 0.0 ? scale / outcome->scale : 0.0;
+  }
+  if (outcome->scale == 0.0) {
+    supine_pose_fill(&pose, scale);
+  }
   const supine_status status = deform(s->basis, &pose, positions, error);
   *rms = INFINITY;
   if (status == SUPINE_OK) {

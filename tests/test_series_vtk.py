@@ -97,17 +97,17 @@ with tempfile.TemporaryDirectory() as folder:
         for name, wanted in (("time_s", "time"), ("gravity_LPS", "gravity"), ("volume_mL", "volume")):
             table = vtk_to_numpy(fields.GetArray(name))
             assert (table == exact[wanted]).all(), name
-    # Of a basis that is at rest itself, displacement counts from the fullest frame: the first shows some.
+    # Displacement counts from the scan, of a basis that knows no rest as well.
     run("precompute", "lungs.ply", "-o", "paper.safetensors", "--law", "paper", "--band", "3")
     for name in ("paper.vtp", "paper_exact.safetensors"):
         run("breathe", "paper.safetensors", "--posture", "supine", "--fps", "4", "-o", name)
-    other = tensors("paper_exact.safetensors")
+    other, paper = tensors("paper_exact.safetensors"), tensors("paper.safetensors")
     fullest = other["volume"].sum(1).argmax()
-    assert fullest > 0 and np.abs(other["volume"][0]).max() < 1
+    assert fullest > 0
     for step in (0, int(fullest)):
         _, surface = read("paper.vtp", step)
         check_surface(surface, other["positions"][step].astype(float), triangles,
-                      other["positions"][fullest].astype(float), tensors("paper.safetensors")["lung"])
+                      paper["vertices"].astype(float), paper["lung"])
         moved = np.abs(vtk_to_numpy(surface.GetPointData().GetArray("displacement"))).max()
         assert (moved > 1) == (step == 0), moved  # mm
     # Of what it took before it was compressed: points, displacement, magnitude, triangles, ends.

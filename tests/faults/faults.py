@@ -33,7 +33,7 @@ solve lungs.ply --posture prone --reach 10 --scale 5 -o other.ply
 solve lungs.ply --posture left --reach 10 --scale 5 -o third.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
-fit --landmarks pairs.csv --law affine -o patient.json
+fit --landmarks pairs.csv --law deep -o patient.json
 pv fit samples.csv -o patient.pv.csv
 """
 
