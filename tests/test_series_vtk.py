@@ -51,7 +51,8 @@ def check_surface(surface, points, triangles, rest, lung):
     assert np.abs(found - points).max() <= HALF_STEP * 1.01
     assert (vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3) == triangles).all()
     moved = vtk_to_numpy(data.GetArray("displacement"))
-    assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01
+    # The evaluator's own reference positions are within 0.0005 mm of the file's.
+    assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01 + 0.0006
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
     cosine = (normals * normals_of(points, triangles)).sum(1) / np.linalg.norm(normals, axis=1)
@@ -109,7 +110,7 @@ with tempfile.TemporaryDirectory() as folder:
         check_surface(surface, other["positions"][step].astype(float), triangles,
                       paper["vertices"].astype(float), paper["lung"])
         moved = np.abs(vtk_to_numpy(surface.GetPointData().GetArray("displacement"))).max()
-        assert (moved > 1) == (step == 0), moved  # mm
+        assert (moved > 1) == (step != 0), moved  # mm; the first frame is the scan
     # Of what it took before it was compressed: points, displacement, magnitude, triangles, ends.
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))

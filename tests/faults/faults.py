@@ -53,7 +53,6 @@ solve lungs.ply --unit-force 3 -o out/a.csv
 fit --landmarks pairs.csv -o out/a.json
 fit lungs.ply state.ply -o out/a.json
 validate lungs.safetensors --state state.ply --posture supine
-validate patient.json --landmarks pairs.csv --json
 embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors
 embed lungs.safetensors image.nrrd -o out/a.safetensors
 embed lungs.safetensors --grid 60 -o out/a.safetensors
