@@ -39,7 +39,7 @@ async function shown(page, posture) {
 
 const near = (a, b, what) => assert.ok(Math.abs(a - b) <= AGREE_MM, `${what}: ${a} and ${b} mm`);
 
-for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'supine at the scan\'s volume'], ['right:rest+200', 'right side at rest + 200 mL']]) {
+for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the scan'], ['right:rest+200', 'right side at rest + 200 mL']]) {
   supine('export', basis, '--inside', inside, '-o', html, ...(from === 'supine:rest' ? [] : ['--from', from]));
   const { page, complaints } = await openLungs(html);
   for (const posture of ['prone', 'left']) {
