@@ -86,17 +86,6 @@ typedef struct supine_mesh_report {
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** Reads a number beside the position of each vertex of a PLY file: rows of x, y, z, in the file's
- * units and axes, and the property, in the file's order, nothing welded or dropped.
- *
- * @param property  its name; a number of any type
- * @param rows      [*count, 4], written on success alone; the caller frees
- * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
- * @retval SUPINE_ERROR_FORMAT  no PLY file, truncated, no such property
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_mesh_load_property(const char *path, const char *property, double **rows,
-                                        size_t *count, supine_error *error);
-
 /** `side` where no lungs have a box with that longest side, mm, else 0. `likely`: the unit, among
  * those that loading is told by name, in which the file would hold lungs, or NULL.
  * @param millimetres  per unit, that `side` was scaled by */

@@ -78,15 +78,6 @@ static supine_status load(const char *path, supine_error *error) {
   return status;
 }
 
-static supine_status load_property(const char *path, supine_error *error) {
-  double *rows = NULL;
-  size_t count = 0;
-  const supine_status status = supine_mesh_load_property(path, "a", &rows, &count, error);
-  assert_true((status == SUPINE_OK) == (rows != NULL));
-  free(rows);
-  return status;
-}
-
 static void test_load_each_allocation_failing_memory(void **state) {
   static const struct {
     const char *name;
@@ -102,9 +93,6 @@ static void test_load_each_allocation_failing_memory(void **state) {
     char path[256];
     (void)sample_text(state, files[i].name, files[i].text, path);
     fail_each(load, path, 6); /* head, bytes, vertices, triangles, weld's two */
-    if (i == 0) {
-      fail_each(load_property, path, 3);
-    }
     assert_int_equal(unlink(path), 0);
   }
 }

@@ -11,9 +11,8 @@ typedef struct ply_reader {
   ply_header header;
   mesh_text text; /* what is left; in ASCII, `line` what is left of the item's line */
   mesh_text line;
-  size_t width; /* columns of `rows`: x, y, z, perhaps the value */
   size_t row_count;
-  double *rows; /* [row_count, width] */
+  double *rows; /* [row_count, 3] x, y, z */
   mesh_faces faces;
   supine_error *error;
 } ply_reader;
@@ -156,9 +155,8 @@ static supine_status take_item(ply_reader *in, const ply_element *element, uint6
       }
     } else if (!take(in, property->type, &value)) {
       return cut_short(in, element, item);
-    } else if (element->kind == PLY_VERTICES && property->role < in->width) {
-      in->rows[item * in->width + property->role] =
-          property->role == PLY_VALUE ? value : (double)(float)value;
+    } else if (element->kind == PLY_VERTICES && property->role <= PLY_Z) {
+      in->rows[3 * item + property->role] = (double)(float)value;
     }
   }
   return SUPINE_OK;
@@ -188,7 +186,7 @@ static supine_status take_vertices(ply_reader *in, const ply_element *element) {
                             in->file->path, MESH_VERTICES_MAX);
   }
   in->row_count = (size_t)count;
-  in->rows = malloc((size_t)count * in->width * sizeof *in->rows);
+  in->rows = malloc((size_t)count * 3 * sizeof *in->rows);
   return in->rows == NULL
              ? supine_error_set(in->error, SUPINE_ERROR_MEMORY, "%s: out of memory", in->file->path)
              : take_items(in, element);
@@ -222,10 +220,9 @@ static supine_status read_faces(ply_reader *in, const unsigned char *after_verti
   return status;
 }
 
-static supine_status begin(const mesh_file *file, const char *value, ply_reader *in,
-                           supine_error *error) {
-  *in = (ply_reader){.file = file, .width = value == NULL ? 3 : 4, .error = error};
-  const supine_status status = supine_mesh_ply_header_read(file, value, &in->header, error);
+static supine_status begin(const mesh_file *file, ply_reader *in, supine_error *error) {
+  *in = (ply_reader){.file = file, .error = error};
+  const supine_status status = supine_mesh_ply_header_read(file, &in->header, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -253,7 +250,7 @@ static bool holds_positions(const ply_header *header) {
 supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   ply_reader in;
-  supine_status status = begin(file, NULL, &in, error);
+  supine_status status = begin(file, &in, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -275,32 +272,5 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
     status = read_faces(&in, after_vertices);
   }
   *dropped = in.faces.dropped;
-  return status;
-}
-
-supine_status supine_mesh_load_property(const char *path, const char *property, double **rows,
-                                        size_t *count, supine_error *error) {
-  ply_reader in = {.rows = NULL};
-  mesh_file file;
-  supine_status status = supine_mesh_file_read(path, &file, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = begin(&file, property, &in, error);
-  if (status == SUPINE_OK && !(holds_positions(&in.header) && holds(&in.header, PLY_VALUE))) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: its vertices have no property '%.60s', or lack x, y or z", path,
-                              property);
-  }
-  if (status == SUPINE_OK) {
-    status = read_vertices(&in);
-  }
-  supine_mesh_file_free(&file);
-  if (status == SUPINE_OK) {
-    *rows = in.rows;
-    *count = in.row_count;
-  } else {
-    free(in.rows);
-  }
   return status;
 }

@@ -16,12 +16,11 @@ typedef struct ply_type {
   bool is_real;
 } ply_type;
 
-/* The first four are columns of a vertex. */
+/* The first three are columns of a vertex. */
 typedef enum ply_role {
   PLY_X,
   PLY_Y,
   PLY_Z,
-  PLY_VALUE, /* what the caller asks for by name */
   PLY_CORNERS,
   PLY_NOTHING /* what no surface needs */
 } ply_role;
@@ -51,9 +50,9 @@ typedef struct ply_header {
   ply_property properties[PLY_PROPERTIES_MAX];
 } ply_header;
 
-/** Reads the header at the start of `file`; `value` names the property of PLY_VALUE, or is NULL.
+/** Reads the header at the start of `file`.
  * @retval SUPINE_ERROR_FORMAT */
-supine_status supine_mesh_ply_header_read(const mesh_file *file, const char *value,
-                                          ply_header *header, supine_error *error);
+supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
+                                          supine_error *error);
 
 #endif

@@ -28,8 +28,8 @@ static int find_name(mesh_text word, const char *const *names) {
   return index;
 }
 
-static ply_role find_role(mesh_text name, ply_kind kind, bool is_list, const char *value) {
-  const char *const columns[] = {"x", "y", "z", value, NULL};
+static ply_role find_role(mesh_text name, ply_kind kind, bool is_list) {
+  static const char *const columns[] = {"x", "y", "z", NULL};
   static const char *const corners[] = {"vertex_indices", "vertex_index", NULL};
   const int index = find_name(name, is_list ? corners : columns);
   if (kind == PLY_VERTICES && !is_list) {
@@ -71,7 +71,7 @@ static bool read_element(mesh_text line, ply_header *header) {
   return supine_mesh_text_count(count, &element->count);
 }
 
-static bool read_property(mesh_text line, const char *value, ply_header *header) {
+static bool read_property(mesh_text line, ply_header *header) {
   mesh_text word;
   if (header->property_count == PLY_PROPERTIES_MAX || header->element_count == 0 ||
       !supine_mesh_text_word(&line, &word)) {
@@ -92,7 +92,7 @@ static bool read_property(mesh_text line, const char *value, ply_header *header)
   if (property.type == NULL || !supine_mesh_text_word(&line, &word)) {
     return false;
   }
-  property.role = find_role(word, element->kind, property.count != NULL, value);
+  property.role = find_role(word, element->kind, property.count != NULL);
   ++element->property_count;
   header->present |= element->count > 0 ? 1U << property.role : 0U;
   header->properties[header->property_count++] = property;
@@ -109,7 +109,7 @@ static bool is_printable(mesh_text line) {
 }
 
 /* Comments and words of no known meaning pass. */
-static bool read_line(mesh_text line, const char *value, ply_header *header, bool *has_format) {
+static bool read_line(mesh_text line, ply_header *header, bool *has_format) {
   mesh_text word;
   if (!is_printable(line)) {
     return false;
@@ -122,12 +122,12 @@ static bool read_line(mesh_text line, const char *value, ply_header *header, boo
     return *has_format;
   }
   return supine_mesh_text_is(word, "element")    ? read_element(line, header)
-         : supine_mesh_text_is(word, "property") ? read_property(line, value, header)
+         : supine_mesh_text_is(word, "property") ? read_property(line, header)
                                                  : true;
 }
 
-supine_status supine_mesh_ply_header_read(const mesh_file *file, const char *value,
-                                          ply_header *header, supine_error *error) {
+supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
+                                          supine_error *error) {
   *header = (ply_header){0};
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
@@ -145,7 +145,7 @@ supine_status supine_mesh_ply_header_read(const mesh_file *file, const char *val
                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                            "%s: the PLY header has no format line", file->path);
     }
-    if (!read_line(line, value, header, &has_format)) {
+    if (!read_line(line, header, &has_format)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu of the PLY header is malformed", file->path, number);
     }
