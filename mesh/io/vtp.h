@@ -10,8 +10,8 @@ enum { VTP_ARRAYS = 8, VTP_FIRST_OF_POINTS = 3 };
 
 typedef struct vtp vtp;
 
-/* Put the bytes of an array's items `begin` to `end` at `at`. */
-typedef void vtp_fill(const vtp *file, size_t begin, size_t end, unsigned char *at);
+/* Put the bytes of item `i` of an array at *at, and move *at past them. */
+typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
 
 /* One array of every frame. */
 typedef struct vtp_array {
@@ -21,7 +21,7 @@ typedef struct vtp_array {
   size_t item; /* bytes of a point or triangle: 1, 4 or 12 */
   size_t count;
   bool still; /* the same in every frame: written once */
-  vtp_fill *fill;
+  vtp_put *put;
 } vtp_array;
 
 struct vtp {

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The arrays of a VTP file, and their bytes, compressed as VTK has them. */
 #include <stdlib.h>
-#include <string.h>
 
 #include <zlib.h>
 
@@ -13,60 +12,48 @@
  * as long for 4 % less. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
 
-static void fill_points(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  for (size_t i = begin; i < end; ++i) {
-    float position[3];
-    supine_mesh_writer_position(&file->writer, i, position);
-    supine_mesh_put_f32(&at, position, 3);
-  }
+static void put_point(const vtp *file, size_t i, unsigned char **at) {
+  float position[3];
+  supine_mesh_writer_position(&file->writer, i, position);
+  supine_mesh_put_f32(at, position, 3);
 }
 
-static void fill_connectivity(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  for (size_t t = begin; t < end; ++t) {
-    uint32_t corner[3];
-    supine_mesh_writer_triangle(&file->writer, t, corner);
-    supine_mesh_put_u32(&at, corner, 3);
-  }
+static void put_connectivity(const vtp *file, size_t i, unsigned char **at) {
+  uint32_t corner[3];
+  supine_mesh_writer_triangle(&file->writer, i, corner);
+  supine_mesh_put_u32(at, corner, 3);
 }
 
-static void fill_offsets(const vtp *file, size_t begin, size_t end, unsigned char *at) {
+static void put_offset(const vtp *file, size_t i, unsigned char **at) {
   (void)file;
-  for (size_t t = begin; t < end; ++t) {
-    const uint32_t stop = 3 * ((uint32_t)t + 1);
-    supine_mesh_put_u32(&at, &stop, 1);
-  }
+  const uint32_t stop = 3 * ((uint32_t)i + 1);
+  supine_mesh_put_u32(at, &stop, 1);
 }
 
-static void fill_displacement(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  for (size_t i = begin; i < end; ++i) {
-    float displacement[4];
-    supine_mesh_writer_displacement(&file->writer, i, displacement);
-    supine_mesh_put_f32(&at, displacement, 3);
-  }
+static void put_displacement(const vtp *file, size_t i, unsigned char **at) {
+  float displacement[4];
+  supine_mesh_writer_displacement(&file->writer, i, displacement);
+  supine_mesh_put_f32(at, displacement, 3);
 }
 
-static void fill_magnitude(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  for (size_t i = begin; i < end; ++i) {
-    float displacement[4];
-    supine_mesh_writer_displacement(&file->writer, i, displacement);
-    supine_mesh_put_f32(&at, displacement + 3, 1);
-  }
+static void put_magnitude(const vtp *file, size_t i, unsigned char **at) {
+  float displacement[4];
+  supine_mesh_writer_displacement(&file->writer, i, displacement);
+  supine_mesh_put_f32(at, displacement + 3, 1);
 }
 
-static void fill_expected_error(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  supine_mesh_put_f32(&at, file->writer.expected_error + begin, end - begin);
+static void put_expected_error(const vtp *file, size_t i, unsigned char **at) {
+  supine_mesh_put_f32(at, file->writer.expected_error + i, 1);
 }
 
-static void fill_normals(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  for (size_t i = begin; i < end; ++i) {
-    float normal[3];
-    supine_mesh_writer_normal(&file->writer, i, normal);
-    supine_mesh_put_f32(&at, normal, 3);
-  }
+static void put_normal(const vtp *file, size_t i, unsigned char **at) {
+  float normal[3];
+  supine_mesh_writer_normal(&file->writer, i, normal);
+  supine_mesh_put_f32(at, normal, 3);
 }
 
-static void fill_lung(const vtp *file, size_t begin, size_t end, unsigned char *at) {
-  memcpy(at, file->writer.lung + begin, end - begin);
+static void put_lung(const vtp *file, size_t i, unsigned char **at) {
+  *(*at)++ = file->writer.lung[i];
 }
 
 supine_status supine_mesh_vtp_begin(vtp *file) {
@@ -74,23 +61,23 @@ supine_status supine_mesh_vtp_begin(vtp *file) {
   const size_t points = writer->mesh->vertex_count;
   const size_t triangles = writer->mesh->triangle_count;
   vtp_array *to = file->arrays;
-  *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, fill_points};
-  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, fill_connectivity};
-  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, fill_offsets};
+  *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, put_point};
+  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity};
+  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset};
   if (writer->rest != NULL) {
-    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, fill_displacement};
+    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, put_displacement};
   }
   if (writer->rest != NULL && file->times == NULL) { /* VTK and ParaView find it by themselves */
-    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, fill_magnitude};
+    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, put_magnitude};
   }
   if (writer->expected_error != NULL) {
-    *to++ = (vtp_array){"Float32", "expected_error_mm", 1, 4, points, false, fill_expected_error};
+    *to++ = (vtp_array){"Float32", "expected_error_mm", 1, 4, points, false, put_expected_error};
   }
   if (writer->normals != NULL) {
-    *to++ = (vtp_array){"Float32", "Normals", 3, 12, points, false, fill_normals};
+    *to++ = (vtp_array){"Float32", "Normals", 3, 12, points, false, put_normal};
   }
   if (writer->lung != NULL) {
-    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, fill_lung};
+    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung};
   }
   file->array_count = (size_t)(to - file->arrays);
   file->offsets = calloc(file->frames * file->array_count, sizeof *file->offsets);
@@ -136,7 +123,10 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
     const size_t items = left < each ? left : each;
     uLongf size = compressBound(BLOCK);
     unsigned char *packed = file->packed + i * size;
-    array->fill(file, i * each, i * each + items, raw);
+    unsigned char *at = raw;
+    for (size_t k = 0; k < items; ++k) {
+      array->put(file, i * each + k, &at);
+    }
     file->sizes[3 + i] = /* 0: no memory */
         compress2(packed, &size, raw, items * array->item, LEVEL) == Z_OK ? size : 0;
   }
