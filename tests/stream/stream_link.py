@@ -3,9 +3,9 @@
 
 It shares no line with the server: bytes by the protocol's text, positions by the file's."""
 import sys
-import time
 
 sys.path.insert(0, sys.argv[1])
+from answers import answer, faces  # noqa: E402
 from supine_link import Basis, Link, array, crc64, instruments, quaternion, string, unpack  # noqa: E402
 
 port, basis = int(sys.argv[2]), Basis(sys.argv[3])
@@ -15,28 +15,6 @@ assert crc64(b"123456789") == 0x6C40DF5F0B497347  # the published check value of
 
 SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rows; columns: left, back, head in a room, z up
 LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
-
-
-def answer(link, stamp, send):
-    """The frame that answers a message of that stamp."""
-    send()
-    end = time.monotonic() + 10
-    while time.monotonic() < end:
-        message = link.message()
-        if message is None:
-            link.receive(1.0)
-        elif message[2] == stamp:
-            return message
-    raise AssertionError("no answer")
-
-
-def faces(corners):
-    """Triangles in an order of their own, each from its lowest corner, as it faces."""
-    found = []
-    for i in range(0, len(corners), 3):
-        low = min(range(3), key=lambda j: corners[i + j])
-        found.append(tuple(corners[i + (low + j) % 3] for j in range(3)))
-    return sorted(found)
 
 
 def far(a, b):

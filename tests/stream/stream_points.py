@@ -9,10 +9,10 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 
 supine, samples = sys.argv[1:]
 sys.path.insert(0, samples)
+from answers import answer  # noqa: E402
 from supine_link import Link, transform, unpack  # noqa: E402
 
 SHIFT = (12.0, -7.0, 20.0)
@@ -37,19 +37,6 @@ def positions(path):
 def point(name, place):
     """An element of a POINT message."""
     return struct.pack(">64s32s4B3ff20s", name.encode(), b"sensors", 255, 0, 0, 255, *place, 1.0, b"")
-
-
-def answer(link, stamp, send):
-    """The content of the frame that answers a message of that stamp."""
-    send()
-    end = time.monotonic() + 20
-    while time.monotonic() < end:
-        message = link.message()
-        if message is None:
-            link.receive(1.0)
-        elif message[2] == stamp:
-            return message
-    raise AssertionError("no answer")
 
 
 def check(message, truth, count):

@@ -6,6 +6,7 @@ import sys
 import time
 
 sys.path.insert(0, sys.argv[1])
+from answers import faces  # noqa: E402
 from slicer_lung import SERVER_OPTIONS, Surface  # noqa: E402
 from supine_link import Basis, Link, array  # noqa: E402
 
@@ -22,15 +23,6 @@ TURNS = {
     # on the left side: right (x) points to the ceiling (+y), front (y) to the room's -x
     "left": ([0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (1, 0, 0)),
 }
-
-
-def faces(corners):
-    """Triangles in an order of their own, each from its lowest corner, as it faces."""
-    found = []
-    for i in range(0, len(corners), 3):
-        low = min(range(3), key=lambda j: corners[i + j])
-        found.append(tuple(corners[i + (low + j) % 3] for j in range(3)))
-    return sorted(found)
 
 
 def settle(read):
