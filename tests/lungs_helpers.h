@@ -69,6 +69,19 @@ static inline bool helper_real_lungs(const char *const *names, size_t count, sup
   return loaded;
 }
 
+/* Load a real left lung in 5,000 vertices and in all of its own, each as one model; false, and both
+ * empty, where they are not there. */
+static inline bool helper_real_left_lung(supine_lungs *coarse, supine_lungs *fine) {
+  static const char *const name[2] = {"lungs/chaste_left_5k.obj", "lungs/chaste_left.ply"};
+  const bool loaded = helper_real_lungs(&name[0], 1, SUPINE_AXES_LPS, coarse) &&
+                      helper_real_lungs(&name[1], 1, SUPINE_AXES_LPS, fine);
+  if (!loaded) {
+    supine_lungs_free(coarse);
+    *coarse = (supine_lungs){0};
+  }
+  return loaded;
+}
+
 /* Largest |a - b|, and largest |a|. */
 static inline double helper_difference(size_t count, const double *a, const double *b) {
   double largest = 0.0;

@@ -23,19 +23,7 @@
 #include "precompute/patient/surfaces.h"
 #include "precompute/physics/solve.h"
 
-#include "lungs_helpers.h"
-
-static const double supine_gravity[3] = {0.0, 1.0, 0.0};
-
-/* The truth: c1 to c6, and (18) as it is supine. */
-static supine_model truth(void) {
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  model.reach = 10.0;
-  model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
-  model.direction =
-      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
-  return model;
-}
+#include "patient_helpers.h"
 
 static double *stiffness_of(const supine_lungs *lungs, const supine_lesion *lesion) {
   const size_t n = lungs->mesh.vertex_count;
@@ -144,13 +132,9 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
 
 static void test_lesion_of_a_real_lung_comes_back(void **state_) {
   (void)state_;
-  static const char *const coarse[] = {"lungs/chaste_left_5k.obj"};
-  static const char *const fine[] = {"lungs/chaste_left.ply"};
   supine_lungs rest = {0};
   supine_lungs other = {0};
-  if (!helper_real_lungs(coarse, 1, SUPINE_AXES_LPS, &rest) ||
-      !helper_real_lungs(fine, 1, SUPINE_AXES_LPS, &other)) {
-    supine_lungs_free(&rest);
+  if (!helper_real_left_lung(&rest, &other)) {
     skip();
   }
   const supine_lesion lesion = {{110.0, -200.0, -230.0}, 60.0, 3.0};
@@ -252,13 +236,9 @@ static void test_gradient_of_made_lungs_comes_back(void **state_) {
 
 static void test_gradient_of_a_real_lung_comes_back(void **state_) {
   (void)state_;
-  static const char *const coarse[] = {"lungs/chaste_left_5k.obj"};
-  static const char *const fine[] = {"lungs/chaste_left.ply"};
   supine_lungs rest = {0};
   supine_lungs other = {0};
-  if (!helper_real_lungs(coarse, 1, SUPINE_AXES_LPS, &rest) ||
-      !helper_real_lungs(fine, 1, SUPINE_AXES_LPS, &other)) {
-    supine_lungs_free(&rest);
+  if (!helper_real_left_lung(&rest, &other)) {
     skip();
   }
   check_gradient(&rest, &other);

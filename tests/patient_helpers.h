@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The law that tests of a patient's fit know to be true. */
+#ifndef SUPINE_PATIENT_HELPERS_H
+#define SUPINE_PATIENT_HELPERS_H
+
+#include "precompute/physics/model.h"
+
+#include "lungs_helpers.h"
+
+static const double supine_gravity[3] = {0.0, 1.0, 0.0};
+
+/* Make the true law: c1 to c6, and (18) as it is supine. */
+static supine_model truth(void) {
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  model.reach = 10.0;
+  model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
+  model.direction =
+      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
+  return model;
+}
+
+#endif
