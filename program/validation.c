@@ -12,9 +12,8 @@
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/surface.h"
 #include "program/options/basis_input.h"
-#include "sh/base/parallel.h"
 
-enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24, GRAIN = 64 };
+enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
 
 static const double search_span = 0.5; /* of a full breath, on either side */
 static const double golden = 0.6180339887498949;
@@ -155,27 +154,16 @@ static supine_status predict_surface(const supine_command_subject *s,
 
 typedef struct search {
   const supine_inside_surface *tree;
-  const double *positions; /* [N, 3] */
-  size_t vertices, count;
-  double *square; /* [count] */
+  double *positions;      /* [vertices, 3] */
+  size_t vertices, count; /* of the mesh, and how many of them are searched */
+  double *distance;       /* [count] */
 } search;
-
-static void search_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const search *s = context;
-  supine_inside_place place;
-  for (size_t i = begin; i < end; ++i) {
-    const double *at = s->positions + 3 * (i * s->vertices / s->count);
-    place = supine_inside_surface_find(s->tree, at, i > begin ? &place : NULL);
-    s->square[i] = place.depth * place.depth;
-  }
-}
 
 /* mm RMS from predicted vertices to the surface at a scale: all gains in proportion, so that each
  * lung keeps its part. */
 static supine_status distance_at(const supine_command_subject *s,
-                                 const supine_command_outcome *outcome, double scale, search *look,
-                                 double *positions, double *rms, supine_error *error) {
+                                 const supine_command_outcome *outcome, double scale,
+                                 const search *look, double *rms, supine_error *error) {
   supine_pose pose = outcome->pose;
   for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
     pose.gains[i / 3][i % 3] *= outcome->scale != 0.0 ? scale / outcome->scale : 0.0;
@@ -183,13 +171,17 @@ static supine_status distance_at(const supine_command_subject *s,
   if (outcome->scale == 0.0) {
     supine_pose_fill(&pose, scale);
   }
-  const supine_status status = deform(s->basis, &pose, positions, error);
+  const supine_status status = deform(s->basis, &pose, look->positions, error);
   *rms = INFINITY;
   if (status == SUPINE_OK) {
     double sum = 0.0;
-    supine_parallel_for(look->count, GRAIN, 0, search_range, look);
     for (size_t i = 0; i < look->count; ++i) {
-      sum += look->square[i] / (double)look->count;
+      memmove(look->positions + 3 * i, look->positions + 3 * (i * look->vertices / look->count),
+              3 * sizeof(double));
+    }
+    supine_inside_surface_distances(look->tree, look->count, look->positions, look->distance, NULL);
+    for (size_t i = 0; i < look->count; ++i) {
+      sum += look->distance[i] * look->distance[i] / (double)look->count;
     }
     *rms = sqrt(sum);
   }
@@ -200,13 +192,12 @@ static supine_status distance_at(const supine_command_subject *s,
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->rest.vertex_count;
-  double *positions = malloc(3 * n * sizeof *positions);
-  search look = {
-      .positions = positions, .vertices = n, .count = n < SEARCHED_MAX ? n : SEARCHED_MAX};
-  look.square = malloc(look.count * sizeof(double));
+  search look = {.vertices = n, .count = n < SEARCHED_MAX ? n : SEARCHED_MAX};
+  look.positions = malloc(3 * n * sizeof(double));
+  look.distance = malloc(look.count * sizeof(double));
   supine_inside_surface *tree = NULL;
   supine_status status =
-      positions == NULL || look.square == NULL
+      look.positions == NULL || look.distance == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
           : supine_inside_surface_create(mesh->vertices, mesh->triangle_count, mesh->triangles,
                                          &tree, error);
@@ -218,21 +209,20 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
     const double a = high - golden * (high - low);
     const double b = low + golden * (high - low);
     double left[2] = {0};
-    status = distance_at(s, outcome, a, &look, positions, &left[0], error);
+    status = distance_at(s, outcome, a, &look, &left[0], error);
     if (status == SUPINE_OK) {
-      status = distance_at(s, outcome, b, &look, positions, &left[1], error);
+      status = distance_at(s, outcome, b, &look, &left[1], error);
     }
     *(left[0] < left[1] ? &high : &low) = left[0] < left[1] ? b : a;
   }
   if (status == SUPINE_OK) {
     outcome->best_scale = 0.5 * (low + high);
     outcome->has_best = true;
-    status =
-        distance_at(s, outcome, outcome->best_scale, &look, positions, &outcome->best_rms, error);
+    status = distance_at(s, outcome, outcome->best_scale, &look, &outcome->best_rms, error);
   }
   supine_inside_surface_destroy(tree);
-  free(positions);
-  free(look.square);
+  free(look.positions);
+  free(look.distance);
   return status;
 }
 

@@ -5,11 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
 #include "precompute/inside/surface.h"
 
-enum { LEAF = 8 };
+enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
 /* Boxes seen from farther than this many of their radii are dipoles: errs by less than 1 % of the
  * winding number, where 50 % decide. */
@@ -329,6 +330,32 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
   search(surface, 0, point, &best, &place);
   place.depth = sqrt(best);
   return place;
+}
+
+typedef struct distances {
+  const supine_inside_surface *surface;
+  const double *points;
+  double *distance;
+  double *nearest; /* NULL: not wanted */
+} distances;
+
+static void distance_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const distances *d = context;
+  supine_inside_place place;
+  for (size_t i = begin; i < end; ++i) {
+    place = supine_inside_surface_nearest(d->surface, d->points + 3 * i, i > begin ? &place : NULL);
+    d->distance[i] = place.depth;
+    if (d->nearest != NULL) {
+      memcpy(d->nearest + 3 * i, place.nearest, sizeof place.nearest);
+    }
+  }
+}
+
+void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
+                                     const double *points, double *distance, double *nearest) {
+  distances all = {surface, points, distance, nearest};
+  supine_parallel_for(count, DISTANCE_GRAIN, 0, distance_range, &all);
 }
 
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,

@@ -37,6 +37,11 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const double point[3],
                                                   const supine_inside_place *near);
 
+/** Find the distance of each point [count, 3] to the surface, mm, into distance [count], and the
+ * surface's nearest point into nearest [count, 3] where it is not NULL. Uses all cores. */
+void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
+                                     const double *points, double *distance, double *nearest);
+
 /** Finds the nearest point, and which side by the generalised winding number, 1 inside and 0
  * outside, so that small holes do no harm: inside where
  *

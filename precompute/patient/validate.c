@@ -12,13 +12,12 @@
 #include "precompute/patient/validate.h"
 
 #include "precompute/inside/surface.h"
-#include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
 const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT] = {
     "predicted", "none", "translation", "rigid+scale", "affine"};
 
-enum { ROUNDS = 20, FITTED_MAX = 2000, GRAIN = 64 };
+enum { ROUNDS = 20, FITTED_MAX = 2000 };
 
 /* x -> m x + t, row by row. */
 typedef struct map {
@@ -157,26 +156,6 @@ supine_status supine_patient_validate_points(
 
 /* --- surfaces -------------------------------------------------------------------------------- */
 
-typedef struct search {
-  const supine_inside_surface *tree;
-  const double *points;
-  double *distance; /* [count] */
-  double *nearest;  /* [count, 3]; NULL: not wanted */
-} search;
-
-static void search_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const search *s = context;
-  supine_inside_place place;
-  for (size_t i = begin; i < end; ++i) {
-    place = supine_inside_surface_nearest(s->tree, s->points + 3 * i, i > begin ? &place : NULL);
-    s->distance[i] = place.depth;
-    if (s->nearest != NULL) {
-      memcpy(s->nearest + 3 * i, place.nearest, 3 * sizeof(double));
-    }
-  }
-}
-
 /* Both ways, pooled. */
 static supine_status surface_distance(const supine_mesh *rest, const double *moved,
                                       const supine_mesh *state,
@@ -190,10 +169,8 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
                     : supine_inside_surface_create(moved, rest->triangle_count, rest->triangles,
                                                    &tree, error);
   if (status == SUPINE_OK) {
-    search there = {state_tree, moved, space, nearest};
-    search back = {tree, state->vertices, space + n, NULL};
-    supine_parallel_for(n, GRAIN, 0, search_range, &there);
-    supine_parallel_for(state->vertex_count, GRAIN, 0, search_range, &back);
+    supine_inside_surface_distances(state_tree, n, moved, space, nearest);
+    supine_inside_surface_distances(tree, state->vertex_count, state->vertices, space + n, NULL);
     summarise(space, n + state->vertex_count, of);
   }
   supine_inside_surface_destroy(tree);
@@ -214,11 +191,10 @@ static bool settle(supine_patient_map kind, size_t n, const double *vertices,
     memcpy(from + 3 * i, vertices + 3 * (i * n / count), 3 * sizeof(double));
   }
   for (int round = 0; round < (kind == SUPINE_PATIENT_MAP_NONE ? 0 : ROUNDS); ++round) {
-    search s = {tree, at, distance, to};
     for (size_t i = 0; i < count; ++i) {
       apply(&by, from + 3 * i, at + 3 * i);
     }
-    supine_parallel_for(count, GRAIN, 0, search_range, &s);
+    supine_inside_surface_distances(tree, count, at, distance, to);
     if (!fit_map(kind, count, from, to, &by)) {
       return false;
     }
