@@ -18,8 +18,9 @@ static const char name[] = "fit";
 
 /* Two scans of the person, or landmarks in them, and how each was taken. */
 typedef struct request {
-  const char *path, *landmarks, *name;
-  bool reverse, translation, rigid, has_law, has_midline, has_gain, expandability, json;
+  const char *path, *name;
+  supine_landmark_options landmarks;
+  bool has_law, has_midline, has_gain, expandability, json;
   int law;
   double midline, gain, reach;
   supine_mesh_load_options load;
@@ -83,12 +84,7 @@ static bool is_landmarks(const char *path) {
 static const supine_option table[] = {
     {"output", 'o', "FILE", "what was found (JSON), for 'supine precompute --patient'", FILLS(path),
      .file = SUPINE_FILE_OUT},
-    {"landmarks", 0, "FILE",
-     "matched points, mm, LPS: CSV with the columns x,y,z,to_x,to_y,to_z (from rest to the other "
-     "state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from 2 to "
-     "1)",
-     FILLS(landmarks), .file = SUPINE_FILE_IN},
-    {"reverse", 0, NULL, "rest is the other one of the two", FILLS(reverse)},
+    {.table = supine_options_landmarks, FILLS(landmarks)},
     {"rest", 0, "STATE",
      "how the person lay in the first scan, and how full the lungs were: POSTURE, VOLUME or "
      "POSTURE:VOLUME, with VOLUME rest, full, either with +ML or -ML, or what a CT shows, 2600mL",
@@ -97,10 +93,6 @@ static const supine_option table[] = {
      "the same of the other state; without a volume the surfaces tell. Which of the two is the "
      "fuller one does not matter: the law counts from it",
      FILLS(state), .read = read_state, .standard = "supine"},
-    {"translation", 0, NULL,
-     "the scans' frames may be shifted against each other: finds the shift as well",
-     FILLS(translation), .rivals = "motion"},
-    {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
     {"law", 0, "LAW",
      "deep (default): the deep law, its size fitted; paper: the published law, c1 to c9 fitted. "
      "What either leaves of this person is carried by kriging",
@@ -125,8 +117,8 @@ static const supine_option table[] = {
      .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
     {"expandability", 0, NULL,
      "of surfaces: finds how expandable which parts are, under the 'deep' law's force, in regions "
-     "some 45 mm apart, in place of kriging and with the paper's law, and says which it cannot see; "
-     "kept where held-out blocks come nearer",
+     "some 45 mm apart, in place of kriging and with the paper's law, and says which it cannot "
+     "see; kept where held-out blocks come nearer",
      FILLS(expandability)},
     {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -298,7 +290,7 @@ static void print_states(const supine_patient_record *record) {
 static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
                        const request *wanted) {
   const supine_patient *patient = &record->patient;
-  const bool moved = wanted->translation || wanted->rigid;
+  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   print_states(record);
   (void)printf("%zu %s in %zu blocks of 40 mm\n", report->count,
                report->components == 3 ? "landmarks" : "measurements", report->blocks);
@@ -306,7 +298,7 @@ static void print_text(const supine_patient_record *record, const supine_patient
   if (moved) {
     const double *t = patient->motion;
     (void)printf("motion between the scans: %.1f,%.1f,%.1f mm", t[0], t[1], t[2]);
-    if (wanted->rigid) {
+    if (wanted->landmarks.rigid) {
       (void)printf(", turned by %.1f degrees",
                    sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5]) * 57.29577951308232);
     }
@@ -392,10 +384,11 @@ static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs 
 }
 
 static supine_status load_evidence(const request *wanted, evidence *of, supine_error *error) {
-  const bool moved = wanted->translation || wanted->rigid;
+  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   supine_status status = SUPINE_OK;
-  if (wanted->landmarks != NULL) {
-    status = supine_patient_pairs_load(wanted->landmarks, wanted->reverse, &of->pairs, error);
+  if (wanted->landmarks.path != NULL) {
+    status = supine_patient_pairs_load(wanted->landmarks.path, wanted->landmarks.reverse,
+                                       &of->pairs, error);
     if (status == SUPINE_OK) {
       status = supine_patient_pairs_check(&of->pairs, moved, error);
     }
@@ -505,7 +498,7 @@ typedef struct further_work {
 static supine_status load_further(const request *wanted, const evidence *of,
                                   const supine_patient_record *record, further_work *work,
                                   supine_error *error) {
-  const bool moved = wanted->translation || wanted->rigid;
+  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   supine_status status = SUPINE_OK;
   for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
     const char *path = wanted->further_path[k];
@@ -516,7 +509,7 @@ static supine_status load_further(const request *wanted, const evidence *of,
       work->other[k].surface = &work->lungs[k].mesh;
       continue;
     }
-    status = supine_patient_pairs_load(path, wanted->reverse, pairs, error);
+    status = supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error);
     if (status == SUPINE_OK) {
       status = supine_patient_pairs_check(pairs, moved, error);
     }
@@ -530,7 +523,7 @@ static supine_status load_further(const request *wanted, const evidence *of,
 
 static supine_status find_gain(const request *wanted, evidence *of, supine_patient_record *record,
                                supine_error *error) {
-  const bool moved = wanted->translation || wanted->rigid;
+  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   further_work *work = calloc(1, sizeof *work);
   supine_patient_gain gain = {0};
   supine_lungs *from = &of->lungs[0];
@@ -611,7 +604,7 @@ static void keep(const request *wanted, const evidence *of, const supine_patient
                  supine_patient_record *record) {
   const supine_patient_fit_report *report = &found->report;
   const supine_patient_scores *held = &report->held_out;
-  const char *source = wanted->landmarks != NULL ? wanted->landmarks : wanted->state_path;
+  const char *source = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->state_path;
   const char *slash = strrchr(source, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
                  wanted->name != NULL ? wanted->name
@@ -628,7 +621,8 @@ static void keep(const request *wanted, const evidence *of, const supine_patient
       &record->patient, wanted->has_gain ? wanted->gain : usual_gain, record->state[1].gravity);
   record->points = report->count;
   record->held_out = held->corrected;
-  record->held_out_baseline = wanted->translation || wanted->rigid ? held->translation : held->none;
+  record->held_out_baseline =
+      wanted->landmarks.translation || wanted->landmarks.rigid ? held->translation : held->none;
   record->expected = report->expected;
   record->band = report->band;
   record->fitted = report->fitted.corrected;
@@ -639,9 +633,10 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
                          supine_patient_surface_fit *found, supine_patient_record *record,
                          supine_error *error) {
   supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
-                                        .moved = wanted->rigid         ? SUPINE_PATIENT_RIGID
-                                                 : wanted->translation ? SUPINE_PATIENT_TRANSLATION
-                                                                       : SUPINE_PATIENT_STILL};
+                                        .moved = wanted->landmarks.rigid ? SUPINE_PATIENT_RIGID
+                                                 : wanted->landmarks.translation
+                                                     ? SUPINE_PATIENT_TRANSLATION
+                                                     : SUPINE_PATIENT_STILL};
   evidence of = {0};
   supine_status status = load_evidence(wanted, &of, error);
   if (status == SUPINE_OK) {
@@ -672,8 +667,8 @@ static int arrange(request *wanted, const supine_arguments *given) {
   wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
   if (given->count > 1) {
     wanted->state_path = given->operand[next++];
-  } else if (wanted->landmarks == NULL && wanted->count > 0) { /* the first state is the one */
-    *(is_landmarks(wanted->further_path[0]) ? &wanted->landmarks : &wanted->state_path) =
+  } else if (wanted->landmarks.path == NULL && wanted->count > 0) { /* the first state is the one */
+    *(is_landmarks(wanted->further_path[0]) ? &wanted->landmarks.path : &wanted->state_path) =
         wanted->further_path[0];
     wanted->state = wanted->further[0];
     --wanted->count;
@@ -689,7 +684,7 @@ static int arrange(request *wanted, const supine_arguments *given) {
     wanted->further[wanted->count].volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0.0};
     wanted->further_path[wanted->count++] = given->operand[next];
   }
-  if (wanted->landmarks == NULL && wanted->state_path == NULL) {
+  if (wanted->landmarks.path == NULL && wanted->state_path == NULL) {
     return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
                                       "and the one in the other state, or both");
   }
@@ -734,7 +729,7 @@ static int run(void *chosen, const supine_arguments *given) {
     free(text);
   } else {
     if (wanted->state_path != NULL) {
-      print_surface(&found.surface, record.patient.law, wanted->landmarks != NULL);
+      print_surface(&found.surface, record.patient.law, wanted->landmarks.path != NULL);
     }
     print_text(&record, &found.report, wanted);
     if (wanted->state_path != NULL) {

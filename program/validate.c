@@ -15,14 +15,15 @@
 static const char name[] = "validate";
 
 typedef struct request {
-  const char *landmarks, *path;
+  const char *path;
+  supine_landmark_options landmarks;
   supine_command_state from, state[SUPINE_COMMAND_STATES_MAX];
   size_t count;
   supine_orientation orientation;
   supine_mesh_load_options load;
   supine_volume_options volume;
   double scale;
-  bool has_scale, reverse, translation, rigid, json;
+  bool has_scale, json;
 } request;
 
 /* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
@@ -70,24 +71,15 @@ static const supine_option table[] = {
      "the same lungs in another state, of any meshing; may be repeated, up to 8, and several then "
      "tell how linear displacement is with volume. Without a volume: what the surface holds",
      .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
-    {"landmarks", 0, "FILE",
-     "points that are known in both states, as 'supine fit --landmarks' takes them; with several "
-     "states, in the first",
-     FILLS(landmarks), .file = SUPINE_FILE_IN},
-    {"reverse", 0, NULL, "landmarks start from the other one of the two", FILLS(reverse)},
+    {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
      "the state that motion starts from, as landmarks and the maps beside the prediction have it; "
      "default: the basis's scan itself",
      FILLS(from), .read = read_from, .wants = "a state, as supine:rest"},
-    {.help =
-         "The volume of states that name none (default: what the state's surface holds):"},
+    {.help = "The volume of states that name none (default: what the state's surface holds):"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
      .wants = "a number", .rivals = "breath"},
-    {"translation", 0, NULL,
-     "the other scan's frame may be shifted: the prediction is shifted to where it fits best",
-     FILLS(translation), .rivals = "motion"},
-    {"rigid", 0, NULL, "or shifted and turned", FILLS(rigid), .rivals = "motion"},
     {.table = supine_options_surface_frame, FILLS(load)},
     {"output", 'o', "FILE",
      "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
@@ -175,9 +167,9 @@ static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
                             "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(
-        row, "explained_percent",
-        isnan(of[k].explained) ? json_null() : json_real(100.0 * of[k].explained));
+    (void)json_object_set_new(row, "explained_percent",
+                              isnan(of[k].explained) ? json_null()
+                                                     : json_real(100.0 * of[k].explained));
     (void)json_object_set_new(all, supine_patient_map_names[k], row);
   }
   return all;
@@ -271,8 +263,9 @@ static supine_status validate(const request *wanted, supine_command_subject *s,
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = supine_command_subject_begin(s, error);
   for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
-    status = supine_command_validate_state(s, i, &wanted->load, i == 0 ? wanted->landmarks : NULL,
-                                           wanted->reverse, error);
+    status =
+        supine_command_validate_state(s, i, &wanted->load, i == 0 ? wanted->landmarks.path : NULL,
+                                      wanted->landmarks.reverse, error);
     (void)supine_options_progress_step(&progress, (double)(i + 1) / (double)s->count);
   }
   supine_options_progress_end(&progress);
@@ -289,7 +282,7 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_command_subject s = {0};
   supine_error error;
   int result = SUPINE_EXIT_OK;
-  if (wanted->count == 0 && wanted->landmarks == NULL) {
+  if (wanted->count == 0 && wanted->landmarks.path == NULL) {
     return supine_options_usage(name, "against what? Name --state or --landmarks");
   }
   if (wanted->path != NULL && wanted->count == 0) {
@@ -307,9 +300,9 @@ static int run(void *chosen, const supine_arguments *given) {
                                 "'supine precompute --patient'",
                                 path);
   }
-  s.moved = wanted->rigid         ? SUPINE_PATIENT_RIGID
-            : wanted->translation ? SUPINE_PATIENT_TRANSLATION
-                                  : SUPINE_PATIENT_STILL;
+  s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
+            : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
+                                            : SUPINE_PATIENT_STILL;
   result = supine_command_subject_open(path, &s, &error) != SUPINE_OK
                ? supine_options_fail(name, &error)
                : set_states(wanted, &s);

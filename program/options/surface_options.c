@@ -44,6 +44,21 @@ const supine_option supine_options_surface_frame[] = {
      .wants = "mm, cm, m, um, in or millimetres per unit"},
     {.name = NULL}};
 
+#define FILLS(member) SUPINE_FILLS(supine_landmark_options, member)
+
+const supine_option supine_options_landmarks[] = {
+    {"landmarks", 0, "FILE",
+     "matched points, mm, LPS: CSV with the columns x,y,z,to_x,to_y,to_z (from the first state to "
+     "the other), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from 2 "
+     "to 1); of several states, the first",
+     FILLS(path), .file = SUPINE_FILE_IN},
+    {"reverse", 0, NULL, "landmarks start from the other one of the two", FILLS(reverse)},
+    {"translation", 0, NULL,
+     "the scans' frames may be shifted against each other: finds the shift as well",
+     FILLS(translation), .rivals = "motion"},
+    {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
+    {.name = NULL}};
+
 void supine_options_say_findings(const char *command, const supine_findings *findings) {
   const char *at = findings->text;
   size_t length;

@@ -12,6 +12,15 @@
 /* --axes and --units, a table that fills a supine_mesh_load_options. */
 extern const supine_option supine_options_surface_frame[];
 
+/* Points that are known in two scans of one person, and how far the scans' frames agree. */
+typedef struct supine_landmark_options {
+  const char *path; /* CSV; NULL: none */
+  bool reverse, translation, rigid;
+} supine_landmark_options;
+
+/* --landmarks, --reverse, --translation and --rigid, a table that fills one. */
+extern const supine_option supine_options_landmarks[];
+
 /* Prints what was found of an input, a line each. */
 void supine_options_say_findings(const char *command, const supine_findings *findings);
 
