@@ -40,7 +40,8 @@ bool supine_kriging_factor(size_t count, double *matrix) {
   return true;
 }
 
-void supine_kriging_forward(size_t count, const double *factor, double *x) {
+/* Solve L x = b in place. */
+static void forward(size_t count, const double *factor, double *x) {
   for (size_t i = 0; i < count; ++i) {
     double sum = x[i];
     for (size_t k = 0; k < i; ++k) {
@@ -89,7 +90,7 @@ static void whiten(supine_kriging *fit) {
     }
   }
   for (size_t c = 0; c < SUPINE_KRIGING_COLUMNS; ++c) {
-    supine_kriging_forward(n, fit->factor, fit->white + c * n);
+    forward(n, fit->factor, fit->white + c * n);
   }
 }
 
@@ -145,7 +146,7 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
   for (size_t k = 0; k < TERMS; ++k) {
     memset(inverse[k], 0, sizeof inverse[k]);
     inverse[k][k] = 1;
-    supine_kriging_forward(TERMS, factor, inverse[k]);
+    forward(TERMS, factor, inverse[k]);
   }
   memset(fit->terms, 0, sizeof fit->terms);
   memset(fit->spread, 0, sizeof fit->spread);
@@ -260,7 +261,7 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   double block[9];
   memset(scratch, 0, n * sizeof *scratch);
   scratch[point] = 1;
-  supine_kriging_forward(n, fit->factor, scratch);
+  forward(n, fit->factor, scratch);
   leave_out_block(fit, scratch, block);
   const double least = 1e-9 * dot(n, scratch, scratch);
   bool alone = !supine_kriging_factor(3, block);
@@ -274,10 +275,10 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   }
   double trace = 0;
   double solved[3];
-  supine_kriging_forward(3, block, residual);
+  forward(3, block, residual);
   for (size_t k = 0; k < 3; ++k) { /* column k of L^-1 */
     double unit[3] = {k == 0, k == 1, k == 2};
-    supine_kriging_forward(3, block, unit);
+    forward(3, block, unit);
     trace += dot(3, unit, unit);
     solved[k] = dot(3, unit, residual);
   }

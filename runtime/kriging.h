@@ -74,9 +74,6 @@ double supine_kriging_covariance(const supine_kriging_model *model, const supine
  * @return false where it is not positive definite */
 bool supine_kriging_factor(size_t count, double *matrix);
 
-/** Solve L x = b in place. */
-void supine_kriging_forward(size_t count, const double *factor, double *x);
-
 /** How many doubles a fit of `count` points needs. */
 size_t supine_kriging_space(size_t count);
 

@@ -20,7 +20,8 @@ static const double biweight = 4.685;    /* of the scale: 95 % efficient on norm
 static const double surface_noise = 0.5; /* mm along the normal */
 static const double scale_least = 0.02;  /* mm: no surface is known better */
 
-supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs) {
+/* Take the frame of a surface: its lungs' box and midline. */
+static supine_patient_frame frame_of(const supine_lungs *lungs) {
   supine_patient_frame frame = {.midline = lungs->midline,
                                 .only_side = lungs->lung_count == 1 ? lungs->side[0] : 0};
   memcpy(frame.minimum, lungs->minimum, sizeof frame.minimum);
@@ -134,7 +135,7 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
   supine_patient_matching *m = matching;
   double *all = malloc(3 * n * sizeof *all);
   *m = (supine_patient_matching){.rest = rest, .state = state};
-  m->frame = supine_patient_frame_of_lungs(rest);
+  m->frame = frame_of(rest);
   m->count = n < most ? n : most;
   m->columns = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->caught = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));

@@ -32,9 +32,6 @@ typedef struct supine_patient_matching {
   size_t landmark_rows_count;
 } supine_patient_matching;
 
-/* The frame of a surface: its lungs' box and midline. */
-supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs);
-
 /* Sets up the vertices, at rest, with room for the rows of so many landmarks. Zeroed before; free
  * it even after a failure.
  * @param most  vertices at most that take part

@@ -12,9 +12,9 @@
 
 enum { P = SUPINE_PATIENT_POWERS, LINEAR_MAX = 9 };
 
-/* Exponents beyond these bend all motion into a face; slopes beyond let the force change sign. */
-const double supine_patient_exponent_least = 0.5, supine_patient_exponent_most = 4.0,
-             supine_patient_slope_most = 2.5;
+/* Bounds of c2, c4, c6 and of c7, c8, c9. Exponents beyond these bend all motion into a face;
+ * slopes beyond let the force change sign. */
+static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
 /* Pulls what the data leave open (mm^2 for a factor of e) towards a common exponent and an even
  * force; what they do say outweighs it by orders of magnitude. */
@@ -30,8 +30,8 @@ const double supine_patient_starts[SUPINE_PATIENT_STARTS][P] = {
     {1.1, 3.1, 0.6, -0.8, 0.7, 0.35}, {0.5, 0.8, 3.6, 0.7, -0.2, -0.8}};
 
 static void range_of(size_t k, double range[2]) {
-  range[0] = k < 3 ? supine_patient_exponent_least : -supine_patient_slope_most;
-  range[1] = k < 3 ? supine_patient_exponent_most : supine_patient_slope_most;
+  range[0] = k < 3 ? exponent_least : -slope_most;
+  range[1] = k < 3 ? exponent_most : slope_most;
 }
 
 /* Unbounded variables for bounded ones: middle + half sin(q), which does not go flat far from the

@@ -47,10 +47,6 @@ typedef struct supine_patient_power {
   bool at_bound[SUPINE_PATIENT_POWERS];
 } supine_patient_power;
 
-/* Bounds of c2, c4, c6 and of c7, c8, c9. */
-extern const double supine_patient_exponent_least, supine_patient_exponent_most,
-    supine_patient_slope_most;
-
 /* The six starts. */
 extern const double supine_patient_starts[SUPINE_PATIENT_STARTS][SUPINE_PATIENT_POWERS];
 

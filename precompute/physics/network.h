@@ -30,8 +30,4 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 /* D(mass, spring) of an edge of the given length, mm. */
 double supine_physics_link_distance(const double *first, const double *second);
 
-/* Gives the links and masses the weights of a spreading length in mm, and coarsens the graph. */
-supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
-                                               const supine_topology *topology, double reach);
-
 #endif

@@ -41,15 +41,17 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 0.5 * sqrt(square);
 }
 
-/* The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
+/* Give the links and masses the weights of a spreading length in mm, and coarsen the graph.
+ *
+ * The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
  * surface, where area_i is
  * the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with link coefficients c that
  * make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a link's own area a (a third
  * of its triangles') and length h, c = 2 a / h^2 does so for links that run in all directions
  * alike; unlike cotangents it is never negative, whatever the triangles, at the price of R^2 within
  * a tenth or so. */
-supine_status supine_physics_network_set_reach(supine_network *network, const supine_mesh *mesh,
-                                               const supine_topology *topology, double reach) {
+static supine_status set_reach(supine_network *network, const supine_mesh *mesh,
+                               const supine_topology *topology, double reach) {
   const size_t n = network->vertex_count;
   double *area = malloc(n * sizeof *area);
   const size_t links = network->links.begin[n];
@@ -110,8 +112,7 @@ supine_status supine_physics_model_network(const supine_lungs *lungs, const supi
       const double half = 0.5 * (lungs->maximum[k] - lungs->minimum[k]);
       square += half * half;
     }
-    status = supine_physics_network_set_reach(made, &lungs->mesh, &lungs->topology,
-                                              fmin(model->reach, sqrt(square)));
+    status = set_reach(made, &lungs->mesh, &lungs->topology, fmin(model->reach, sqrt(square)));
   }
   if (status == SUPINE_OK && model->lesions != NULL) {
     made->lesions = malloc(made->vertex_count * sizeof *made->lesions);

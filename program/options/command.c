@@ -14,7 +14,8 @@
 #include "program/options/command.h"
 #include "runtime/words.h"
 
-int supine_options_exit_code(supine_status status) {
+/* Return the exit code that a status ends the program with. */
+static int exit_code(supine_status status) {
   switch (status) {
   case SUPINE_OK:
     return SUPINE_EXIT_OK;
@@ -53,8 +54,7 @@ void supine_options_say(const char *command, const char *format, ...) {
 
 int supine_options_fail(const char *command, const supine_error *error) {
   supine_options_say(command, "%s", error->message);
-  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL
-                                    : supine_options_exit_code(error->status);
+  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL : exit_code(error->status);
 }
 
 int supine_options_usage(const char *command, const char *format, ...) {

@@ -30,9 +30,6 @@ extern const supine_command supine_command_phantom, supine_command_precompute, s
 /* The same, ended by NULL. */
 extern const supine_command *const supine_command_list[];
 
-/* The exit code that a status ends the program with. */
-int supine_options_exit_code(supine_status status);
-
 /* Prints "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 

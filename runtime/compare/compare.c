@@ -137,7 +137,8 @@ double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-double supine_compare_product(const double *gram, const double *q, const double *p, size_t count) {
+/* Compute q^T G p of K weights each. */
+static double product(const double *gram, const double *q, const double *p, size_t count) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
     double row = 0;
@@ -163,8 +164,7 @@ double supine_compare_square(const supine_compare *compare, const double *q) {
   const size_t count = compare->basis->info.mode_count;
   double square = 0;
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
-    square += supine_compare_product(compare->gram + i * count * count, q + i * count,
-                                     q + i * count, count);
+    square += product(compare->gram + i * count * count, q + i * count, q + i * count, count);
   }
   return square;
 }
@@ -205,7 +205,7 @@ void supine_compare_energy(const supine_compare *compare, double *energy) {
       for (size_t k = 0; k < count; ++k) {
         column[k] = compare->basis->info.modes[k * terms + term];
       }
-      energy[l] += supine_compare_product(compare->sum, column, column, count) / four_pi;
+      energy[l] += product(compare->sum, column, column, count) / four_pi;
     }
   }
 }

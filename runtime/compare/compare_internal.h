@@ -23,7 +23,4 @@ double supine_compare_square(const supine_compare *compare, const double *q);
 void supine_compare_state(const supine_compare *compare, const supine_pose *pose,
                           const supine_pose *from, double *q);
 
-/** q^T G p of K weights each. */
-double supine_compare_product(const double *gram, const double *q, const double *p, size_t count);
-
 #endif

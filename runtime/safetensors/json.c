@@ -159,7 +159,8 @@ char *supine_safetensors_json_string(json_cursor *cursor) {
   return NULL;
 }
 
-bool supine_safetensors_json_count(json_cursor *cursor, size_t *value) {
+/* Take a non-negative integer, written without sign, fraction, exponent or leading zeros. */
+static bool read_count(json_cursor *cursor, size_t *value) {
   json_skip(cursor);
   const char *const begin = cursor->at;
   size_t number = 0;
@@ -185,7 +186,7 @@ bool supine_safetensors_json_counts(json_cursor *cursor, size_t *values, size_t 
     return true;
   }
   do {
-    if (*count == capacity || !supine_safetensors_json_count(cursor, &values[*count])) {
+    if (*count == capacity || !read_count(cursor, &values[*count])) {
       return false;
     }
     ++*count;

@@ -23,9 +23,6 @@ bool supine_safetensors_json_at_end(json_cursor *cursor);
  * it holds a control character, a NUL, a bad escape or bytes that are not UTF-8. */
 char *supine_safetensors_json_string(json_cursor *cursor);
 
-/** Takes a non-negative integer, written without sign, fraction, exponent or leading zeros. */
-bool supine_safetensors_json_count(json_cursor *cursor, size_t *value);
-
 /** Takes an array of at most `capacity` counts. */
 bool supine_safetensors_json_counts(json_cursor *cursor, size_t *values, size_t capacity,
                                     size_t *count);
