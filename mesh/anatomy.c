@@ -28,7 +28,8 @@ static const double thin = 0.85;
  * distribution (kurtosis 1.8). */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-static const double least_side = 0.12; /* hollow towards the heart, to tell a single lung's side */
+/* A single lung is called left or right where its concavity towards the heart is at least this. */
+static const double least_side = 0.12;
 
 typedef struct shape {
   double volume, centre[3], deviation[3], kurtosis[3];

@@ -9,7 +9,7 @@
 typedef struct supine_mesh_repair_report {
   size_t duplicates; /**< triangles dropped: an earlier one has the same corners */
   size_t loose;      /**< dropped: faces too many, none of whose edges has just two triangles */
-  size_t reversed;   /**< triangles turned: most of their surface faced the other way */
+  size_t reversed;   /**< triangles whose corners were reordered to face as most of their surface */
   size_t parted;     /**< vertices doubled, in which closed surfaces touched */
 } supine_mesh_repair_report;
 

@@ -17,7 +17,7 @@ typedef struct supine_basis_content {
   const supine_compression *compression;
   const supine_volume_forms *forms; /* of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
-  const supine_reference *reference; /* that volumes count from; NULL: the surface as it came */
+  const supine_reference *reference; /* full inflation; NULL: the scan is the reference */
   const double *resting;             /* [G, 9] with it: volumes at rest, harmonics, mL */
   const double *resting_total;       /* [9] their sum */
   const double *turned_over;         /* optional, see supine_accuracy_turned_over */

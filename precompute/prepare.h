@@ -15,7 +15,7 @@ enum { SUPINE_LESIONS_MAX = 64 };
 
 /** What is said of the model and of the scan. */
 typedef struct supine_model_choice {
-  int law;                 /**< a supine_law, or SUPINE_LAW_COUNT: by the scan */
+  int law;                 /**< a supine_law; SUPINE_LAW_COUNT: chosen by the scan's state */
   supine_model model;      /**< constants other than the law's; NAN: the law's */
   const char *own;         /**< whose the model is, all its constants said; NULL: a law's */
   const double *stiffness; /**< [N] E, with `own`; or NULL */

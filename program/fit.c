@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine fit: a person's own law, from that person's scans and landmarks. */
+/* supine fit: fit a law to one person's scans and landmarks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@
 
 static const char name[] = "fit";
 
-/* Two scans of the person, or landmarks in them, and how each was taken. */
+/* The options: two scans or their landmarks, and the posture and volume of each. */
 typedef struct request {
   const char *path, *name;
   supine_landmark_options landmarks;

@@ -28,7 +28,7 @@ enum {
 
 typedef struct supine_kriging_model {
   double sill;   /**< s, mm: 3-D variance of g for each mm of displacement */
-  double length; /**< mm */
+  double length; /**< correlation length of g, mm */
   double across; /**< correlation of two lungs, 0 to 1 */
   double least;  /**< |u| counts as this much at least, mm */
 } supine_kriging_model;

@@ -154,7 +154,7 @@ static void test_gate_any_other_axes_named(void **state) {
   }
 }
 
-/* The option that mends it takes account of the axes that the file was read in. */
+/* The message proposes axes for the file, not for the coordinates after a wrong --axes. */
 static void test_gate_axes_given_wrongly_right_ones_named(void **state) {
   (void)state;
   supine_mesh mesh = phantom();

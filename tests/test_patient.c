@@ -557,7 +557,7 @@ static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) 
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The deep law's own comes back from its form of nine constants. */
+  /* Written as nine constants, the deep law keeps its force: base 0.9 and -0.2 along y. */
   supine_patient other = patient;
   const supine_patient_power shape = supine_patient_deep(postures[0]);
   memcpy(other.powers, shape.powers, sizeof other.powers);

@@ -238,7 +238,7 @@ static void test_compare_csv_has_six_fields_a_row(void **state) {
   char *text = read_file("rows.csv", &size);
   size_t rows = 0;
   for (char *line = strtok(text, "\n"); line != NULL; line = strtok(NULL, "\n")) {
-    if (line[0] == '#') { /* what displacements count from */
+    if (line[0] == '#') { /* names the reference state of the displacements */
       assert_non_null(strstr(line, "displacement from supine at rest"));
       continue;
     }

@@ -186,7 +186,7 @@ static bool take_blocks(const vtp_file *v, const char *at, bool raw, size_t want
   return good;
 }
 
-/* The bytes of an array of `count` numbers of `each` bytes, of binary or appended format. */
+/* Read an array of `count` numbers of `each` bytes, in binary or appended format, into `out`. */
 static bool take_binary(const vtp_file *v, const element *e, size_t count, size_t each,
                         array *out) {
   char text[64];

@@ -18,8 +18,8 @@ typedef struct supine_patient_other {
 } supine_patient_other;
 
 typedef struct supine_patient_gain {
-  bool told; /**< some state is in another posture than the fitted one */
-  bool open; /**< it ended at a bound: the states do not determine it, and the gain stays */
+  bool told; /**< a state in another posture was given, so the gain was fitted */
+  bool open; /**< the fit ended at a bound: the states do not determine the gain, which stays */
   double gain;
   double error; /**< its standard error, by leaving each block of 40 mm out (jackknife) */
 } supine_patient_gain;

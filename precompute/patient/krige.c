@@ -225,7 +225,7 @@ double supine_patient_krige_predict(const supine_patient_krige *krige,
   return value;
 }
 
-/* Adds a row's weight to the centre at its place, the last one or a new one. */
+/* Add a row's weight to the last centre where the positions agree, else to a new centre. */
 static void add_centre(const supine_patient_krige *k, size_t i, supine_patient *patient) {
   supine_patient_correction *c = &patient->correction;
   const supine_patient_frame *frame = &patient->frame;

@@ -24,9 +24,9 @@ typedef struct supine_force_law {
                       midline make, so that it moves as beside its fellow; false: its own */
 } supine_force_law;
 
-/** min and max over the vertices of g.p for `count` directions [count, 3] into minimum [count] and
- * maximum [count], mm. Uses all cores.
- * @param pair  of a lung alone, those of the pair (supine_force_law)
+/** Find the smallest and largest g.p over all vertices, in mm, for each of `count` directions g
+ * [count, 3], into minimum [count] and maximum [count]. Uses all cores.
+ * @param pair  true: where one lung stands alone, of it and its mirror image (supine_force_law)
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
                                           const double *directions, double *minimum,

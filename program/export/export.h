@@ -111,7 +111,7 @@ enum { EXPORT_PAGE_MODES_MAX = 16 };
 /** What a page shows beside the lungs. */
 typedef struct export_page {
   export_breath breath;
-  const supine_pose *from; /**< what displacements count from */
+  const supine_pose *from; /**< displacements are measured from this pose */
   const char *from_name;   /**< "supine at rest" */
   const char *title;
   const export_source

@@ -33,7 +33,7 @@ typedef struct supine_comparison {
   supine_from from;
   double breath; /* mL, on top of the volume */
   supine_posture_list postures;
-  supine_reference_pose reference; /* what displacements count from */
+  supine_reference_pose reference; /* displacements are measured from this pose */
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
   supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
