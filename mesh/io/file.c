@@ -7,8 +7,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include <assimp/cimport.h>
-
 #include "mesh/io/read.h"
 
 enum { HEAD_SIZE = 4096 };
@@ -40,7 +38,7 @@ static bool format_of_ending(const char *ending, mesh_format *format) {
     }
   }
   *format = MESH_FORMAT_OTHER;
-  return *ending != '\0' && aiIsExtensionSupported(ending) == AI_TRUE;
+  return *ending != '\0' && supine_mesh_import_knows(ending);
 }
 
 /* Names without a known ending are read where the first word leaves no doubt. */

@@ -17,6 +17,20 @@
 #include <assimp/scene.h>
 
 #include "mesh/io/read.h"
+#include "sh/base/library.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(ai, CreatePropertyStore) EACH(ai, SetImportPropertyInteger) EACH(ai, ReleasePropertyStore)  \
+  EACH(ai, ImportFileExWithProperties) EACH(ai, ImportFileFromMemoryWithProperties)                \
+  EACH(ai, GetErrorString) EACH(ai, IsExtensionSupported) EACH(ai, IdentityMatrix4)                \
+  EACH(ai, MultiplyMatrix4) EACH(ai, Matrix4Determinant)
+/* clang-format on */
+
+/* assimp, which takes longer to load than most commands run. */
+typedef struct assimp {
+  FUNCTIONS(SUPINE_LIBRARY_MEMBER)
+} assimp;
 
 /* What an importer may take: far beyond what it needs for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
@@ -29,6 +43,7 @@ typedef struct outcome {
 
 /* In the child: the scene's surface, node by node. */
 typedef struct sink {
+  assimp ai;
   const char *path;
   FILE *vertices;
   FILE *triangles;
@@ -53,17 +68,17 @@ static supine_status import_fail(const char *path, const char *words, supine_err
 }
 
 /* The bytes that a guard has seen; a path where none has. */
-static const struct aiScene *import(const mesh_file *file) {
+static const struct aiScene *import(const assimp *ai, const mesh_file *file) {
   const unsigned steps = aiProcess_Triangulate;
-  struct aiPropertyStore *properties = aiCreatePropertyStore();
+  struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Else importers make up a surface for files that hold bones alone. */
-  aiSetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
+  ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
   const struct aiScene *scene =
       file->format == MESH_FORMAT_OTHER
-          ? aiImportFileExWithProperties(file->path, steps, NULL, properties)
-          : aiImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
-                                                 steps, "obj", properties);
-  aiReleasePropertyStore(properties);
+          ? ai->ImportFileExWithProperties(file->path, steps, NULL, properties)
+          : ai->ImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
+                                                   steps, "obj", properties);
+  ai->ReleasePropertyStore(properties);
   return scene;
 }
 
@@ -107,8 +122,8 @@ static bool put_triangles(const struct aiMesh *part, bool mirrored, sink *out) {
 static bool put_node(const struct aiScene *scene, const struct aiNode *node,
                      const struct aiMatrix4x4 *above, sink *out) {
   struct aiMatrix4x4 to = *above;
-  aiMultiplyMatrix4(&to, &node->mTransformation);
-  const bool mirrored = aiMatrix4Determinant(&to) < 0.0F;
+  out->ai.MultiplyMatrix4(&to, &node->mTransformation);
+  const bool mirrored = out->ai.Matrix4Determinant(&to) < 0.0F;
   bool good = true;
   for (unsigned m = 0; good && m < node->mNumMeshes; ++m) {
     const struct aiMesh *part = scene->mMeshes[node->mMeshes[m]];
@@ -147,13 +162,16 @@ static _Noreturn void be_child(const mesh_file *file, const int streams[2], size
               .vertices = fdopen(streams[0], "wb"),
               .triangles = fdopen(streams[1], "wb"),
               .outcome = left};
-  const struct aiScene *scene = import(file);
+  if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &left->error) != SUPINE_OK) {
+    _exit(0);
+  }
+  const struct aiScene *scene = import(&out.ai, file);
   if (scene == NULL) {
-    (void)import_fail(file->path, aiGetErrorString(), &left->error);
+    (void)import_fail(file->path, out.ai.GetErrorString(), &left->error);
     _exit(0);
   }
   struct aiMatrix4x4 identity;
-  aiIdentityMatrix4(&identity);
+  out.ai.IdentityMatrix4(&identity);
   if (out.vertices != NULL && out.triangles != NULL &&
       (scene->mRootNode == NULL || put_node(scene, scene->mRootNode, &identity, &out)) &&
       fclose(out.vertices) == 0 && fclose(out.triangles) == 0) {
@@ -223,4 +241,10 @@ cleanup:
     }
   }
   return status;
+}
+
+bool supine_mesh_import_knows(const char *ending) {
+  assimp ai;
+  return SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &ai, NULL) == SUPINE_OK &&
+         ai.IsExtensionSupported(ending) == AI_TRUE;
 }

@@ -95,6 +95,8 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error);
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error);
+/** Has assimp, where it is installed, an importer for this ending? */
+bool supine_mesh_import_knows(const char *ending);
 
 /* ---- guard_*.c: what importers stumble over ---- */
 

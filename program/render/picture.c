@@ -7,6 +7,28 @@
 #include <cairo.h>
 
 #include "program/render/render.h"
+#include "sh/base/library.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(cairo_, arc) EACH(cairo_, close_path) EACH(cairo_, create) EACH(cairo_, destroy)            \
+  EACH(cairo_, fill) EACH(cairo_, fill_preserve) EACH(cairo_, image_surface_create)                \
+  EACH(cairo_, image_surface_create_for_data) EACH(cairo_, image_surface_get_data)                 \
+  EACH(cairo_, image_surface_get_stride) EACH(cairo_, line_to) EACH(cairo_, move_to)               \
+  EACH(cairo_, new_path) EACH(cairo_, new_sub_path) EACH(cairo_, paint)                            \
+  EACH(cairo_, paint_with_alpha) EACH(cairo_, pattern_add_color_stop_rgb)                          \
+  EACH(cairo_, pattern_create_linear) EACH(cairo_, pattern_destroy) EACH(cairo_, rectangle)        \
+  EACH(cairo_, select_font_face) EACH(cairo_, set_font_size) EACH(cairo_, set_line_width)          \
+  EACH(cairo_, set_source) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)              \
+  EACH(cairo_, set_source_surface) EACH(cairo_, show_text) EACH(cairo_, status)                    \
+  EACH(cairo_, status_to_string) EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)                \
+  EACH(cairo_, surface_destroy) EACH(cairo_, surface_flush) EACH(cairo_, surface_mark_dirty)       \
+  EACH(cairo_, surface_status) EACH(cairo_, surface_write_to_png_stream)                           \
+  EACH(cairo_, text_extents) EACH(cairo_, text_path)
+/* clang-format on */
+
+/* cairo, which brings the X11 libraries. */
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
@@ -48,25 +70,25 @@ typedef struct bar_scale {
 } bar_scale;
 
 static void colour(cairo_t *cr, const double rgb[3]) {
-  cairo_set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
+  cairo.set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
 }
 
 static void font(cairo_t *cr, double size, bool bold) {
-  cairo_select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+  cairo.select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
                          bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-  cairo_set_font_size(cr, size);
+  cairo.set_font_size(cr, size);
 }
 
 static double text_width(cairo_t *cr, const char *text) {
   cairo_text_extents_t extents;
-  cairo_text_extents(cr, text, &extents);
+  cairo.text_extents(cr, text, &extents);
   return extents.x_advance;
 }
 
 /* Text whose left end, middle or right end (align 0, 0.5, 1) is at x. */
 static void text(cairo_t *cr, double x, double y, double align, const char *words) {
-  cairo_move_to(cr, x - align * text_width(cr, words), y);
-  cairo_show_text(cr, words);
+  cairo.move_to(cr, x - align * text_width(cr, words), y);
+  cairo.show_text(cr, words);
 }
 
 /* The same, made smaller where it is wider than `room`. */
@@ -81,44 +103,44 @@ static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold,
 }
 
 static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
-  cairo_new_sub_path(cr);
-  cairo_arc(cr, x + width - radius, y + radius, radius, -pi / 2, 0);
-  cairo_arc(cr, x + width - radius, y + height - radius, radius, 0, pi / 2);
-  cairo_arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
-  cairo_arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
-  cairo_close_path(cr);
+  cairo.new_sub_path(cr);
+  cairo.arc(cr, x + width - radius, y + radius, radius, -pi / 2, 0);
+  cairo.arc(cr, x + width - radius, y + height - radius, radius, 0, pi / 2);
+  cairo.arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
+  cairo.arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
+  cairo.close_path(cr);
 }
 
 static void ground(cairo_t *cr, const supine_picture *picture, const theme *look) {
-  cairo_pattern_t *fade = cairo_pattern_create_linear(0, 0, 0, (double)picture->height);
-  cairo_pattern_add_color_stop_rgb(fade, 0, look->top[0], look->top[1], look->top[2]);
-  cairo_pattern_add_color_stop_rgb(fade, 1, look->bottom[0], look->bottom[1], look->bottom[2]);
-  cairo_set_source(cr, fade);
-  cairo_paint(cr);
-  cairo_pattern_destroy(fade);
+  cairo_pattern_t *fade = cairo.pattern_create_linear(0, 0, 0, (double)picture->height);
+  cairo.pattern_add_color_stop_rgb(fade, 0, look->top[0], look->top[1], look->top[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 1, look->bottom[0], look->bottom[1], look->bottom[2]);
+  cairo.set_source(cr, fade);
+  cairo.paint(cr);
+  cairo.pattern_destroy(fade);
 }
 
 /* An arrow from the centre of the ball; towards or away from the viewer: a dot or a cross. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
-  cairo_new_path(cr);
+  cairo.new_path(cr);
   colour(cr, accent);
-  cairo_set_line_width(cr, radius * 0.13);
+  cairo.set_line_width(cr, radius * 0.13);
   if (flat < 0.35) {
     const double r = radius * 0.3;
-    cairo_arc(cr, x, y, r, 0, 2 * pi);
-    cairo_stroke(cr);
+    cairo.arc(cr, x, y, r, 0, 2 * pi);
+    cairo.stroke(cr);
     if (seen[2] > 0) {
-      cairo_arc(cr, x, y, r * 0.42, 0, 2 * pi);
-      cairo_fill(cr);
+      cairo.arc(cr, x, y, r * 0.42, 0, 2 * pi);
+      cairo.fill(cr);
       return;
     }
     const double d = r * 0.6;
-    cairo_move_to(cr, x - d, y - d);
-    cairo_line_to(cr, x + d, y + d);
-    cairo_move_to(cr, x - d, y + d);
-    cairo_line_to(cr, x + d, y - d);
-    cairo_stroke(cr);
+    cairo.move_to(cr, x - d, y - d);
+    cairo.line_to(cr, x + d, y + d);
+    cairo.move_to(cr, x - d, y + d);
+    cairo.line_to(cr, x + d, y - d);
+    cairo.stroke(cr);
     return;
   }
   const double dx = seen[0] / flat;
@@ -126,14 +148,14 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
   const double length = radius * fmax(flat, 0.55);
   const double head = radius * 0.42;
   const double neck = length - head;
-  cairo_move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
-  cairo_line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
-  cairo_stroke(cr);
-  cairo_move_to(cr, x + length * dx, y + length * dy);
-  cairo_line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
-  cairo_line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
-  cairo_close_path(cr);
-  cairo_fill(cr);
+  cairo.move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
+  cairo.line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
+  cairo.stroke(cr);
+  cairo.move_to(cr, x + length * dx, y + length * dy);
+  cairo.line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
+  cairo.line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
+  cairo.close_path(cr);
+  cairo.fill(cr);
 }
 
 /* The ball that says how the body lies to the viewer, and gravity to the body. */
@@ -143,12 +165,12 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   double axes[3][3];
   double seen[3] = {0, 0, 0};
   supine_render_view_axes(view, axes);
-  cairo_arc(cr, x, y, radius, 0, 2 * pi);
-  cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.13);
-  cairo_fill_preserve(cr);
-  cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.5);
-  cairo_set_line_width(cr, fmax(0.6, radius * 0.035));
-  cairo_stroke(cr);
+  cairo.arc(cr, x, y, radius, 0, 2 * pi);
+  cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.13);
+  cairo.fill_preserve(cr);
+  cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.5);
+  cairo.set_line_width(cr, fmax(0.6, radius * 0.035));
+  cairo.stroke(cr);
   font(cr, radius * 0.4, false);
   for (int axis = 0; axis < 3; ++axis) {
     const double dx = axes[0][axis];
@@ -159,13 +181,13 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
     if (hypot(dx, dy) < 0.3) {
       continue;
     }
-    cairo_set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.45);
-    cairo_move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
-    cairo_line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
-    cairo_stroke(cr);
+    cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.45);
+    cairo.move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
+    cairo.line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
+    cairo.stroke(cr);
     for (int end = 0; end < 2; ++end) {
       const double reach = (end == 0 ? 0.8 : -0.8) * radius;
-      cairo_set_source_rgba(cr, look->text[0], look->text[1], look->text[2], 0.8);
+      cairo.set_source_rgba(cr, look->text[0], look->text[1], look->text[2], 0.8);
       text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
     }
   }
@@ -192,25 +214,25 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
       }
       supine_render_colour(scene->colours, fmin(1, (double)mark->value / scene->largest), rgb);
       if (names == 0) {
-        cairo_new_path(cr);
-        cairo_arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
+        cairo.new_path(cr);
+        cairo.arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
         colour(cr, rgb);
-        cairo_fill_preserve(cr);
-        cairo_set_line_width(cr, size * 0.1);
+        cairo.fill_preserve(cr);
+        cairo.set_line_width(cr, size * 0.1);
         colour(cr, mark->point ? look->text : rgb);
-        cairo_stroke(cr);
+        cairo.stroke(cr);
         continue;
       }
       font(cr, size * 0.75, false);
       const double beside = at[0] + size * 0.5;
       const double room = (double)scene->width - text_width(cr, mark->label);
-      cairo_move_to(cr, x + fmax(0, fmin(beside, room)), y + at[1] - size * 0.3);
-      cairo_text_path(cr, mark->label);
-      cairo_set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
-      cairo_set_line_width(cr, size * 0.25);
-      cairo_stroke_preserve(cr);
+      cairo.move_to(cr, x + fmax(0, fmin(beside, room)), y + at[1] - size * 0.3);
+      cairo.text_path(cr, mark->label);
+      cairo.set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
+      cairo.set_line_width(cr, size * 0.25);
+      cairo.stroke_preserve(cr);
       colour(cr, look->text);
-      cairo_fill(cr);
+      cairo.fill(cr);
     }
   }
   free(pixel);
@@ -235,26 +257,26 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .extent = extent};
   supine_status status = SUPINE_ERROR_MEMORY;
   cairo_surface_t *image =
-      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene.width, (int)scene.height);
-  if (cairo_surface_status(image) != CAIRO_STATUS_SUCCESS ||
-      (size_t)cairo_image_surface_get_stride(image) != 4 * scene.width) {
+      cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene.width, (int)scene.height);
+  if (cairo.surface_status(image) != CAIRO_STATUS_SUCCESS ||
+      (size_t)cairo.image_surface_get_stride(image) != 4 * scene.width) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
-  cairo_surface_flush(image);
+  cairo.surface_flush(image);
   status = supine_render_draw(renderer, &scene,
-                              (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
+                              (uint32_t *)(void *)cairo.image_surface_get_data(image), error);
   if (status == SUPINE_OK) {
-    cairo_surface_mark_dirty(image);
-    cairo_set_source_surface(cr, image, floor(x), floor(y));
-    cairo_paint_with_alpha(cr, 1 - picture->transparency);
+    cairo.surface_mark_dirty(image);
+    cairo.set_source_surface(cr, image, floor(x), floor(y));
+    cairo.paint_with_alpha(cr, 1 - picture->transparency);
     if (panel->marks != NULL) {
       status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
                           &themes[picture->dark ? 1 : 0]);
     }
   }
 cleanup:
-  cairo_surface_destroy(image);
+  cairo.surface_destroy(image);
   return status;
 }
 
@@ -273,10 +295,10 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
   colour(cr, look->card);
-  cairo_fill_preserve(cr);
+  cairo.fill_preserve(cr);
   colour(cr, look->edge);
-  cairo_set_line_width(cr, 1);
-  cairo_stroke(cr);
+  cairo.set_line_width(cr, 1);
+  cairo.stroke(cr);
   ball(cr, x + radius + at->font * 0.7, y + at->strip / 2 + at->font * 0.2, radius, view,
        panel->gravity, look);
   colour(cr, look->text);
@@ -300,33 +322,33 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   const double x = ((double)picture->width - width) / 2;
   const double y = (double)picture->height - at->bar + at->font * 1.65;
   const double height = at->font * 0.8;
-  cairo_pattern_t *fade = cairo_pattern_create_linear(x, 0, x + width, 0);
+  cairo_pattern_t *fade = cairo.pattern_create_linear(x, 0, x + width, 0);
   for (int i = 0; i <= STOPS; ++i) {
     double rgb[3];
     supine_render_colour(picture->colours, i / (double)STOPS, rgb);
-    cairo_pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
+    cairo.pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
   }
-  cairo_rectangle(cr, x, y, width, height);
+  cairo.rectangle(cr, x, y, width, height);
   if (picture->beyond) {
-    cairo_move_to(cr, x + width, y);
-    cairo_line_to(cr, x + width + 0.9 * height, y + height / 2);
-    cairo_line_to(cr, x + width, y + height);
+    cairo.move_to(cr, x + width, y);
+    cairo.line_to(cr, x + width + 0.9 * height, y + height / 2);
+    cairo.line_to(cr, x + width, y + height);
   }
-  cairo_set_source(cr, fade);
-  cairo_fill(cr);
-  cairo_pattern_destroy(fade);
+  cairo.set_source(cr, fade);
+  cairo.fill(cr);
+  cairo.pattern_destroy(fade);
   font(cr, at->font * 0.85, false);
   colour(cr, look->text);
   text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
   colour(cr, look->faint);
-  cairo_set_line_width(cr, 1);
+  cairo.set_line_width(cr, 1);
   for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
     char number[32];
     const double tick = x + width * i * bar->step / bar->largest;
     (void)snprintf(number, sizeof number, "%g", i * bar->step);
-    cairo_move_to(cr, tick, y + height + at->font * 0.15);
-    cairo_line_to(cr, tick, y + height + at->font * 0.4);
-    cairo_stroke(cr);
+    cairo.move_to(cr, tick, y + height + at->font * 0.15);
+    cairo.line_to(cr, tick, y + height + at->font * 0.4);
+    cairo.stroke(cr);
     text(cr, tick, y + height + at->font * 1.3, 0.5, number);
   }
 }
@@ -406,21 +428,22 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
-  cairo_t *cr = cairo_create(surface);
-  if (cairo_status(cr) == CAIRO_STATUS_SUCCESS) {
+  cairo_t *cr = cairo.create(surface);
+  if (cairo.status(cr) == CAIRO_STATUS_SUCCESS) {
     status = compose(cr, renderer, picture, error);
-    cairo_surface_flush(surface);
+    cairo.surface_flush(surface);
   } else {
     (void)supine_error_set(error, status, "out of memory");
   }
-  cairo_destroy(cr);
+  cairo.destroy(cr);
   return status;
 }
 
-static supine_status check_size(const supine_picture *picture, supine_error *error) {
+/* Check the size and load cairo. */
+static supine_status begin(const supine_picture *picture, supine_error *error) {
   enum { SIZE_MAX_CAIRO = 32767 };
   return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
-             ? SUPINE_OK
+             ? SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error)
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "a picture has at most %d x %d pixels", SIZE_MAX_CAIRO,
                                 SIZE_MAX_CAIRO);
@@ -428,35 +451,35 @@ static supine_status check_size(const supine_picture *picture, supine_error *err
 
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
-  supine_status status = check_size(picture, error);
+  supine_status status = begin(picture, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  cairo_surface_t *surface = cairo_image_surface_create_for_data(
+  cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
   status = draw_on(surface, renderer, picture, error);
-  cairo_surface_destroy(surface);
+  cairo.surface_destroy(surface);
   return status;
 }
 
 supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
                                           FILE *file, supine_error *error) {
-  supine_status status = check_size(picture, error);
+  supine_status status = begin(picture, error);
   if (status != SUPINE_OK) {
     return status;
   }
   cairo_surface_t *surface =
-      cairo_image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
+      cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
   status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
-    const cairo_status_t written = cairo_surface_write_to_png_stream(surface, to_file, file);
+    const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
     if (written != CAIRO_STATUS_SUCCESS) {
       status =
-          supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s", cairo_status_to_string(written));
+          supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s", cairo.status_to_string(written));
     }
   }
-  cairo_surface_destroy(surface);
+  cairo.surface_destroy(surface);
   return status;
 }
 
@@ -485,23 +508,27 @@ static cairo_status_t to_buffer(void *closure, const unsigned char *bytes, unsig
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
                                 unsigned char **bytes, size_t *size, supine_error *error) {
   buffer out = {NULL, 0, 0};
-  supine_status status = SUPINE_ERROR_MEMORY;
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  status = SUPINE_ERROR_MEMORY;
   cairo_surface_t *image =
-      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
-  if (cairo_surface_status(image) == CAIRO_STATUS_SUCCESS &&
-      (size_t)cairo_image_surface_get_stride(image) == 4 * scene->width) {
-    cairo_surface_flush(image);
+      cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
+  if (cairo.surface_status(image) == CAIRO_STATUS_SUCCESS &&
+      (size_t)cairo.image_surface_get_stride(image) == 4 * scene->width) {
+    cairo.surface_flush(image);
     status = supine_render_draw(renderer, scene,
-                                (uint32_t *)(void *)cairo_image_surface_get_data(image), error);
-    cairo_surface_mark_dirty(image);
+                                (uint32_t *)(void *)cairo.image_surface_get_data(image), error);
+    cairo.surface_mark_dirty(image);
   } else {
     (void)supine_error_set(error, status, "out of memory");
   }
   if (status == SUPINE_OK &&
-      cairo_surface_write_to_png_stream(image, to_buffer, &out) != CAIRO_STATUS_SUCCESS) {
+      cairo.surface_write_to_png_stream(image, to_buffer, &out) != CAIRO_STATUS_SUCCESS) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  cairo_surface_destroy(image);
+  cairo.surface_destroy(image);
   if (status != SUPINE_OK) {
     free(out.bytes);
     return status;

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Pictures of deformed lungs: drawn off screen by OpenGL ES 3, composed by cairo. Not part of the
- * run-time library. Where the build has no EGL or cairo, everything here answers
- * SUPINE_ERROR_UNSUPPORTED. */
+ * run-time library. Where cairo is not installed, pictures answer SUPINE_ERROR_UNSUPPORTED. */
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 

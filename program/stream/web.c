@@ -12,6 +12,22 @@
 
 #include "program/stream/web.h"
 #include "sh/base/clock.h"
+#include "sh/base/library.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(lws_, add_http_common_headers) EACH(lws_, callback_http_dummy)                              \
+  EACH(lws_, callback_on_writable) EACH(lws_, callback_on_writable_all_protocol)                   \
+  EACH(lws_, cancel_service) EACH(lws_, context_destroy) EACH(lws_, context_user)                  \
+  EACH(lws_, create_context) EACH(lws_, finalize_write_http_header) EACH(lws_, get_context)        \
+  EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name) EACH(lws_, get_vhost_listen_port)         \
+  EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length) EACH(lws_, http_transaction_completed)         \
+  EACH(lws_, is_final_fragment) EACH(lws_, is_first_fragment) EACH(lws_, return_http_status)       \
+  EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, write)
+/* clang-format on */
+
+/* libwebsockets, which brings OpenSSL and three event loops. */
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
 enum { TEXT = 256, HEARD = 512, CHUNK = 65536 };
 
@@ -39,7 +55,7 @@ typedef struct session {
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
-  return lws_context_user(lws_get_context(wsi));
+  return lws.context_user(lws.get_context(wsi));
 }
 
 /* A browser says whose page opened the socket: only ours may. Programs that are no browsers do not
@@ -47,11 +63,11 @@ static supine_stream_web *web_of(struct lws *wsi) {
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0) {
+  if (lws.hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0) {
     return true;
   }
-  if (lws_hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) < 0 ||
-      lws_hdr_copy(wsi, host, sizeof host, WSI_TOKEN_HOST) < 0) {
+  if (lws.hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) < 0 ||
+      lws.hdr_copy(wsi, host, sizeof host, WSI_TOKEN_HOST) < 0) {
     return false;
   }
   const char *from = strstr(origin, "://");
@@ -93,7 +109,7 @@ static int tell(supine_stream_web *web, struct lws *wsi, session *s) {
     return 0;
   }
   s->told = told;
-  return lws_write(wsi, bytes + LWS_PRE, size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
+  return lws.write(wsi, bytes + LWS_PRE, size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
 }
 
 static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
@@ -109,7 +125,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     }
     s->counted = true;
     (void)atomic_fetch_add(&web->viewers, 1);
-    (void)lws_callback_on_writable(wsi);
+    (void)lws.callback_on_writable(wsi);
     return 0;
   case LWS_CALLBACK_CLOSED:
     if (s->counted) {
@@ -117,12 +133,12 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     }
     return 0;
   case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* by supine_stream_web_tell */
-    (void)lws_callback_on_writable_all_protocol(web->context, lws_get_protocol(wsi));
+    (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
     return tell(web, wsi, s);
   case LWS_CALLBACK_RECEIVE: /* longer ones come in pieces, and are none of ours */
-    if (lws_is_first_fragment(wsi) != 0 && lws_is_final_fragment(wsi) != 0) {
+    if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
       hear(web, in, size);
     }
     return 0;
@@ -136,18 +152,18 @@ static int begin_page(supine_stream_web *web, struct lws *wsi, const char *path,
   unsigned char *at = bytes + LWS_PRE;
   unsigned char *end = bytes + sizeof bytes - 1;
   if (strcmp(path, "/") != 0) {
-    return lws_return_http_status(wsi, HTTP_STATUS_NOT_FOUND, NULL) != 0 ||
-                   lws_http_transaction_completed(wsi) != 0
+    return lws.return_http_status(wsi, HTTP_STATUS_NOT_FOUND, NULL) != 0 ||
+                   lws.http_transaction_completed(wsi) != 0
                ? -1
                : 0;
   }
   s->sent = 0;
-  if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8",
+  if (lws.add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8",
                                   web->site.page_size, &at, end) != 0 ||
-      lws_finalize_write_http_header(wsi, bytes + LWS_PRE, &at, end) != 0) {
+      lws.finalize_write_http_header(wsi, bytes + LWS_PRE, &at, end) != 0) {
     return -1;
   }
-  (void)lws_callback_on_writable(wsi);
+  (void)lws.callback_on_writable(wsi);
   return 0;
 }
 
@@ -158,13 +174,13 @@ static int continue_page(supine_stream_web *web, struct lws *wsi, session *s) {
   memcpy(bytes + LWS_PRE, (const unsigned char *)web->site.page + s->sent, size);
   s->sent += size;
   const bool last = size == left;
-  if (lws_write(wsi, bytes + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) {
+  if (lws.write(wsi, bytes + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) {
     return -1;
   }
   if (last) {
-    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+    return lws.http_transaction_completed(wsi) != 0 ? -1 : 0;
   }
-  (void)lws_callback_on_writable(wsi);
+  (void)lws.callback_on_writable(wsi);
   return 0;
 }
 
@@ -176,7 +192,7 @@ static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, 
   case LWS_CALLBACK_HTTP_WRITEABLE:
     return continue_page(web_of(wsi), wsi, user);
   default:
-    return lws_callback_http_dummy(wsi, reason, user, in, size);
+    return lws.callback_http_dummy(wsi, reason, user, in, size);
   }
 }
 
@@ -187,13 +203,17 @@ static const struct lws_protocols protocols[] = {
 
 static void *run(void *context) {
   supine_stream_web *web = context;
-  while (!atomic_load(&web->ending) && lws_service(web->context, 0) >= 0) {
+  while (!atomic_load(&web->ending) && lws.service(web->context, 0) >= 0) {
   }
   return NULL;
 }
 
 supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error) {
+  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_WEBSOCKETS, FUNCTIONS, &lws, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   supine_stream_web *w = calloc(1, sizeof *w);
   if (w == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
@@ -201,7 +221,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);
   w->event = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  lws_set_log_level(0, NULL);
+  lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
   info.iface = site->address != NULL ? site->address : "127.0.0.1";
@@ -220,9 +240,9 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
     info.ssl_private_key_filepath = site->key;
     info.alpn = "http/1.1";
   }
-  w->context = w->event < 0 ? NULL : lws_create_context(&info);
-  struct lws_vhost *host = w->context == NULL ? NULL : lws_get_vhost_by_name(w->context, "default");
-  w->port = host == NULL ? 0 : lws_get_vhost_listen_port(host);
+  w->context = w->event < 0 ? NULL : lws.create_context(&info);
+  struct lws_vhost *host = w->context == NULL ? NULL : lws.get_vhost_by_name(w->context, "default");
+  w->port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
   w->running = w->port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
   if (!w->running) {
     supine_stream_web_destroy(w);
@@ -241,11 +261,11 @@ void supine_stream_web_destroy(supine_stream_web *web) {
   }
   atomic_store(&web->ending, true);
   if (web->running) {
-    lws_cancel_service(web->context);
+    lws.cancel_service(web->context);
     (void)pthread_join(web->thread, NULL);
   }
   if (web->context != NULL) {
-    lws_context_destroy(web->context);
+    lws.context_destroy(web->context);
   }
   if (web->event >= 0) {
     (void)close(web->event);
@@ -282,7 +302,7 @@ void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *
   ++web->told;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {
-    lws_cancel_service(web->context);
+    lws.cancel_service(web->context);
   }
 }
 

@@ -26,7 +26,7 @@ typedef struct supine_stream_site {
 } supine_stream_site;
 
 /** Opens it.
- * @retval SUPINE_ERROR_UNSUPPORTED  a build without libwebsockets
+ * @retval SUPINE_ERROR_UNSUPPORTED  libwebsockets is not installed
  * @retval SUPINE_ERROR_WRITE        the port is taken, or the certificate is no good
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * Shared libraries that few commands need, loaded at their first use: as dependencies they would
+ * delay every command. Name the functions once,
+ *
+ *     #define FUNCTIONS(EACH) EACH(cairo_, arc) EACH(cairo_, fill)
+ *     static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
+ *
+ * fill the struct with SUPINE_LIBRARY_LOAD, and call cairo.arc(...). */
+#ifndef SUPINE_BASE_LIBRARY_H
+#define SUPINE_BASE_LIBRARY_H
+
+#include <stddef.h>
+
+#include <supine/status.h>
+
+#define SUPINE_LIBRARY_MEMBER(prefix, function) __typeof__(prefix##function) *function;
+#define SUPINE_LIBRARY_NAME(prefix, function) #prefix #function,
+
+/** Load the functions of a list into a struct of its members. */
+#define SUPINE_LIBRARY_LOAD(library, LIST, members, error)                                         \
+  supine_library_load(library, (const char *const[]){LIST(SUPINE_LIBRARY_NAME) NULL}, members,     \
+                      error)
+
+/** Load functions of a shared library, which stays loaded until the process ends.
+ * @param library  its soname
+ * @param names    of the functions; NULL after the last
+ * @param members  pointers to functions, one for each name; written
+ * @retval SUPINE_ERROR_UNSUPPORTED  the library is not installed, or lacks a function */
+supine_status supine_library_load(const char *library, const char *const *names, void *members,
+                                  supine_error *error);
+
+#endif
