@@ -67,36 +67,6 @@ cleanup:
   return status;
 }
 
-/* The next even number whose prime factors are 2, 3 and 5. */
-static size_t next_smooth(size_t n) {
-  for (size_t even = n + n % 2;; even += 2) {
-    size_t rest = even;
-    for (size_t prime = 2; prime <= 5; ++prime) {
-      while (rest % prime == 0) {
-        rest /= prime;
-      }
-    }
-    if (rest == 1) {
-      return even;
-    }
-  }
-}
-
-supine_status supine_sh_grid_size(size_t band, double oversampling, size_t *latitudes,
-                                  size_t *longitudes) {
-  const double usual = 1.5;
-  const double factor = oversampling == 0 ? usual : oversampling;
-  /* 1e-9: a product that should be whole must not round up to the next */
-  const double rows = ceil(factor * ((double)band + 1) - 1e-9);
-  const double columns = ceil(fmax(1, factor / usual) * 2 * ((double)band + 1) - 1e-9);
-  if (!(factor >= 1) || !(rows <= SUPINE_SH_GRID_MAX) || !(columns <= SUPINE_SH_GRID_MAX)) {
-    return SUPINE_ERROR_ARGUMENT;
-  }
-  *latitudes = (size_t)rows;
-  *longitudes = next_smooth((size_t)columns);
-  return SUPINE_OK;
-}
-
 void supine_sh_grid_destroy(supine_sh_grid *grid) {
   if (grid != NULL) {
     free(grid->z);

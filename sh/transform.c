@@ -1,34 +1,41 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Making and destroying plans. */
+/* Fields on a grid of directions to coefficients: FFTW along longitude, Legendre functions along
+ * latitude. */
+#include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
+
+#include <fftw3.h>
+#include <gsl/gsl_sf_legendre.h>
 
 #include <supine/sh.h>
 
-#include "sh/internal.h"
+#include "sh/transform.h"
 
-/* Fields in a block: as measured. An odd number of lanes, so that the rows of a block do not fall
- * on the same few cache sets; the least where the rings alone would fill a cache. */
-static size_t block_width(size_t longitudes) {
-  return longitudes <= 256 ? SUPINE_SH_WIDTH_MAX : SUPINE_SH_LANES;
-}
+struct supine_sh_transform {
+  size_t band, fields;
+  const supine_sh_grid *grid;
+  double *legendre;       /* one latitude's, in GSL's order */
+  fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] */
+  fftw_plan fft;
+};
 
-/* FFTW_ESTIMATE: as fast as FFTW_PATIENT here, in microseconds, and the same plan every time. */
-static supine_status plan_fft(supine_sh_transform *plan) {
-  const int longitudes = (int)plan->longitudes;
-  const int width = (int)plan->width;
-  const size_t size = 2 * plan->longitudes * plan->width * sizeof(double);
-  fftw_complex *in = aligned_alloc(SUPINE_SH_ALIGNMENT, size);
-  fftw_complex *out = aligned_alloc(SUPINE_SH_ALIGNMENT, size);
-  if (in != NULL && out != NULL) {
-    plan->fft = fftw_plan_many_dft(1, &longitudes, width, in, NULL, width, 1, out, NULL, width, 1,
-                                   FFTW_BACKWARD, FFTW_ESTIMATE);
+/* FFTW_ESTIMATE plans in microseconds, and the same every time. */
+static fftw_plan plan_fft(supine_sh_transform *plan) {
+  const int longitudes = (int)plan->grid->longitudes;
+  const int fields = (int)plan->fields;
+  double *ring = malloc(plan->grid->longitudes * plan->fields * sizeof *ring);
+  fftw_plan made = NULL;
+  if (ring != NULL) {
+    made =
+        fftw_plan_many_dft_r2c(1, &longitudes, fields, ring, NULL, fields, 1, plan->spectrum, NULL,
+                               fields, 1, FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED);
   }
-  free(in);
-  free(out);
-  return plan->fft == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  free(ring);
+  return made;
 }
 
-supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid,
+supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
                                          supine_sh_transform **plan, supine_error *error) {
   *plan = NULL;
   if (band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || grid->longitudes <= 2 * band) {
@@ -39,37 +46,54 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
                             SUPINE_SH_BAND_MAX);
   }
   supine_sh_transform *made = calloc(1, sizeof *made);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (made == NULL) {
-    goto cleanup;
+  if (made != NULL) {
+    *made = (supine_sh_transform){.band = band, .fields = fields, .grid = grid};
+    made->legendre = malloc(gsl_sf_legendre_array_n(band) * sizeof *made->legendre);
+    made->spectrum = malloc((grid->longitudes / 2 + 1) * fields * sizeof *made->spectrum);
+    made->fft = made->spectrum == NULL ? NULL : plan_fft(made);
   }
-  made->band = band;
-  made->count = supine_sh_count(band);
-  made->latitudes = grid->latitudes;
-  made->longitudes = grid->longitudes;
-  made->pairs = (grid->latitudes + 1) / 2;
-  made->width = block_width(grid->longitudes);
-  status = supine_sh_legendre(made, grid);
-  if (status == SUPINE_OK) {
-    status = plan_fft(made);
+  if (made == NULL || made->legendre == NULL || made->fft == NULL) {
+    supine_sh_transform_destroy(made);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory for a transform of band %zu",
+                            band);
   }
-  if (status == SUPINE_OK) {
-    *plan = made;
-    return SUPINE_OK;
-  }
-
-cleanup:
-  supine_sh_transform_destroy(made);
-  return supine_error_set(error, status, "out of memory for a transform of band %zu", band);
+  *plan = made;
+  return SUPINE_OK;
 }
 
 void supine_sh_transform_destroy(supine_sh_transform *plan) {
   if (plan != NULL) {
-    free(plan->analysis);
-    free(plan->position);
+    free(plan->legendre);
+    free(plan->spectrum);
     if (plan->fft != NULL) {
       fftw_destroy_plan(plan->fft);
     }
     free(plan);
+  }
+}
+
+/* GSL's SPHARM functions are orthonormal with exp(i m phi); a real harmonic of m > 0 is sqrt(2)
+ * times that. */
+void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
+                              double *coefficients) {
+  const size_t count = supine_sh_count(plan->band);
+  const double weight = plan->grid->weight[j] * 2 * M_PI / (double)plan->grid->longitudes;
+  (void)gsl_sf_legendre_array_e(GSL_SF_LEGENDRE_SPHARM, plan->band, plan->grid->z[j], 1,
+                                plan->legendre);
+  fftw_execute_dft_r2c(plan->fft, (double *)(uintptr_t)ring, plan->spectrum);
+  for (size_t m = 0; m <= plan->band; ++m) {
+    for (size_t f = 0; f < plan->fields; ++f) {
+      const double *s = plan->spectrum[m * plan->fields + f]; /* sum of value exp(-i m phi) */
+      double *c = coefficients + f * count;
+      for (size_t l = m; l <= plan->band; ++l) {
+        const double y = weight * plan->legendre[gsl_sf_legendre_array_index(l, m)];
+        if (m == 0) {
+          c[supine_sh_index(l, 0)] += y * s[0];
+        } else {
+          c[supine_sh_index(l, (int)m)] += M_SQRT2 * y * s[0];
+          c[supine_sh_index(l, -(int)m)] -= M_SQRT2 * y * s[1];
+        }
+      }
+    }
   }
 }

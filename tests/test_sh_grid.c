@@ -81,45 +81,12 @@ static void test_grid_bad_size_refused(void **state) {
   supine_sh_grid_destroy(NULL);
 }
 
-static void test_grid_size_follows_band_and_oversampling(void **state) {
-  (void)state;
-  static const struct {
-    size_t band;
-    double oversampling;
-    size_t latitudes, longitudes;
-  } cases[] = {{0, 0, 2, 2},    {3, 1, 4, 8},      {3, 0, 6, 8},      {7, 0, 12, 16},
-               {15, 1, 16, 32}, {15, 0, 24, 32},   {15, 1.5, 24, 32}, {15, 2, 32, 48},
-               {15, 3, 48, 64}, {10, 1.2, 14, 24}, {22, 1.1, 26, 48}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
-    size_t latitudes = 0;
-    size_t longitudes = 0;
-    assert_int_equal(
-        supine_sh_grid_size(cases[i].band, cases[i].oversampling, &latitudes, &longitudes),
-        SUPINE_OK);
-    assert_int_equal(latitudes, cases[i].latitudes);
-    assert_int_equal(longitudes, cases[i].longitudes);
-  }
-}
-
-static void test_grid_size_bad_oversampling_refused(void **state) {
-  (void)state;
-  size_t j = 0;
-  size_t k = 0;
-  assert_int_equal(supine_sh_grid_size(15, 0.99, &j, &k), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_grid_size(15, -1, &j, &k), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_grid_size(15, NAN, &j, &k), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_grid_size(15, INFINITY, &j, &k), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_grid_size(SIZE_MAX, 1, &j, &k), SUPINE_ERROR_ARGUMENT);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_grid_five_latitudes_match_table),
       cmocka_unit_test(test_grid_any_size_integrates_powers),
       cmocka_unit_test(test_grid_direction_is_unit_and_in_place),
       cmocka_unit_test(test_grid_bad_size_refused),
-      cmocka_unit_test(test_grid_size_follows_band_and_oversampling),
-      cmocka_unit_test(test_grid_size_bad_oversampling_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,7 +9,6 @@
 #include "precompute/fields/fields.h"
 #include "sh/base/vec3.h"
 #include "sh/grid.h"
-#include "sh/transform.h"
 #include <supine/sh.h>
 
 #include "precompute/projection/compression.h"
@@ -325,7 +324,7 @@ static supine_status choose_band(fitting *w, supine_fit_report *report, supine_e
   return SUPINE_OK;
 }
 
-/* Coefficients [rows, P]: by the transform on a grid, else by the fit's analysis matrix. */
+/* Compute the coefficients [rows, P] by the fit's analysis matrix. */
 static supine_status project(fitting *w, size_t band, supine_error *error) {
   const size_t m = w->fields->direction_count;
   const size_t terms = w->chosen.terms;
@@ -337,31 +336,9 @@ static supine_status project(fitting *w, size_t band, supine_error *error) {
                            w->rows * terms);
     return SUPINE_ERROR_MEMORY;
   }
-  if (w->grid == NULL) {
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, (int)w->rows, (int)terms, (int)m, 1.0,
-                w->values, (int)w->rows, w->chosen.analysis, (int)m, 0.0, made->columns,
-                (int)terms);
-    return SUPINE_OK;
-  }
-  supine_sh_transform *plan = NULL;
-  double *ring = malloc(w->grid->longitudes * w->rows * sizeof *ring);
-  if (ring == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a ring");
-  }
-  supine_status status = supine_sh_transform_create(band, w->grid, &plan, error);
-  const supine_sh_batch batch = {.fields = w->rows};
-  for (size_t j = 0; j < w->grid->latitudes && status == SUPINE_OK; ++j) {
-    for (size_t d = 0; d < m; ++d) {
-      if (w->place[d] / w->grid->longitudes == j) {
-        memcpy(ring + (w->place[d] % w->grid->longitudes) * w->rows, w->values + d * w->rows,
-               w->rows * sizeof *ring);
-      }
-    }
-    status = supine_sh_forward_ring(plan, &batch, j, ring, made->columns, error);
-  }
-  supine_sh_transform_destroy(plan);
-  free(ring);
-  return status;
+  cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, (int)w->rows, (int)terms, (int)m, 1.0,
+              w->values, (int)w->rows, w->chosen.analysis, (int)m, 0.0, made->columns, (int)terms);
+  return SUPINE_OK;
 }
 
 /* The whole procedure without one direction, in closed form: with r its residual in the whole fit

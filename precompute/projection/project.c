@@ -52,7 +52,6 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
   const size_t least = LATITUDES_PER_BAND * (band + 1);
   const size_t latitudes = least < LATITUDES_MIN ? LATITUDES_MIN : least;
   const size_t count = 2 * latitudes * latitudes;
-  const supine_sh_batch batch = {.fields = span->rank};
   supine_sh_grid *grid = NULL;
   supine_sh_transform *plan = NULL;
   grid_heights heights = {malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
@@ -60,7 +59,7 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
   double *ring = malloc(2 * latitudes * span->rank * sizeof *ring);
   supine_status status = supine_sh_grid_create(latitudes, 2 * latitudes, &grid);
   if (status == SUPINE_OK) {
-    status = supine_sh_transform_create(band, grid, &plan, error);
+    status = supine_sh_transform_create(band, grid, span->rank, &plan, error);
   }
   if (status == SUPINE_OK && (heights.directions == NULL || heights.minimum == NULL ||
                               heights.maximum == NULL || ring == NULL)) {
@@ -76,7 +75,7 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
                                         heights.minimum + first, heights.maximum + first};
     status = supine_projection_span_weights(lungs, law, span, &gravities, ring);
     if (status == SUPINE_OK) {
-      status = supine_sh_forward_ring(plan, &batch, j, ring, functions, error);
+      supine_sh_transform_ring(plan, j, ring, functions);
     }
   }
   supine_sh_transform_destroy(plan);
