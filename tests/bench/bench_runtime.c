@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The evaluator against OpenBLAS and plain loops, interleaved in one process.
+/* The evaluator beside OpenBLAS and a plain loop, in turns in one process.
  *
- *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES...]
- *     bench_runtime lit [VERTICES or BASIS...]
+ *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
  *
- * OpenBLAS 0.3.21 takes newer processors for old ones; the variable names one that it knows. `lit`
- * sets normals by their modes beside exact ones: at each size the made lungs' own fields, as the
- * default options make them, over and over; of a basis file, itself. */
+ * A number makes random fields of 16 modes and normals of 6; a file is taken as it is. Each entry
+ * counts by the fastest of nine runs. OpenBLAS 0.3.21 takes newer processors for old ones; the
+ * variable names one that it knows. */
 #include <math.h>
-#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,517 +14,343 @@
 
 #include <cblas.h>
 
-#include "precompute/lungs/phantom.h"
-#include "precompute/precompute.h"
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
-#include "evaluation.h"
-#include "full_solve.h"
+#include <supine/runtime.h>
 
-enum { MADE_VERTICES = 40000 };
-enum {
-  ROWS_MAX = 256,
-  PLANAR_BLOCK = 1024,
-  BATCH = 64,
-  BATCH_VERTICES = 50000,
-  SOLVE_VERTICES_MAX = 2000000
-};
+#include "sh/base/clock.h"
+#include "sh/base/denormals.h"
+#include "sh/base/parallel.h"
+#include "tests/runtime_fixture.h"
 
-/* OpenBLAS's own, which cblas.h does not declare everywhere. */
-char *openblas_get_corename(void);
+enum { TILE = 16, ENTRIES_MAX = 64, REPEATS = 9, ENOUGH = 2000000 };
+
 void openblas_set_num_threads(int threads);
 
-typedef struct peers {
-  const supine_bench_image *image;
-  float *xyz;
-  float weights[BATCH * 256];
-  float *amount;
-  float *product;
-  float *planar;         /* coefficients [K, N], directions [3, N], rest [3, N] */
-  int16_t *small_planar; /* the coefficients in 16 bits, a unit for all */
-  float small_unit;
-  full_solve *solve;
-  size_t rows;
-  supine_bench_row row[ROWS_MAX];
-} peers;
+typedef struct bench {
+  const supine_basis_info *info;
+  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* opened in that storage */
+  supine_basis *simd[SUPINE_SIMD_COUNT];       /* in INT16, by that code; NULL: not here */
+  supine_pose pose;
+  float weights[SUPINE_MODES_MAX]; /* times the gain */
+  float *xyz, *normals;            /* [N, 3] */
+  float *amount;                   /* [N] */
+} bench;
 
-static void displace(size_t n, const float *restrict amount, const float *restrict d,
-                     const float *restrict p, float *restrict xyz) {
-  for (size_t i = 0; i < n; ++i) {
+typedef struct entry {
+  const char *what, *how;
+  supine_range_function *range;
+  bench *work;
+  const supine_basis *basis;
+  size_t threads;
+  double bytes;   /* of a vertex, read and written */
+  double seconds; /* of all vertices, the least so far */
+} entry;
+
+static void run_deform(void *context, size_t begin, size_t end, size_t thread) {
+  const entry *e = context;
+  (void)thread;
+  supine_deform_range(e->basis, &e->work->pose, begin, end, e->work->xyz + 3 * begin);
+}
+
+static void run_normals(void *context, size_t begin, size_t end, size_t thread) {
+  const entry *e = context;
+  (void)thread;
+  (void)supine_deform_lit_range(e->basis, &e->work->pose, begin, end, NULL,
+                                e->work->normals + 3 * begin);
+}
+
+static void run_lit(void *context, size_t begin, size_t end, size_t thread) {
+  const entry *e = context;
+  (void)thread;
+  (void)supine_deform_lit_range(e->basis, &e->work->pose, begin, end, e->work->xyz + 3 * begin,
+                                e->work->normals + 3 * begin);
+}
+
+/* Of one thread: it knows no ranges. */
+static void run_exact_normals(void *context, size_t begin, size_t end, size_t thread) {
+  const entry *e = context;
+  (void)begin, (void)end, (void)thread;
+  supine_normals(e->basis, e->work->xyz, e->work->normals);
+}
+
+static void displace(const bench *work, size_t begin, size_t end) {
+  const supine_basis_info *m = work->info;
+  for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      xyz[3 * i + axis] = p[3 * i + axis] + amount[i] * d[3 * i + axis];
+      work->xyz[3 * i + axis] =
+          m->vertices[3 * i + axis] + work->amount[i] * m->direction[3 * i + axis];
     }
   }
 }
 
-static void run_sgemv(void *context) {
-  peers *p = context;
-  const supine_bench_image *m = p->image;
-  const int modes = (int)m->modes;
-  cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m->vertices, modes, 0.7F, m->coefficients, modes,
-              p->weights, 1, 0, p->amount, 1);
-  displace(m->vertices, p->amount, m->direction, m->rest, p->xyz);
+static void run_sgemv(void *context, size_t begin, size_t end, size_t thread) {
+  const entry *e = context;
+  const int modes = (int)e->work->info->mode_count;
+  (void)thread;
+  cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)(end - begin), modes, 1.0F,
+              e->work->info->coefficients + begin * (size_t)modes, modes, e->work->weights, 1, 0.0F,
+              e->work->amount + begin, 1);
+  displace(e->work, begin, end);
 }
 
-/* The same with the coefficients mode by mode, as a product by columns likes them. */
-static void run_sgemv_columns(void *context) {
-  peers *p = context;
-  const supine_bench_image *m = p->image;
-  const int n = (int)m->vertices;
-  cblas_sgemv(CblasColMajor, CblasNoTrans, n, (int)m->modes, 0.7F, p->planar, n, p->weights, 1, 0,
-              p->amount, 1);
-  displace(m->vertices, p->amount, m->direction, m->rest, p->xyz);
-}
-
-/* The best simple code: coefficients, directions, rest and result each in planes, so that the
- * compiler takes as many vertices at a time as a vector holds; for float32 and 16 bits. */
-#define PLANAR(name, type)                                                                         \
-  static void name(size_t n, const float *restrict w, const type *restrict c,                      \
-                   const float *restrict d, const float *restrict p, float *restrict xyz) {        \
-    for (size_t i = 0; i < n; ++i) {                                                               \
-      float amount = 0;                                                                            \
-      for (size_t k = 0; k < 16; ++k) {                                                            \
-        amount += w[k] * (float)c[k * n + i];                                                      \
-      }                                                                                            \
-      for (size_t axis = 0; axis < 3; ++axis) {                                                    \
-        xyz[axis * n + i] = p[axis * n + i] + amount * d[axis * n + i];                            \
-      }                                                                                            \
-    }                                                                                              \
-  }
-PLANAR(planar_float, float)
-PLANAR(planar_small, int16_t)
-
-static void run_planar(void *context) {
-  peers *p = context;
-  const size_t n = p->image->vertices;
-  planar_float(n, p->weights, p->planar, p->planar + 16 * n, p->planar + 19 * n, p->xyz);
-}
-
-static void run_planar_small(void *context) {
-  peers *p = context;
-  const size_t n = p->image->vertices;
-  float weights[16];
-  for (size_t k = 0; k < 16; ++k) {
-    weights[k] = p->small_unit * p->weights[k];
-  }
-  planar_small(n, weights, p->small_planar, p->planar + 16 * n, p->planar + 19 * n, p->xyz);
-}
-
-/* The image's arrays in planes. */
-static bool make_planes(peers *p, const supine_bench_image *m) {
-  const size_t n = m->vertices;
-  float top = 0;
-  free(p->planar);
-  free(p->small_planar);
-  p->planar = malloc(22 * n * sizeof *p->planar);
-  p->small_planar = malloc(16 * n * sizeof *p->small_planar);
-  if (p->planar == NULL || p->small_planar == NULL) {
-    return false;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t k = 0; k < 16; ++k) {
-      p->planar[k * n + i] = m->coefficients[16 * i + k];
-      top = fmaxf(top, fabsf(m->coefficients[16 * i + k]));
+/* The loop that anyone would write, compiled with -march=native. */
+static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
+  const bench *work = ((const entry *)context)->work;
+  const supine_basis_info *m = work->info;
+  const float *restrict w = work->weights;
+  float *restrict xyz = work->xyz;
+  (void)thread;
+  for (size_t i = begin; i < end; ++i) {
+    const float *c = m->coefficients + i * m->mode_count;
+    float amount = 0;
+    if (m->mode_count == 16) { /* a number that the compiler knows */
+      for (size_t k = 0; k < 16; ++k) {
+        amount += w[k] * c[k];
+      }
+    } else {
+      for (size_t k = 0; k < m->mode_count; ++k) {
+        amount += w[k] * c[k];
+      }
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-      p->planar[(16 + axis) * n + i] = m->direction[3 * i + axis];
-      p->planar[(19 + axis) * n + i] = m->rest[3 * i + axis];
+      xyz[3 * i + axis] = m->vertices[3 * i + axis] + amount * m->direction[3 * i + axis];
     }
   }
-  p->small_unit = top / INT16_MAX;
-  for (size_t i = 0; i < 16 * n; ++i) {
-    p->small_planar[i] = (int16_t)lrintf(p->planar[i] / p->small_unit);
+}
+
+#if defined(__x86_64__)
+/* The evaluator's loads and stores without its arithmetic: what memory allows at best. */
+__attribute__((target("avx512f"))) static void run_traffic(void *context, size_t begin, size_t end,
+                                                           size_t thread) {
+  const entry *e = context;
+  const supine_basis_info *info = supine_basis_get_info(e->basis);
+  const size_t stride = (size_t)(info->bytes_per_vertex * TILE);
+  const unsigned char *tile = (const unsigned char *)info->packed + begin / TILE * stride;
+  float *xyz = e->work->xyz + 3 * begin;
+  (void)thread;
+  for (size_t t = begin / TILE; t < end / TILE; ++t, tile += stride, xyz += 3 * TILE) {
+    __m512i sum = _mm512_setzero_si512();
+    for (size_t line = 0; line < stride; line += 64) {
+      sum = _mm512_xor_si512(sum, _mm512_loadu_si512(tile + line));
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      _mm512_stream_si512((void *)(xyz + 16 * j), sum);
+    }
   }
+  _mm_sfence();
+}
+#endif
+
+static size_t add_entries(bench *work, entry *entries) {
+  static const char *const storages[] = {"auto", "exact", "int16", "mixed"};
+  const supine_basis_info *info = work->info;
+  const supine_basis *usual = work->storage[SUPINE_STORAGE_INT16];
+  const double packed = supine_basis_get_info(usual)->bytes_per_vertex;
+  const double plain = 4.0 * (double)info->mode_count + 36.0;
+  const double normals = 12.0 + 12.0 * (double)((info->normal_count + 2) / 3);
+  size_t count = 0;
+  for (size_t threads = 1; threads <= 2; ++threads) {
+    for (size_t s = SUPINE_STORAGE_EXACT; s < SUPINE_STORAGE_COUNT; ++s) {
+      const double bytes = supine_basis_get_info(work->storage[s])->bytes_per_vertex + 12.0;
+      entries[count++] = (entry){"supine",         storages[s], run_deform, work,
+                                 work->storage[s], threads,     bytes,      INFINITY};
+    }
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) {
+      entries[count++] =
+          (entry){"traffic", "int16", run_traffic, work, usual, threads, packed + 12.0, INFINITY};
+    }
+#endif
+    if (info->normal_count > 0) {
+      entries[count++] =
+          (entry){"normals", "int16", run_normals, work, usual, threads, normals, INFINITY};
+      entries[count++] =
+          (entry){"lit", "int16", run_lit, work, usual, threads, normals + packed + 12.0, INFINITY};
+    }
+  }
+  for (size_t s = SUPINE_SIMD_PORTABLE; s < SUPINE_SIMD_COUNT; ++s) {
+    static const char *const codes[] = {"auto", "portable", "avx2", "avx512"};
+    if (work->simd[s] != NULL) {
+      entries[count++] = (entry){"supine",      s < 4 ? codes[s] : "other code",
+                                 run_deform,    work,
+                                 work->simd[s], 1,
+                                 packed + 12.0, INFINITY};
+    }
+  }
+  entries[count++] =
+      (entry){"sgemv_displace", "float32", run_sgemv, work, usual, 1, plain + 8.0, INFINITY};
+  entries[count++] = (entry){"plain_native", "float32", run_plain, work, usual, 1, plain, INFINITY};
+  if (info->normal_count > 0) {
+    const double triangles = (double)info->triangle_count / (double)info->vertex_count;
+    entries[count++] = (entry){"exact_normals", "float32", run_exact_normals,       work,
+                               usual,           1,         12.0 * triangles + 24.0, INFINITY};
+  }
+  return count;
+}
+
+/* Take turns, each turn beginning with another entry, denormal numbers flushed. */
+static void measure(entry *entries, size_t count, size_t vertices) {
+  const unsigned saved = supine_denormals_flush();
+  const size_t rounds = 1 + ENOUGH / vertices;
+  for (size_t turn = 0; turn < REPEATS; ++turn) {
+    for (size_t i = 0; i < count; ++i) {
+      entry *e = &entries[(i + turn) % count];
+      supine_parallel_for(vertices, 64, e->threads, e->range, e); /* fills the caches */
+      const double begin = supine_clock_seconds();
+      for (size_t r = 0; r < rounds; ++r) {
+        supine_parallel_for(vertices, 64, e->threads, e->range, e);
+      }
+      e->seconds = fmin(e->seconds, (supine_clock_seconds() - begin) / (double)rounds);
+    }
+  }
+  supine_denormals_restore(saved);
+}
+
+static double find(const entry *entries, size_t count, const char *what, const char *how,
+                   size_t threads) {
+  for (size_t i = 0; i < count; ++i) {
+    if (strcmp(entries[i].what, what) == 0 && strcmp(entries[i].how, how) == 0 &&
+        entries[i].threads == threads) {
+      return entries[i].seconds;
+    }
+  }
+  return NAN;
+}
+
+static void print(const entry *entries, size_t count, size_t vertices) {
+  (void)printf("%-15s %-10s %7s %9s %6s %8s\n", "what", "how", "threads", "ns/vertex", "bytes",
+               "GB/s");
+  for (size_t i = 0; i < count; ++i) {
+    const entry *e = &entries[i];
+    const double ns = 1e9 * e->seconds / (double)vertices;
+    (void)printf("%-15s %-10s %7zu %9.3f %6.1f %8.2f\n", e->what, e->how, e->threads, ns, e->bytes,
+                 e->bytes / ns);
+  }
+  const double own = find(entries, count, "supine", "int16", 1);
+  (void)printf("int16 is %.2f times as fast as sgemv and a displacing loop, %.2f as one fused "
+               "loop, %.2f as its loads and stores; two threads gain %.2f\n",
+               find(entries, count, "sgemv_displace", "float32", 1) / own,
+               find(entries, count, "plain_native", "float32", 1) / own,
+               find(entries, count, "traffic", "int16", 1) / own,
+               own / find(entries, count, "supine", "int16", 2));
+  const double exact = find(entries, count, "exact_normals", "float32", 1);
+  if (isfinite(exact)) {
+    (void)printf("normals are %.2f times as fast as exact ones; a lit frame takes %.2f of a frame "
+                 "and exact normals\n",
+                 exact / find(entries, count, "normals", "int16", 1),
+                 find(entries, count, "lit", "int16", 1) / (own + exact));
+  }
+}
+
+/* What is measured side by side does the same work. */
+static bool check_same(bench *work, entry *entries, size_t count) {
+  const size_t n = work->info->vertex_count;
+  float *expected = fixture_allocate(3 * n, sizeof *expected);
+  entry plain = {.work = work};
+  run_plain(&plain, 0, n, 0);
+  memcpy(expected, work->xyz, 3 * n * sizeof *expected);
+  bool same = true;
+  for (size_t i = 0; i < count; ++i) {
+    if (entries[i].range == run_deform || entries[i].range == run_sgemv) {
+      double apart = 0.0;
+      double moved = 0.0;
+      entries[i].range(&entries[i], 0, n, 0);
+      for (size_t k = 0; k < 3 * n; ++k) {
+        apart = fmax(apart, fabs((double)work->xyz[k] - (double)expected[k]));
+        moved = fmax(moved, fabs((double)expected[k] - (double)work->info->vertices[k]));
+      }
+      if (apart > 1e-3 * moved) {
+        (void)fprintf(stderr, "%s %s and the plain loop end %g mm apart\n", entries[i].what,
+                      entries[i].how, apart);
+        same = false;
+      }
+    }
+  }
+  free(expected);
+  return same;
+}
+
+static bool open_all(bench *work, const void *bytes, size_t size, supine_error *error) {
+  supine_basis_options options = {.size = sizeof options};
+  for (int s = SUPINE_STORAGE_EXACT; s < SUPINE_STORAGE_COUNT; ++s) {
+    options.storage = (supine_storage)s;
+    options.without_normals = s != SUPINE_STORAGE_INT16;
+    if (supine_basis_open_memory_with(bytes, size, &options, &work->storage[s], error) !=
+        SUPINE_OK) {
+      return false;
+    }
+  }
+  options = (supine_basis_options){
+      .size = sizeof options, .storage = SUPINE_STORAGE_INT16, .without_normals = true};
+  for (int s = SUPINE_SIMD_PORTABLE; s < SUPINE_SIMD_COUNT; ++s) {
+    options.simd = (supine_simd)s;
+    (void)supine_basis_open_memory_with(bytes, size, &options, &work->simd[s], NULL);
+  }
+  work->info = supine_basis_get_info(work->storage[SUPINE_STORAGE_INT16]);
   return true;
 }
 
-/* The plain loop again, here compiled with -march=native. */
-static void run_native(void *context) {
-  peers *p = context;
-  const supine_bench_image *m = p->image;
-  const float *restrict w = p->weights;
-  const float *restrict c = m->coefficients;
-  float *restrict xyz = p->xyz;
-  for (size_t i = 0; i < m->vertices; ++i) {
-    float amount = 0;
-    for (size_t k = 0; k < 16; ++k) {
-      amount += w[k] * c[16 * i + k];
-    }
-    for (size_t axis = 0; axis < 3; ++axis) {
-      xyz[3 * i + axis] = m->rest[3 * i + axis] + amount * m->direction[3 * i + axis];
-    }
-  }
-}
-
-static void run_sgemm(void *context) {
-  peers *p = context;
-  const int modes = (int)p->image->modes;
-  const int n = (int)(p->image->vertices < BATCH_VERTICES ? p->image->vertices : BATCH_VERTICES);
-  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, n, BATCH, modes, 1, p->image->coefficients,
-              modes, p->weights, modes, 0, p->product, BATCH);
-}
-
-/* A product of square matrices, OpenBLAS at its best. */
-static void run_sgemm_square(void *context) {
-  peers *p = context;
-  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 1024, 1024, 1024, 1, p->product, 1024,
-              p->product + 1024 * 1024, 1024, 0, p->product + 2 * 1024 * 1024, 1024);
-}
-
-static size_t add_peers(void *context, const supine_bench_image *image, float *xyz,
-                        supine_bench_entry *entries, size_t room) {
-  peers *p = context;
-  const size_t batch = image->vertices < BATCH_VERTICES ? image->vertices : BATCH_VERTICES;
-  const size_t product = (size_t)BATCH * BATCH_VERTICES;
-  free(p->amount);
-  free(p->product);
-  full_solve_destroy(p->solve);
-  p->solve = NULL;
-  p->image = image;
-  p->xyz = xyz;
-  p->amount = calloc(image->vertices, sizeof *p->amount);
-  p->product = calloc(product, sizeof *p->product);
-  if (p->amount == NULL || p->product == NULL || image->modes != 16 || room < 8 ||
-      !make_planes(p, image)) {
-    return 0;
-  }
-  for (size_t i = 0; i < sizeof p->weights / sizeof *p->weights; ++i) {
-    p->weights[i] = 0.01F * (float)(i % 97) - 0.4F;
-  }
-  const supine_bench_row common = {.storage = "float32",
-                                   .code = "openblas",
-                                   .vertices = image->vertices,
-                                   .modes = 16,
-                                   .threads = 1};
-  entries[0] = (supine_bench_entry){common, 1, run_sgemv, p};
-  entries[0].row.what = "sgemv_displace";
-  entries[0].row.bytes_per_vertex = 64 + 4 + 4 + 36;
-  entries[0].row.multiplications = 19;
-  entries[0].row.additions = 19;
-  entries[1] = (supine_bench_entry){common, 1, run_native, p};
-  entries[1].row.what = "plain_native";
-  entries[1].row.code = "";
-  entries[1].row.bytes_per_vertex = 100;
-  entries[1].row.multiplications = 19;
-  entries[1].row.additions = 19;
-  entries[2] = (supine_bench_entry){common, 1, run_sgemm, p};
-  entries[2].row.what = "sgemm64";
-  entries[2].row.vertices = BATCH * batch;
-  entries[2].row.bytes_per_vertex = 4 + 1;
-  entries[2].row.multiplications = 16;
-  entries[2].row.additions = 16;
-  entries[3] = (supine_bench_entry){common, 1, run_sgemm_square, p};
-  entries[3].row.what = "sgemm_square";
-  entries[3].row.vertices = (size_t)1024 * 1024;
-  entries[3].row.multiplications = 1024;
-  entries[3].row.additions = 1024;
-  static const struct {
-    const char *what, *storage, *code;
-    void (*run)(void *context);
-    double bytes;
-  } planar[] = {{"sgemv_columns", "float32", "openblas", run_sgemv_columns, 64 + 4 + 4 + 36},
-                {"planar", "float32", "", run_planar, 64 + 36},
-                {"planar", "int16", "", run_planar_small, 32 + 36}};
-  for (size_t i = 0; i < 3; ++i) {
-    entries[4 + i] = (supine_bench_entry){common, 1, planar[i].run, p};
-    entries[4 + i].row.what = planar[i].what;
-    entries[4 + i].row.storage = planar[i].storage;
-    entries[4 + i].row.code = planar[i].code;
-    entries[4 + i].row.bytes_per_vertex = planar[i].bytes;
-    entries[4 + i].row.multiplications = entries[4 + i].row.additions = 19;
-  }
-  if (image->vertices <= SOLVE_VERTICES_MAX) {
-    p->solve = full_solve_create(image->vertices);
-  }
-  if (p->solve == NULL) {
-    return 7;
-  }
-  entries[7] = (supine_bench_entry){{.what = "sparse_solve",
-                                     .storage = "float64",
-                                     .code = "",
-                                     .vertices = full_solve_vertex_count(p->solve),
-                                     .threads = 1},
-                                    1,
-                                    full_solve_run,
-                                    p->solve};
-  return 8;
-}
-
-static void report(void *context, const supine_bench_row *row) {
-  peers *p = context;
-  if (p->rows < ROWS_MAX) {
-    p->row[p->rows++] = *row;
-  }
-}
-
-static double find(const peers *p, size_t from, const char *what, const char *storage,
-                   size_t threads) {
-  for (size_t i = from; i < p->rows; ++i) {
-    if (strcmp(p->row[i].what, what) == 0 && p->row[i].threads == threads &&
-        (storage[0] == '\0' || strcmp(p->row[i].storage, storage) == 0)) {
-      return p->row[i].ns_per_vertex;
-    }
-  }
-  return 0;
-}
-
-static void print(const peers *p, size_t from) {
-  printf("%-16s %-8s %-8s %9s %3s %8s %6s %7s %6s %5s %5s %9s\n", "what", "storage", "code",
-         "vertices", "thr", "ns/vert", "bytes", "GB/s", "triad", "mul", "add", "mul/ns");
-  for (size_t i = from; i < p->rows; ++i) {
-    const supine_bench_row *r = &p->row[i];
-    printf("%-16s %-8s %-8s %9zu %3zu %8.4f %6.1f %7.2f %6.3f %5.0f %5.0f %9.2f\n", r->what,
-           r->storage, r->code, r->vertices, r->threads, r->ns_per_vertex, r->bytes_per_vertex,
-           r->gb_per_second, r->triad_share, r->multiplications, r->additions,
-           r->multiplications / r->ns_per_vertex);
-  }
-  const double sgemv = find(p, from, "sgemv_displace", "", 1);
-  const double plain = find(p, from, "plain_loop", "", 1);
-  const double native = find(p, from, "plain_native", "", 1);
-  static const char *const storages[] = {"mixed", "int16", "exact"};
-  for (size_t i = 0; i < sizeof storages / sizeof *storages; ++i) {
-    const double own = find(p, from, "supine", storages[i], 1);
-    const double traffic = find(p, from, "traffic", storages[i], 1);
-    printf("%-8s  sgemv+displace %.2f (traffic alone %.2f)  plain loop %.2f  plain native %.2f  "
-           "two threads %.2f (arithmetic %.2f, traffic %.2f)\n",
-           storages[i], sgemv / own, sgemv / traffic, plain / own, native / own,
-           own / find(p, from, "supine", storages[i], 2),
-           find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2),
-           traffic / find(p, from, "traffic", storages[i], 2));
-    printf("          sgemv by columns %.2f  planar float32 %.2f  planar int16 "
-           "%.2f\n",
-           find(p, from, "sgemv_columns", "", 1) / own, find(p, from, "planar", "float32", 1) / own,
-           find(p, from, "planar", "int16", 1) / own);
-  }
-  const double solve = find(p, from, "sparse_solve", "", 1);
-  if (solve > 0) {
-    printf("int16     sparse solve of (2), one direction, to 1e-6: %.0f\n",
-           solve / find(p, from, "supine", "int16", 1));
-  }
-  const double batch = find(p, from, "supine_batch64", "", 1);
-  printf("batch of 64, multiplications a ns: %.1f; sgemm of the same shape %.1f, square %.1f\n\n",
-         19 / batch, 16 / find(p, from, "sgemm64", "", 1),
-         1024 / find(p, from, "sgemm_square", "", 1));
-}
-
-/* What fewer modes cost, at the same size. */
-static int run_modes(size_t vertices) {
-  static const size_t modes[] = {1, 4, 8, 16, 32, 64};
-  double sixteen = 0;
-  for (size_t turn = 0; turn < 2; ++turn) {
-    for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
-      supine_bench_image image;
-      supine_basis *basis = NULL;
-      peers *p = calloc(1, sizeof *p);
-      supine_bench_options options = {.vertices = &vertices, .vertices_count = 1, .threads = 1};
-      if (p == NULL ||
-          supine_bench_image_create(100000, modes[i], NULL, &image, NULL) != SUPINE_OK) {
-        free(p);
-        return 1;
-      }
-      if (supine_basis_open_memory(image.bytes, image.size, &basis, NULL) != SUPINE_OK) {
-        supine_bench_image_destroy(&image);
-        free(p);
-        return 1;
-      }
-      options.like = basis;
-      (void)supine_bench_run(&options, NULL, report, p, NULL);
-      const double own = find(p, 0, "supine", "int16", 1);
-      sixteen = modes[i] == 16 ? own : sixteen;
-      if (turn == 1) {
-        printf("%2zu modes, %zu vertices: %.4f ns a vertex, %.2f of sixteen\n", modes[i], vertices,
-               own, own / sixteen);
-      }
-      supine_basis_close(basis);
-      supine_bench_image_destroy(&image);
-      free(p);
-    }
-  }
-  return 0;
-}
-
-/* The loop over triangles that anyone would write, compiled with -march=native. */
-static void scatter(const supine_bench_image *m, const float *restrict xyz, float *restrict n) {
-  memset(n, 0, 3 * m->vertices * sizeof *n);
-  for (size_t t = 0; t < m->triangle_count; ++t) {
-    const uint32_t *corner = m->triangles + 3 * t;
-    const float *a = xyz + 3 * (size_t)corner[0];
-    const float *b = xyz + 3 * (size_t)corner[1];
-    const float *c = xyz + 3 * (size_t)corner[2];
-    const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    const float v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    const float cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                            u[0] * v[1] - u[1] * v[0]};
-    for (size_t j = 0; j < 3; ++j) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        n[3 * (size_t)corner[j] + axis] += cross[axis];
-      }
-    }
-  }
-  for (size_t i = 0; i < m->vertices; ++i) {
-    float *at = n + 3 * i;
-    const float inverse = 1 / sqrtf(at[0] * at[0] + at[1] * at[1] + at[2] * at[2] + 1e-30F);
-    at[0] *= inverse;
-    at[1] *= inverse;
-    at[2] *= inverse;
-  }
-}
-
-static void run_scatter(void *context) {
-  peers *p = context;
-  scatter(p->image, p->xyz, p->product);
-}
-
-static size_t add_scatter(void *context, const supine_bench_image *image, float *xyz,
-                          supine_bench_entry *entries, size_t room) {
-  peers *p = context;
-  free(p->product);
-  p->image = image;
-  p->xyz = xyz;
-  p->product = calloc(3 * image->vertices, sizeof *p->product);
-  if (p->product == NULL || room < 1) {
-    return 0;
-  }
-  entries[0] = (supine_bench_entry){{.what = "scatter_native",
-                                     .storage = "",
-                                     .code = "",
-                                     .vertices = image->vertices,
-                                     .modes = image->modes,
-                                     .threads = 1},
-                                    1,
-                                    run_scatter,
-                                    p};
-  return 1;
-}
-
-static void print_lit(const peers *p, size_t from) {
-  const double normals = find(p, from, "normals", "", 1);
-  const double exact = find(p, from, "supine_normals", "", 1);
-  const double lit = find(p, from, "lit", "", 1);
-  const double deform = find(p, from, "supine", "int16", 1);
-  printf("%zu vertices, ns each: deform %.3f  normals %.3f  lit %.3f  supine_normals %.3f  "
-         "scatter %.3f\n",
-         p->row[from].vertices, deform, normals, lit, exact,
-         find(p, from, "scatter_native", "", 1));
-  printf(
-      "  normals are %.2f times as fast as supine_normals, %.2f as a plain scatter loop (>= 4); a "
-      "lit frame takes %.3f of deform + supine_normals (<= 0.35)\n",
-      exact / normals, find(p, from, "scatter_native", "", 1) / normals, lit / (deform + exact));
-  printf("  two threads gain: normals %.2f, lit %.2f; arithmetic %.2f, bare traffic %.2f, copy "
-         "%.2f\n",
-         normals / find(p, from, "normals", "", 2), lit / find(p, from, "lit", "", 2),
-         find(p, from, "arithmetic", "", 1) / find(p, from, "arithmetic", "", 2),
-         find(p, from, "traffic", "int16", 1) / find(p, from, "traffic", "int16", 2),
-         find(p, from, "copy", "", 1) / find(p, from, "copy", "", 2));
-}
-
-/* The made lungs by the default options. */
-static supine_basis *made_basis(supine_error *error) {
-  const char *path = "bench_runtime.safetensors";
-  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
-  const supine_resting resting = supine_reference_resting_default();
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 23, .modes = 16, .held_out = 20};
-  supine_reference reference;
-  supine_precompute_report report;
-  supine_mesh mesh = {0};
-  supine_lungs lungs = {0};
-  supine_basis *basis = NULL;
-  options.reference = &reference;
-  if (supine_phantom_create(MADE_VERTICES, 6000, &mesh, error) == SUPINE_OK &&
-      supine_lungs_create(&mesh, 1, NULL, &lungs, error) == SUPINE_OK &&
-      supine_reference_find(&lungs, &options.model, &full, &resting, &reference, error) ==
-          SUPINE_OK &&
-      supine_precompute(&lungs, &options, path, &report, error) == SUPINE_OK) {
-    (void)supine_basis_open(path, &basis, error);
-    (void)remove(path);
-  }
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&mesh);
-  return basis;
-}
-
-/* One size of the made lungs, or a file's own. */
-static int run_lit(const char *what, const supine_basis *made) {
-  size_t vertices = strtoul(what, NULL, 10);
+static bool run(const char *what) {
+  const size_t vertices = strtoul(what, NULL, 10);
+  const double gravity[3] = {0.6, 0.8, 0.0};
+  bench work = {.info = NULL};
+  entry entries[ENTRIES_MAX];
   supine_error error = {0};
-  supine_basis *own = NULL;
-  peers *p = calloc(1, sizeof *p);
-  if (p == NULL || (vertices == 0 && supine_basis_open(what, &own, &error) != SUPINE_OK)) {
-    (void)fprintf(stderr, "%s\n", error.message);
-    free(p);
-    return 1;
-  }
-  vertices = own != NULL ? supine_basis_get_info(own)->vertex_count : vertices;
-  const supine_basis *like = own != NULL ? own : made;
-  const supine_bench_options options = {
-      .vertices = &vertices, .vertices_count = 1, .like = like, .lit = true};
-  const supine_status status = supine_bench_run(&options, add_scatter, report, p, &error);
-  if (status == SUPINE_OK) {
-    const supine_basis_info *info = supine_basis_get_info(like);
-    printf("%s: %zu modes, %zu of the normals\n", what, info->mode_count, info->normal_count);
-    print_lit(p, 0);
+  unsigned char *bytes = NULL;
+  size_t size = 0;
+  if (vertices > 0) {
+    fixture *made = fixture_create(vertices, 16, 3, 2, false, false, 5.0, 31);
+    fixture_add_normals(made, 6, 32);
+    bytes = fixture_bytes(made, &size);
+    fixture_destroy(made);
   } else {
-    (void)fprintf(stderr, "%s\n", error.message);
+    bytes = fixture_read(what, &size);
   }
-  supine_basis_close(own);
-  free(p->product);
-  free(p);
-  return status != SUPINE_OK;
-}
-
-static int run_lits(int count, char **what) {
-  static char *usual[] = {"40000", "508000", "16000000"};
-  supine_error error = {0};
-  supine_basis *made = made_basis(&error);
-  if (made == NULL) {
-    (void)fprintf(stderr, "%s\n", error.message);
-    return 1;
+  bool good = open_all(&work, bytes, size, &error) && !work.info->vector;
+  if (good) {
+    const size_t n = work.info->vertex_count;
+    (void)supine_basis_weights(work.storage[SUPINE_STORAGE_INT16], gravity, work.pose.weights);
+    for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
+      work.pose.gains[i / 3][i % 3] = 0.7;
+    }
+    for (size_t k = 0; k < work.info->mode_count; ++k) {
+      work.weights[k] = (float)(0.7 * work.pose.weights[k]);
+    }
+    work.xyz = aligned_alloc(64, (12 * n + 127) / 64 * 64);
+    work.normals = fixture_allocate(3 * n, sizeof *work.normals);
+    work.amount = fixture_allocate(n, sizeof *work.amount);
+    const size_t count = add_entries(&work, entries);
+    good = work.xyz != NULL && check_same(&work, entries, count);
+    if (good) {
+      (void)printf("%s: %zu vertices, %zu modes\n", what, n, work.info->mode_count);
+      measure(entries, count, n);
+      print(entries, count, n);
+    }
+  } else {
+    (void)fprintf(stderr, "%s: %s\n", what, error.message);
   }
-  int code = 0;
-  for (int i = 0; i < (count > 0 ? count : 3); ++i) {
-    code |= run_lit(count > 0 ? what[i] : usual[i], made);
+  for (size_t s = 0; s < SUPINE_STORAGE_COUNT; ++s) {
+    supine_basis_close(work.storage[s]);
   }
-  supine_basis_close(made);
-  return code;
+  for (size_t s = 0; s < SUPINE_SIMD_COUNT; ++s) {
+    supine_basis_close(work.simd[s]);
+  }
+  free(work.xyz);
+  free(work.normals);
+  free(work.amount);
+  free(bytes);
+  return good;
 }
 
 int main(int argc, char **argv) {
-  static const size_t usual[] = {10000, 100000, 1000000, 16000000};
-  if (argc > 1 && strcmp(argv[1], "lit") == 0) {
-    return run_lits(argc - 2, argv + 2);
-  }
-  size_t sizes[32];
-  size_t count = 0;
-  for (int i = 1; i < argc && count < 32; ++i) {
-    sizes[count++] = strtoul(argv[i], NULL, 10);
-  }
-  if (count == 0) {
-    memcpy(sizes, usual, sizeof usual);
-    count = sizeof usual / sizeof *usual;
-  }
+  static const char *const usual[] = {"1000000", "16000000"};
+  bool good = true;
   openblas_set_num_threads(1);
-  printf("OpenBLAS says that this is a %s\n", openblas_get_corename());
-  peers *p = calloc(1, sizeof *p);
-  if (p == NULL) {
-    return 1;
+  for (int i = 0; i < (argc > 1 ? argc - 1 : 2); ++i) {
+    good = run(argc > 1 ? argv[i + 1] : usual[i]) && good;
   }
-  int code = 0;
-  for (size_t i = 0; i < count; ++i) {
-    supine_error error = {0};
-    const size_t from = p->rows;
-    const supine_bench_options options = {.vertices = &sizes[i], .vertices_count = 1};
-    if (supine_bench_run(&options, add_peers, report, p, &error) != SUPINE_OK) {
-      (void)fprintf(stderr, "%s\n", error.message);
-      code = 1;
-      break;
-    }
-    print(p, from);
-  }
-  free(p->amount);
-  free(p->product);
-  free(p->planar);
-  free(p->small_planar);
-  full_solve_destroy(p->solve);
-  free(p);
-  return code != 0 ? code : run_modes(1000000);
+  return good ? 0 : 1;
 }
