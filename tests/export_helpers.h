@@ -3,9 +3,8 @@
 #ifndef SUPINE_TEST_EXPORT_HELPERS_H
 #define SUPINE_TEST_EXPORT_HELPERS_H
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "test.h"
+
 #include <unistd.h>
 
 #include "program/options/command.h"

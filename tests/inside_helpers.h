@@ -3,14 +3,7 @@
 #ifndef SUPINE_INSIDE_HELPERS_H
 #define SUPINE_INSIDE_HELPERS_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include <supine/runtime.h>
 #include <supine/safetensors.h>

@@ -3,18 +3,8 @@
 #ifndef SUPINE_TEST_MESH_SAMPLES_H
 #define SUPINE_TEST_MESH_SAMPLES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
 #include "mesh/mesh.h"
+#include "test.h"
 
 /* Copies arrays into a mesh that supine_mesh_free releases. */
 static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,

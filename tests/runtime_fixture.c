@@ -1,17 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <dirent.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #include "precompute/writer.h"
 #include "runtime_fixture.h"
+#include "test.h"
 
 void *fixture_allocate(size_t count, size_t size) {
   void *memory = calloc(count + 1, size);

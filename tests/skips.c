@@ -1,12 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A cmocka program of which a test was skipped, and none failed, ends with 77: CTest then counts it
  * as skipped and not as passed. The linker sends cmocka's functions here (--wrap). */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 enum { SKIPPED = 77 }; /* SKIP_RETURN_CODE in CMakeLists.txt */
 

@@ -3,26 +3,16 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #include "sh/base/folder.h"
 #include "sh/base/output.h"
 #include "sh/base/parallel.h"
 #include "sh/base/text.h"
+#include "test.h"
 #include <supine/status.h>
 
 static void test_status_string_every_code_distinct(void **state) {

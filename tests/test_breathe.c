@@ -2,26 +2,16 @@
 /* supine breathe: volumes of every frame, as measured on its surface; what it writes and refuses.
  */
 #include <dirent.h>
-#include <math.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "test.h"
 #include <supine/safetensors.h>
 
 #include "lungs_helpers.h"

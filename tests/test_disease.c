@@ -1,19 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Lesions and collapse: what they change and what they leave alone. */
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/precompute.h"
+#include "test.h"
 #include <supine/volume.h>
 
 #include "lungs_helpers.h"

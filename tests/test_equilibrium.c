@@ -1,16 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The fast equilibrium solve against the definitions, the paper's iteration and its invariants. */
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "precompute/physics/equilibrium.h"
+#include "test.h"
 #include <gsl/gsl_linalg.h>
 
 #include "full_operator.h"

@@ -1,20 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Expandability: regional models, files, and what both do to displacement. */
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #include "precompute/lungs/expandability.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 

@@ -1,14 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine export: exit codes, and messages that name the remedy. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "export_helpers.h"
+#include "test.h"
 
 static char *folder;
 static char basis[256], still[256], glb[256], page[256];

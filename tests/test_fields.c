@@ -1,21 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fields of another simulator: loading, fitting, cross-validation, and everything that can be
  * wrong. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-
-#include <cmocka.h>
 
 #include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "sh/grid.h"
+#include "test.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 

@@ -1,16 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The applied force (18), its factors, heights, and the direction of displacement (15)-(17). */
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "precompute/physics/model.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 

@@ -1,19 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The checks that every surface of lungs passes. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "mesh/anatomy.h"
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/lungs/phantom.h"
+#include "test.h"
 
 static supine_mesh phantom(void) {
   supine_mesh mesh = {0};

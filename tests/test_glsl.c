@@ -2,20 +2,11 @@
 /* supine.glsl off screen, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals by transform
  * feedback equal the C evaluator's within rounding, of lungs at different scales in one draw. Skips
  * where EGL gives no such context. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
 
-#include <cmocka.h>
+#include "test.h"
 
 #include <supine/runtime.h>
 

@@ -1,19 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The equilibrium backwards: the force comes back from its catch, over the paper's links and over
  * links with a reach. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "precompute/physics/inverse.h"
 #include "precompute/physics/model.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 

@@ -1,19 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Label maps into surfaces: what comes back of lungs that are known, whose conventions are
  * understood, what is said of what was done, and maps that are none. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-
-#include <cmocka.h>
-
 #include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/surface.h"
 #include "precompute/lungs/phantom.h"
+#include "test.h"
 
 #include "labels_helpers.h"
 #include "sh_helpers.h"

@@ -1,18 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Joining surfaces into a model, telling left from right, made lungs, and volume forms. */
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 

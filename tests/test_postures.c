@@ -1,17 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Real pairs at rest in six postures: what turning a patient must and must not do, nothing of which
  * the model was fitted to. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
 #include "precompute/precompute.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 #include "tests/postures.h"

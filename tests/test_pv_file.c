@@ -1,15 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Files of samples and of parameters. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "test.h"
 
-#include <cmocka.h>
 #include <gsl/gsl_errno.h>
 
 #include "program/breath/pv.h"
@@ -100,7 +92,8 @@ static void test_samples_load_malformed_names_the_line(void **state) {
       {"pressure_cmH2O,volume_mL\n1,2 mL\n", ":2: volume_mL \"2 mL\""},
       {"pressure_cmH2O,volume_mL\n1,\"2\"3\n", ":2: a quote is not closed"},
       {"pressure_cmH2O,volume_mL,limb\n1,2,in\n", ":2: limb \"in\""},
-      {"pressure_cmH2O,volume_mL,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,\n",
+      {"pressure_cmH2O,volume_mL,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,"
+       "\n",
        ":1: more than 64 fields"},
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {

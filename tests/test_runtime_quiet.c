@@ -1,17 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What the library asks of the system: memory and files when opening, nothing afterwards; and what
  * it does when an allocation fails. Linked with --wrap, so that every call passes through here. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/types.h>
 
-#include <cmocka.h>
+#include "test.h"
 
 #include <supine/breath.h>
 #include <supine/posture.h>

@@ -1,17 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Y_lm of a direction: closed forms, orthonormality, addition theorem, rotation, edges. */
 #include <float.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "sh/grid.h"
+#include "test.h"
 #include <supine/sh.h>
 
 #include "sh_helpers.h"

@@ -1,15 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Templates: names, sections, escapes. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "program/template/template.h"
+#include "test.h"
 
 static void write_large(const void *context, const char *name, FILE *file) {
   (void)fprintf(file, "[%s %s]", (const char *)context, name);

@@ -1,18 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A basis file is the same, byte for byte, whatever the number of threads. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
+#include "test.h"
 
 enum { VERTICES = 9000 }; /* several blocks of every sum, the last of them short */
 

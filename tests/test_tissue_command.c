@@ -1,20 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The tissue options of solve and precompute: what they accept, refuse, warn of and write. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
+#include "test.h"
 #include <supine/runtime.h>
 
 #include "program/options/command.h"

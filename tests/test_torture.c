@@ -1,18 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Meshes and stiffnesses that no lung has: the solve answers with its residual. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
+#include "test.h"
 
 #include "lungs_helpers.h"
 

@@ -1,15 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* [Santhanam2008] Figs. 7 to 9: sheet, ring and convergence, against a mass-spring-damper system
  * that is integrated to rest. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
-
+#include "test.h"
 #include "validation.h"
 
 /* Fig. 8 */

@@ -1,15 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Postures as trackers give them, rotations that are none, and smoothing. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
-#include <string.h>
-
 #include "program/stream/gravity.h"
+#include "tests/test.h"
 #include <supine/posture.h>
 
 /* A few roundings of 32-bit numbers. */

@@ -1,22 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Poses in files, volumes in words, latencies in counts. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
 #include "precompute/writer.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
 #include "program/stream/volume.h"
 #include "tests/poses.h"
 #include "tests/runtime_fixture.h"
+#include "tests/test.h"
 
 static char *folder;
 

@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Bytes on the wire, against those that the protocol's public library makes. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
+#include "tests/test.h"
 
-#include <cmocka.h>
 #include <igtl_header.h>
 #include <igtl_ndarray.h>
 #include <igtl_point.h>
@@ -15,10 +11,6 @@
 #include <igtl_string.h>
 #include <igtl_transform.h>
 #include <igtl_util.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "program/stream/crc64.h"
 #include "program/stream/frame.h"
