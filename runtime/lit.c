@@ -4,6 +4,7 @@
 
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
+#include "sh/base/clones.h"
 
 enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
 
@@ -19,7 +20,7 @@ uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size
 }
 
 /* Word `word` of 16 vertices along one axis. */
-static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
+SUPINE_CLONES static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
                       unsigned char *at) {
   const size_t last = basis->info.vertex_count - 1;
   const size_t count = basis->info.normal_count;

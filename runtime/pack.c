@@ -6,6 +6,7 @@
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/safetensors/platform.h"
+#include "sh/base/clones.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */
@@ -25,6 +26,18 @@ typedef struct units {
   double direction;
   double rest; /* a power of two */
 } units;
+
+/* Largest values so far, by place in the tile. */
+typedef struct bounds {
+  float mode_error[SUPINE_MODES_MAX][TILE], mode_size[SUPINE_MODES_MAX][TILE];
+  float rest_error[TILE], rest_size[TILE]; /* squared */
+} bounds;
+
+typedef struct work {
+  units units;
+  bounds bounds;
+  source was, is; /* before packing, and after */
+} work;
 
 /* Numbers so small that products with them would be subnormal, and slow. */
 static float flush(float value) {
@@ -47,23 +60,32 @@ static double direction_length(const supine_basis *basis, size_t i) {
 }
 
 static void source_load(const supine_basis *basis, size_t tile, source *from) {
-  const size_t modes = basis->info.mode_count;
-  const size_t axes = basis->tiles.axes;
+  const size_t rows = basis->tiles.axes * basis->info.mode_count;
   const size_t begin = tile * TILE;
   const size_t left = basis->info.vertex_count - begin;
+  double length[TILE];
+  memset(from->direction, 0, sizeof from->direction);
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = begin + (v < left ? v : left - 1);
+    length[v] = direction_length(basis, i);
     memcpy(from->rest + 3 * v, basis->info.vertices + 3 * i, 3 * sizeof *from->rest);
-    const double length = direction_length(basis, i);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      from->direction[3 * v + axis] =
-          basis->info.direction != NULL
-              ? (float)((double)basis->info.direction[3 * i + axis] / length)
-              : 0;
+    if (basis->info.direction != NULL) {
+      memcpy(from->direction + 3 * v, basis->info.direction + 3 * i, 3 * sizeof *from->direction);
     }
-    for (size_t row = 0; row < axes * modes; ++row) {
-      from->coefficients[row * TILE + v] =
-          flush((float)(length * (double)basis->info.coefficients[i * axes * modes + row]));
+    for (size_t row = 0; row < rows; ++row) {
+      from->coefficients[row * TILE + v] = basis->info.coefficients[i * rows + row];
+    }
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v < TILE; ++v) {
+      float *component = &from->direction[3 * v + axis];
+      *component = (float)((double)*component / length[v]);
+    }
+  }
+  for (size_t row = 0; row < rows; ++row) {
+    float *values = from->coefficients + row * TILE;
+    for (size_t v = 0; v < TILE; ++v) {
+      values[v] = flush((float)(length[v] * (double)values[v]));
     }
   }
 }
@@ -207,65 +229,72 @@ static void pack_numbers(const supine_tiles *tiles, double unit, float *numbers,
   memcpy(at, words, sizeof words);
 }
 
-/* Largest length of 16 vectors. */
-static double longest(const float *xyz) {
-  float top = 0;
+static void raise_to(float *top, const float *values) {
   for (size_t v = 0; v < TILE; ++v) {
-    const float *p = xyz + 3 * v;
-    const float square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-    top = square > top ? square : top;
+    top[v] = values[v] > top[v] ? values[v] : top[v];
   }
-  return sqrt((double)top);
 }
 
-static void raise_to(double *bound, double value) {
-  *bound = value > *bound ? value : *bound;
+/* The squared lengths of 16 vectors. */
+static void squares(const float *xyz, float *square) {
+  for (size_t v = 0; v < TILE; ++v) {
+    const float *p = xyz + 3 * v;
+    square[v] = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+  }
+}
+
+static void roots(float *values) {
+#pragma GCC unroll 1 /* else it is taken apart before it is made a vector */
+  for (size_t v = 0; v < TILE; ++v) {
+    values[v] = sqrtf(values[v]);
+  }
 }
 
 /* Raises the bounds to what this tile needs, `was` before packing and `is` after. With one axis,
  * |c d - c' d'| <= |c - c'| |d| + |c'| |d - d'|; a vector's length is over its three axes. */
-static void measure(supine_basis *basis, const source *was, const source *is) {
+static void measure(const supine_tiles *tiles, const source *was, const source *is, bounds *top) {
   float difference[TILE_NUMBERS];
   float length[TILE];
   float slip[TILE];
+  float value[TILE];
   for (size_t j = 0; j < TILE_NUMBERS; ++j) {
     difference[j] = was->rest[j] - is->rest[j];
   }
-  raise_to(&basis->rest_error, longest(difference));
-  raise_to(&basis->rest_size, longest(was->rest));
-  for (size_t v = 0; v < TILE; ++v) {
-    float d = 0;
-    float e = 0;
-    for (size_t j = 3 * v; j < 3 * v + 3; ++j) {
-      const float apart = was->direction[j] - is->direction[j];
-      d += was->direction[j] * was->direction[j];
-      e += apart * apart;
-    }
-    length[v] = basis->tiles.axes == 3 ? 1 : sqrtf(d);
-    slip[v] = sqrtf(e);
+  squares(difference, value);
+  raise_to(top->rest_error, value);
+  squares(was->rest, value);
+  raise_to(top->rest_size, value);
+  for (size_t j = 0; j < TILE_NUMBERS; ++j) {
+    difference[j] = was->direction[j] - is->direction[j];
   }
-  const size_t modes = basis->tiles.modes;
+  squares(difference, slip);
+  squares(was->direction, length);
+  roots(length);
+  for (size_t v = 0; v < TILE && tiles->axes == 3; ++v) {
+    length[v] = 1;
+  }
+  roots(slip);
+  const size_t modes = tiles->modes;
   for (size_t k = 0; k < modes; ++k) {
     float apart[TILE] = {0};
     float size[TILE] = {0};
-    for (size_t axis = 0; axis < basis->tiles.axes; ++axis) {
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
       const float *c = was->coefficients + (axis * modes + k) * TILE;
       const float *packed = is->coefficients + (axis * modes + k) * TILE;
+#pragma GCC unroll 1 /* likewise */
       for (size_t v = 0; v < TILE; ++v) {
         apart[v] += (c[v] - packed[v]) * (c[v] - packed[v]);
         size[v] += c[v] * c[v];
       }
     }
-    float top_error = 0;
-    float top_size = 0;
+    roots(apart);
+    roots(size);
     for (size_t v = 0; v < TILE; ++v) {
-      const float error = sqrtf(apart[v]) * length[v] + sqrtf(size[v]) * slip[v];
-      const float moved = sqrtf(size[v]) * length[v];
-      top_error = error > top_error ? error : top_error;
-      top_size = moved > top_size ? moved : top_size;
+      apart[v] = apart[v] * length[v] + size[v] * slip[v];
+      size[v] *= length[v];
     }
-    raise_to(&basis->mode_error[k], (double)top_error);
-    raise_to(&basis->mode_size[k], (double)top_size);
+    raise_to(top->mode_error[k], apart);
+    raise_to(top->mode_size[k], size);
   }
 }
 
@@ -277,48 +306,50 @@ unsigned char *supine_tiles_allocate(size_t bytes) {
   return memory;
 }
 
-supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
-  supine_tiles *tiles = &basis->tiles;
-  supine_status status = SUPINE_ERROR_MEMORY;
-  const size_t count = (basis->info.vertex_count + TILE - 1) / TILE;
-  source *was = malloc(sizeof *was);
-  source *is = malloc(sizeof *is);
-  units *u = calloc(1, sizeof *u);
-  supine_platform_free(tiles->bytes);
-  supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
-  tiles->bytes = supine_tiles_allocate(count * tiles->stride);
-  if (was == NULL || is == NULL || u == NULL || tiles->bytes == NULL) {
-    goto cleanup;
-  }
-  choose_units(basis, u);
-  memset(basis->mode_error, 0, sizeof basis->mode_error);
-  memset(basis->mode_size, 0, sizeof basis->mode_size);
-  basis->rest_error = 0;
-  basis->rest_size = 0;
-  for (size_t t = 0; t < count; ++t) {
+SUPINE_CLONES __attribute__((flatten)) static void pack(const supine_basis *basis, work *w) {
+  const supine_tiles *tiles = &basis->tiles;
+  source *is = &w->is;
+  for (size_t t = 0; t < tiles->count; ++t) {
     unsigned char *tile = tiles->bytes + t * tiles->stride;
-    source_load(basis, t, was);
-    memcpy(is->coefficients, was->coefficients, tiles->axes * tiles->modes * TILE * sizeof(float));
-    memcpy(is->direction, was->direction, sizeof is->direction);
-    memcpy(is->rest, was->rest, sizeof is->rest);
+    source_load(basis, t, &w->was);
+    memcpy(is->coefficients, w->was.coefficients,
+           tiles->axes * tiles->modes * TILE * sizeof(float));
+    memcpy(is->direction, w->was.direction, sizeof is->direction);
+    memcpy(is->rest, w->was.rest, sizeof is->rest);
     for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      pack_coefficients(tiles, u, is->coefficients + axis * tiles->modes * TILE,
+      pack_coefficients(tiles, &w->units, is->coefficients + axis * tiles->modes * TILE,
                         tile + axis * tiles->axis_bytes);
     }
     if (tiles->axes == 1) {
-      pack_numbers(tiles, u->direction, is->direction, tile + tiles->direction_begin);
+      pack_numbers(tiles, w->units.direction, is->direction, tile + tiles->direction_begin);
     }
-    pack_numbers(tiles, u->rest, is->rest, tile + tiles->rest_begin);
-    measure(basis, was, is);
+    pack_numbers(tiles, w->units.rest, is->rest, tile + tiles->rest_begin);
+    measure(tiles, &w->was, is, &w->bounds);
   }
+}
+
+supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
+  supine_tiles *tiles = &basis->tiles;
+  const size_t count = (basis->info.vertex_count + TILE - 1) / TILE;
+  work *w = calloc(1, sizeof *w);
+  supine_platform_free(tiles->bytes);
+  supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector, count);
+  tiles->bytes = supine_tiles_allocate(count * tiles->stride);
+  if (w == NULL || tiles->bytes == NULL) {
+    free(w);
+    return SUPINE_ERROR_MEMORY;
+  }
+  choose_units(basis, &w->units);
+  pack(basis, w);
+  for (size_t k = 0; k < tiles->modes; ++k) {
+    basis->mode_error[k] = (double)largest(w->bounds.mode_error[k], TILE);
+    basis->mode_size[k] = (double)largest(w->bounds.mode_size[k], TILE);
+  }
+  basis->rest_error = sqrt((double)largest(w->bounds.rest_error, TILE));
+  basis->rest_size = sqrt((double)largest(w->bounds.rest_size, TILE));
   basis->info.storage = storage;
   basis->info.packed = tiles->bytes;
   basis->info.bytes_per_vertex = (double)tiles->stride / TILE;
-  status = SUPINE_OK;
-
-cleanup:
-  free(was);
-  free(is);
-  free(u);
-  return status;
+  free(w);
+  return SUPINE_OK;
 }
