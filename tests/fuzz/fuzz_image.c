@@ -20,7 +20,7 @@ static void expect_words(supine_status status, const supine_error *error) {
 }
 
 static void expect_lungs(const char *path) {
-  const supine_labels_options options = {.edge = 0.0};
+  const supine_labels_options options = {.edge = 12.0}; /* few triangles: 20 times as fast */
   supine_mesh surfaces[2] = {0};
   supine_labels_report report = {0};
   supine_error error = {0};

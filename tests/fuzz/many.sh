@@ -4,8 +4,8 @@
 #
 #     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 inputs for most readers by default
 #
-# Messages, which are quick, get five times as many; what takes a process or a surface each, a 200th.
-# Ends with 1 where an input crashed a reader, or took more than 10 s or 2 GB.
+# Messages, which are quick, get five times as many; what takes a process each, a 200th.
+# Ends with 1 where an input crashed a reader, or took more than 0.5 s or 2 GB.
 set -u
 build=$1
 runs=${2:-110000}
@@ -13,8 +13,8 @@ seed=${3:-1}
 source=$(cd "$(dirname "$0")" && pwd)
 all=0
 failed=0
-for reader in ply:mesh:200 stl:mesh:200 text:text:200 basis:basis:200 message:text:1000 obj:mesh:1 \
-  nrrd:image:1 nii:image:1; do
+for reader in ply:mesh:200 stl:mesh:200 vtp:mesh:200 text:text:200 basis:basis:200 message:text:1000 obj:mesh:1 \
+  nrrd:image:200 nii:image:200 mha:image:200 points_csv:text:200 points_fcsv:text:200 points_json:text:200; do
   name=${reader%%:*}
   dictionary=${reader#*:}
   count=$((runs * ${dictionary#*:} / 200))
