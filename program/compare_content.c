@@ -91,7 +91,7 @@ static void print_table(const comparison *c, size_t from, size_t to) {
   for (size_t name = 0; name < c->names.count; ++name) {
     double move[3];
     const double length = move_between(c, from, to, name, move);
-    (void)printf("  %-16s %5.1f mm", c->names.text[name], length);
+    (void)printf("  %-16s moved %5.1f mm", c->names.text[name], length);
     if (error_of(c, from, to, name) > 0.0) {
       (void)printf(" (expected error %.1f)", error_of(c, from, to, name));
     }
@@ -120,7 +120,7 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
     if (json_array_append_new(
             list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from",
                             c->postures->item[from].name, "to", c->postures->item[to].name, "name",
-                            c->names.text[name], "move", move[0], move[1], move[2], "mm", length,
+                            c->names.text[name], "move", move[0], move[1], move[2], "moved_mm", length,
                             "expected_error_mm", error_of(c, from, to, name))) != 0) {
       return false;
     }
@@ -131,7 +131,7 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
 /* All that was asked for, pair by pair. */
 static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
   if (csv != NULL) {
-    (void)fputs("from,to,name,dx,dy,dz,mm,expected_error_mm\n", csv);
+    (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", csv);
   }
   for (size_t from = 0; from < c->postures->count; ++from) {
     for (size_t to = from + 1; to < c->postures->count; ++to) {

@@ -102,8 +102,8 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     supine_mesh_unit_name(unit, unit_name);
     supine_mesh_axes_letters(frame->axes, axes);
     (void)fprintf(output.file,
-                  "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; mm: its length%s\n"
-                  "name,lung,x,y,z,dx,dy,dz,mm%s\n",
+                  "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: its length%s\n"
+                  "name,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
                   from->name, axes, unit_name,
                   expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
                   expected->sigma == NULL ? "" : ",expected_error_mm");

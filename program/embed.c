@@ -37,6 +37,7 @@ typedef struct request {
   bool has_grid;
   double grid; /* mm */
   bool clamp;
+  const char *rigid; /* parts by name, or "all" */
   supine_mesh_load_options load;
 } request;
 
@@ -80,6 +81,10 @@ static const supine_option table[] = {
      "beside points and meshes",
      SUPINE_FILLS(request, labels), .read = read_labels,
      .wants = "all, or at most 64 labels with names of up to 31 letters, as 7=nodule,8=vessels"},
+    {"rigid", 0, "all|NAME,...",
+     "these parts keep their size and shape and turn with the tissue, as nodules and tumours do; "
+     "others are deformed with it",
+     SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
      "what lies outside the lungs moves as the nearest point of their surface, instead of as the "
      "inside would if it went on",
@@ -177,6 +182,10 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
                  content->grid.size[2]);
   }
   (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
+  if (report->rigid > 0) {
+    (void)printf("%zu %s: moved and turned, never deformed\n", report->rigid,
+                 report->rigid == 1 ? "rigid part" : "rigid parts");
+  }
   if (shells->scan.gains[0][0] != 0.0) {
     (void)puts("given where the scan had it; the file holds it at full inflation");
   }
@@ -209,6 +218,8 @@ static int embed(const supine_basis *basis, const request *wanted, const supine_
   if (supine_inside_shells_create(basis, &shells, &error) != SUPINE_OK ||
       read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, &error) !=
           SUPINE_OK ||
+      (wanted->rigid != NULL &&
+       supine_inside_content_make_rigid(&content, wanted->rigid, &error) != SUPINE_OK) ||
       supine_inside_embed(&shells, &content, &options, wanted->path, &report, &error) !=
           SUPINE_OK) {
     result = supine_options_fail(name, &error);
@@ -273,13 +284,13 @@ const supine_command supine_command_embed = {
         "Displacements inside are the biharmonic interpolation of the surface's, lung by lung: a "
         "point on the surface moves with it, and an affine motion goes on inside.",
     .options = table,
-    .notes =
-        "Examples:\n"
-        "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
-        "  supine deform inside.safetensors --posture prone -o prone.csv\n"
-        "  supine embed lungs.safetensors labels.nii.gz --labels 7=nodule -o inside.safetensors\n"
-        "  supine embed lungs.safetensors ct.nii.gz -o grid.safetensors\n"
-        "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
+    .notes = "Examples:\n"
+             "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
+             "  supine deform inside.safetensors --posture prone -o prone.csv\n"
+             "  supine embed lungs.safetensors labels.nii.gz --labels 7=nodule --rigid nodule -o "
+             "inside.safetensors\n"
+             "  supine embed lungs.safetensors ct.nii.gz -o grid.safetensors\n"
+             "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
     .operands_least = 1,
     .operands_most = SIZE_MAX,
     .operands_missing = "name a basis file (made by 'supine precompute'), then what is inside",

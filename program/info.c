@@ -103,6 +103,11 @@ static void print_content(const supine_basis *basis, const char *content) {
   }
   (void)printf("; %zu triangles; %s\n", info->triangle_count,
                info->has_volume ? "volumes are the lungs'" : "no volumes");
+  const supine_tensor *rigid = supine_basis_tensor(basis, "rigid");
+  if (rigid != NULL) {
+    (void)printf("  %zu rigid %s: moved and turned, never deformed\n", rigid->shape[0],
+                 rigid->shape[0] == 1 ? "part" : "parts");
+  }
 }
 
 /* The expected error of the default state, supine and prone, counted from the scan. */

@@ -46,7 +46,7 @@ static void add_part(const supine_command_names *names, size_t part, const size_
       out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
     }
   }
-  (void)snprintf(out->label[part], sizeof out->label[part], "%.32s %.1f mm", names->text[part],
+  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm", names->text[part],
                  (double)middle.value);
   out->mark[out->marks.count++] = middle;
 }

@@ -479,6 +479,30 @@ static supine_status take_options(const check *c, const supine_basis_options *op
 }
 
 /* Takes the file, whatever comes of it. */
+/* Rigid parts are optional: ranges of vertices, each in one lung. */
+static supine_status check_rigid(const check *c, supine_basis *basis) {
+  const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
+  if (rigid == NULL) {
+    return SUPINE_OK;
+  }
+  bool well = rigid->dtype == SUPINE_U32 && rigid->rank == 2 && rigid->shape[1] == 2;
+  for (size_t i = 0; well && i < rigid->shape[0]; ++i) {
+    const uint32_t *range = (const uint32_t *)rigid->data + 2 * i;
+    size_t lung = 0;
+    while (lung < basis->info.lung_count && range[0] >= basis->lung_begin[lung + 1]) {
+      ++lung;
+    }
+    well = lung < basis->info.lung_count && range[0] < range[1] &&
+           range[1] <= basis->lung_begin[lung + 1];
+  }
+  if (!well) {
+    return refuse(c, "rigid must be ranges of vertices, [R, 2], each in one lung");
+  }
+  basis->rigid = rigid->data;
+  basis->rigid_count = rigid->shape[0];
+  return SUPINE_OK;
+}
+
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
@@ -494,8 +518,8 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface,   check_field, check_modes, check_lungs,  check_volume,
-      check_reference, check_rest,  check_scan,  check_normals};
+      check_surface,   check_field, check_modes, check_lungs,   check_volume,
+      check_reference, check_rest,  check_scan,  check_normals, check_rigid};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }

@@ -80,4 +80,8 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
     }
   }
   supine_stream_fence(stream);
+  for (size_t j = 0; j < count && basis->rigid_count > 0; ++j) {
+    supine_deform_rigid(basis, &poses[j], begin, end,
+                        &(supine_target){.x = xyz + j * apart, .rest = true});
+  }
 }

@@ -2,7 +2,7 @@
 /* Deformed positions x_ij = p_ij + gain_j (w . c_i) d_ij, in runs of whole tiles of one lung. */
 #include <string.h>
 
-#include "runtime/internal.h"
+#include "runtime/rigid.h"
 
 supine_target supine_target_after(const supine_target *target, size_t count) {
   supine_target moved = *target;
@@ -53,6 +53,42 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
+enum { RIGID_BLOCK = 256 }; /* vertices evaluated at once */
+
+void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  for (size_t part = 0; part < basis->rigid_count; ++part) {
+    const size_t first = basis->rigid[2 * part];
+    const size_t last = basis->rigid[2 * part + 1];
+    supine_rigid_motion m = {.count = 0};
+    if (first >= end || last <= begin) {
+      continue;
+    }
+    float folded[SUPINE_MODES_MAX + 3];
+    size_t lung = 0;
+    while (first >= basis->lung_begin[lung + 1]) {
+      ++lung;
+    }
+    supine_fold(basis, pose, lung, folded);
+    for (size_t at = first; at < last; at += RIGID_BLOCK) {
+      float x[3 * RIGID_BLOCK];
+      const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
+      const supine_target block = {.x = x, .rest = true};
+      supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, at, next, &block);
+      supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
+    }
+    supine_rigid_finish(&m);
+    for (size_t i = first > begin ? first : begin; i < last && i < end; ++i) {
+      const float *p = basis->info.vertices + 3 * i;
+      float *const to[3] = {target->x, target->y, target->z};
+      for (size_t a = 0; a < 3; ++a) {
+        const double value = supine_rigid_move(&m, p, a) - (target->rest ? 0 : (double)p[a]);
+        *(target->y == NULL ? target->x + 3 * (i - begin) + a : to[a] + (i - begin)) = (float)value;
+      }
+    }
+  }
+}
+
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   float folded[SUPINE_MODES_MAX + 3];
@@ -66,6 +102,7 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
     }
   }
   supine_stream_fence(target->stream);
+  supine_deform_rigid(basis, pose, begin, end, target);
 }
 
 void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,

@@ -41,6 +41,8 @@ struct supine_basis {
   double upright_gain;   /**< of the reference volume that full inflation holds more upright */
   double scan_volume;    /**< mL of the scan beyond the reference */
   double scan_gravity[3];
+  const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
+  size_t rigid_count;
   double rest_error; /**< largest error of a rest position, mm */
   double rest_size;  /**< largest distance of a rest position from 0, mm */
 };
@@ -64,6 +66,10 @@ unsigned char *supine_tiles_allocate(size_t bytes);
 /** Evaluates vertices begin <= i < end, all of one lung, into a target for them. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
+
+/** Make the rigid parts among vertices begin <= i < end of a target rigid, see rigid.h. */
+void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target);
 
 /** A target `count` vertices further on. */
 supine_target supine_target_after(const supine_target *target, size_t count);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "runtime/locate.h"
+#include "runtime/rigid.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "one limit");
 
@@ -170,8 +171,7 @@ static void find_residuals(study *s) {
   }
 }
 
-/* Start from the rotation that fits the points best [Horn 1987, J Opt Soc Am A 4(4)]: the largest
- * eigenvector of a symmetric 4 x 4 matrix, by powers. */
+/* Start from the rotation that fits the points best. */
 static void rotate_roughly(study *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
@@ -189,37 +189,7 @@ static void rotate_roughly(study *s) {
       }
     }
   }
-  const double m[4][4] = {
-      {h[0][0] + h[1][1] + h[2][2], h[1][2] - h[2][1], h[2][0] - h[0][2], h[0][1] - h[1][0]},
-      {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
-      {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
-      {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]}};
-  double shift = 0; /* makes every eigenvalue positive */
-  for (size_t k = 0; k < 16; ++k) {
-    shift += m[k / 4][k % 4] * m[k / 4][k % 4];
-  }
-  shift = sqrt(shift);
-  double q[4] = {0.9, 0.3, 0.2, 0.1};
-  for (int step = 0; step < 200; ++step) {
-    double next[4];
-    double square = 0;
-    for (size_t a = 0; a < 4; ++a) {
-      next[a] = shift * q[a] + m[a][0] * q[0] + m[a][1] * q[1] + m[a][2] * q[2] + m[a][3] * q[3];
-      square += next[a] * next[a];
-    }
-    for (size_t a = 0; a < 4 && square > 0; ++a) {
-      q[a] = next[a] / sqrt(square);
-    }
-  }
-  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double w = q[0] / length;
-  const double x = q[1] / length;
-  const double y = q[2] / length;
-  const double z = q[3] / length;
-  const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                       2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                       2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  memcpy(s->found->rotation, r, sizeof r);
+  supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
 }
 
 /* R exp(r) [Rodrigues]. */

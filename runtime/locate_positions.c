@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "runtime/locate.h"
+#include "runtime/rigid.h"
 
 /* The poses that a position follows from. */
 typedef struct poses {
@@ -101,6 +102,9 @@ supine_status supine_locate_positions(const supine_location *found, const supine
       predict(found, basis, &p, lung, begin, end, &b);
       finish(found, &p, &b, end - begin, xyz + 3 * begin, sigma + begin);
     }
+  }
+  if (status == SUPINE_OK) {
+    supine_rigid_restore(basis, xyz);
   }
   return status;
 }

@@ -5,6 +5,7 @@
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"
 #include "precompute/inside/grid.h"
+#include "sh/base/vec3.h"
 
 #include "tests/poses.h"
 
@@ -659,6 +660,137 @@ static void test_content_meshes_parts_and_triangles(void **state) {
   supine_inside_content_free(&content);
 }
 
+static double part_volume(const supine_basis_info *info, uint32_t part_end, const float *xyz) {
+  double sum = 0.0;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    double corner[3][3];
+    for (size_t k = 0; k < 9; ++k) {
+      corner[k / 3][k % 3] = (double)xyz[3 * (size_t)info->triangles[3 * t + k / 3] + k % 3];
+    }
+    sum += info->triangles[3 * t] < part_end ? supine_triple(corner[0], corner[1], corner[2]) : 0.0;
+  }
+  return sum / 6.0;
+}
+
+/* Sum of squares from positions to others after a small turn about their mean along an axis. */
+static double misfit_turned(size_t count, const float *from, const float *to, size_t axis,
+                            double angle) {
+  const size_t a = (axis + 1) % 3;
+  const size_t b = (axis + 2) % 3;
+  double mean[3] = {0.0};
+  double sum = 0.0;
+  for (size_t k = 0; k < 3 * count; ++k) {
+    mean[k % 3] += (double)from[k] / (double)count;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    double p[3];
+    for (size_t k = 0; k < 3; ++k) {
+      p[k] = (double)from[3 * i + k] - mean[k];
+    }
+    const double turned[2] = {cos(angle) * p[a] - sin(angle) * p[b],
+                              sin(angle) * p[a] + cos(angle) * p[b]};
+    p[a] = turned[0];
+    p[b] = turned[1];
+    for (size_t k = 0; k < 3; ++k) {
+      sum += pow(p[k] + mean[k] - (double)to[3 * i + k], 2.0);
+    }
+  }
+  return sum;
+}
+
+/* A tumour that keeps its size beside one that does not: given where a scan had it, there again in
+ * the scan's state, of one volume in every pose, the best rigid motion of the field, and the same
+ * through every call that places vertices. */
+static void test_embed_rigid_part_keeps_volume_and_follows_the_field(void **state) {
+  (void)state;
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
+  helper_write_scanned_basis(path, 10, 2, "0.6,0.8,0", "-900");
+  supine_basis *scanned = helper_open(path);
+  const supine_inside_shells unmoved = shells;
+  supine_inside_shells moved_shells;
+  assert_int_equal(supine_inside_shells_create(scanned, &moved_shells, NULL), SUPINE_OK);
+  shells = moved_shells;
+  supine_inside_content content = {0};
+  for (size_t side = 0; side < 2; ++side) {
+    supine_mesh mesh = helper_lump(7, 0.0, 9 + side);
+    for (size_t k = 0; k < 3 * mesh.vertex_count; ++k) { /* 40 mm long, in the lung */
+      mesh.vertices[k] = 0.15 * mesh.vertices[k] + (k % 3 == 0 ? 73.7 - 149.1 * (double)side : 3.0);
+    }
+    assert_int_equal(
+        supine_inside_content_surface(side == 0 ? "tumour" : "soft", &mesh, &content, NULL),
+        SUPINE_OK);
+    supine_mesh_free(&mesh);
+  }
+  (void)embed(&content, false, 0);
+  supine_basis *soft = helper_open(inside_path);
+  supine_error error;
+  assert_int_equal(supine_inside_content_make_rigid(&content, "tumor", &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "'tumor'"));
+  free(content.rigid);
+  assert_int_equal(supine_inside_content_make_rigid(&content, "tumour", NULL), SUPINE_OK);
+  assert_int_equal(embed(&content, false, 0).rigid, 1);
+  supine_basis *inside = helper_open(inside_path);
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
+  const uint32_t end = ((const uint32_t *)supine_basis_tensor(inside, "rigid")->data)[1];
+  assert_int_equal(end, n / 2);
+  float *xyz = malloc(4 * 3 * n * sizeof *xyz);
+  float *others = xyz + 3 * n; /* [3, N, 3] */
+  const supine_pose *scan = &moved_shells.scan;
+  supine_deform(inside, scan, xyz);
+  const uint32_t *part = supine_basis_tensor(inside, "part")->data;
+  for (size_t i = 0; i < 3 * n; ++i) { /* vertices keep their order within a lung */
+    assert_close((double)xyz[i], content.points[i], 2e-4);
+    assert_int_equal(part[i / 3], i / 3 >= end);
+  }
+  const double given = part_volume(info, end, xyz);
+  double least_soft = INFINITY;
+  for (size_t j = 0; j < 5; ++j) {
+    const double weights[HELPER_MODES] = {0.7 - 0.4 * (double)j, 0.5 * (double)j - 0.9, 0.3};
+    const double scales[2] = {0.9, 0.2 + 0.1 * (double)j};
+    const supine_pose *pose = POSED(inside, weights, scales);
+    supine_deform(soft, pose, others);
+    least_soft = fmin(least_soft, fabs(part_volume(info, end, others) / given - 1.0));
+    supine_displace_range(soft, pose, 0, n, others);
+    for (size_t k = 0; k < 3 * n; ++k) {
+      others[k] += info->vertices[k];
+    }
+    supine_deform(inside, pose, xyz);
+    assert_close(part_volume(info, end, xyz) / given, 1.0, 1e-5); /* a thousandth is promised */
+    const double misfit = misfit_turned(end, xyz, others, 0, 0.0);
+    for (size_t axis = 0; axis < 6; ++axis) {
+      assert_true(misfit < misfit_turned(end, xyz, others, axis % 3, axis < 3 ? 0.002 : -0.002));
+    }
+    for (size_t k = 3 * end; k < 3 * n; ++k) {
+      assert_close((double)xyz[k], (double)others[k], 1e-4); /* the soft part */
+    }
+    float *x = others;
+    supine_deform_separate(inside, pose, 0, n, x, x + n, x + 2 * n);
+    supine_displace_range(inside, pose, 0, n, others + 3 * n);
+    for (size_t k = 0; k < 3 * n; ++k) {
+      assert_true(x[k / 3 + n * (k % 3)] == xyz[k]);
+      assert_close((double)info->vertices[k] + (double)others[3 * n + k], (double)xyz[k], 1e-4);
+    }
+    supine_deform_batch(inside, 2, (const supine_pose[]){*scan, *pose}, 0, n, others);
+    assert_memory_equal(others + 3 * n, xyz, 3 * n * sizeof *xyz);
+    for (size_t begin = 0; begin < n; begin += 37) {
+      const size_t last = begin + 37 < n ? begin + 37 : n;
+      supine_deform_range(inside, pose, begin, last, others);
+      assert_memory_equal(others, xyz + 3 * begin, 3 * (last - begin) * sizeof *xyz);
+    }
+  }
+  assert_true(least_soft > 0.02); /* the field itself does not keep it */
+  free(xyz);
+  supine_basis_close(soft);
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+  shells = unmoved;
+  supine_inside_shells_free(&moved_shells);
+  supine_basis_close(scanned);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_surface_find_side_and_distance_of_random_points),
@@ -678,6 +810,7 @@ int main(void) {
       cmocka_unit_test(test_content_points_names_axes_and_units),
       cmocka_unit_test(test_content_points_bad_files_refused),
       cmocka_unit_test(test_content_meshes_parts_and_triangles),
+      cmocka_unit_test(test_embed_rigid_part_keeps_volume_and_follows_the_field),
   };
   return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -130,7 +130,39 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
   return status;
 }
 
+supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
+                                               supine_error *error) {
+  const bool all = strcmp(names, "all") == 0;
+  content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
+  if (content->rigid == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  for (const char *at = names;; ++at) {
+    const size_t length = strcspn(at, ",");
+    const char *part = content->names;
+    bool found = false;
+    for (size_t i = 0; i < content->part_count; ++i) {
+      const size_t size = strcspn(part, "\n");
+      if (all || (size == length && memcmp(part, at, size) == 0)) {
+        content->rigid[i] = found = true;
+      }
+      part += size + 1;
+    }
+    if (!found) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--rigid: no part is named '%.*s': a mesh's name is its file's, a "
+                              "label's as --labels has it",
+                              (int)length, at);
+    }
+    at += length;
+    if (*at == '\0') {
+      return SUPINE_OK;
+    }
+  }
+}
+
 void supine_inside_content_free(supine_inside_content *content) {
+  free(content->rigid);
   free(content->points);
   free(content->part);
   free(content->triangles);

@@ -24,6 +24,7 @@ typedef struct supine_inside_content {
   uint32_t *triangles; /**< [triangle_count, 3] */
   size_t part_count;   /**< names of parts; 0: a grid */
   char *names;         /**< in order of part, each but the last followed by a newline */
+  bool *rigid;         /**< [part_count] parts that keep their size; NULL: none */
   supine_inside_grid grid;
 } supine_inside_content;
 
@@ -42,6 +43,13 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
+
+/** Makes parts rigid.
+ * @param names  separated by commas, or "all"
+ * @retval SUPINE_ERROR_ARGUMENT  no part is named so
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
+                                               supine_error *error);
 
 void supine_inside_content_free(supine_inside_content *content);
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "precompute/writer.h"
+#include "runtime/rigid.h"
 #include "sh/base/parallel.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -28,6 +29,8 @@ typedef struct embedding {
   uint32_t *part;
   unsigned char *group;
   uint32_t *triangles; /* [M, 3] */
+  uint32_t *rigid;     /* [rigid_count, 2] first vertex of a rigid part, and that behind its last */
+  size_t rigid_count;
 } embedding;
 
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
@@ -39,6 +42,37 @@ static void find_places(void *context, size_t begin, size_t end, size_t thread) 
         supine_inside_shells_find(e->shells, e->content->points + 3 * i, INFINITY, &walk);
     e->lung[i] = (unsigned char)lung;
     e->place[i] = walk.place[lung];
+  }
+}
+
+/* Points [begin, end) of the content, a rigid part: into the lung of most of them. */
+static void gather_part(embedding *e, size_t begin, size_t end) {
+  size_t count[SUPINE_LUNGS_MAX] = {0};
+  size_t most = 0;
+  for (size_t i = begin; i < end; ++i) {
+    const size_t lung = e->lung[i];
+    most = ++count[lung] > count[most] ? lung : most;
+  }
+  for (size_t i = begin; i < end; ++i) {
+    if (e->lung[i] != most) {
+      e->lung[i] = (unsigned char)most;
+      e->place[i] = supine_inside_surface_find(e->shells->shell[most].surface,
+                                               e->content->points + 3 * i, NULL);
+    }
+  }
+}
+
+static void gather_parts(embedding *e) {
+  const supine_inside_content *content = e->content;
+  for (size_t begin = 0; content->rigid != NULL && begin < content->count;) {
+    size_t end = begin + 1;
+    while (end < content->count && content->part[end] == content->part[begin]) {
+      ++end;
+    }
+    if (content->rigid[content->part[begin]]) {
+      gather_part(e, begin, end);
+    }
+    begin = end;
   }
 }
 
@@ -74,7 +108,19 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
     e->triangles[i] = position[e->content->triangles[i]];
   }
   free(position);
+  for (size_t begin = 0; e->content->rigid != NULL && begin < n;) {
+    size_t end = begin + 1;
+    while (end < n && e->part[end] == e->part[begin]) {
+      ++end;
+    }
+    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a point is rigid as it is */
+      e->rigid[2 * e->rigid_count] = (uint32_t)begin;
+      e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
+    }
+    begin = end;
+  }
   report->count = n;
+  report->rigid = e->rigid_count;
   return SUPINE_OK;
 }
 
@@ -92,8 +138,7 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
 }
 
 /* From where the scan had the points [begin, end) to where full inflation has them. */
-static void take_back(embedding *e, size_t lung, size_t begin, size_t end,
-                      const double *values) {
+static void take_back(embedding *e, size_t lung, size_t begin, size_t end, const double *values) {
   const size_t modes = e->columns / 3;
   for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -203,6 +248,41 @@ cleanup:
   return status;
 }
 
+/* The part as it was given, turned and shifted so that the field at the scan's weights, from there,
+ * takes it back to where it was: the turn is found by repetition, as the field is that of where
+ * full inflation has the vertices. */
+static void take_back_rigid(embedding *e, size_t begin, size_t end) {
+  enum { TURNS = 60 };
+  const double count = (double)(end - begin);
+  double given[3] = {0.0};
+  double full[3] = {0.0};
+  double r[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  for (size_t k = 3 * begin; k < 3 * end; ++k) {
+    given[k % 3] += e->content->points[3 * e->order[k / 3] + k % 3] / count;
+    full[k % 3] += (double)e->vertices[k] / count;
+  }
+  for (int turn = 0; turn <= TURNS; ++turn) {
+    double h[3][3] = {{0.0}};
+    for (size_t i = begin; i < end; ++i) {
+      const double *scan = e->content->points + 3 * e->order[i];
+      double p[3];
+      for (size_t a = 0; a < 3; ++a) { /* R' (scan - its mean) */
+        p[a] = r[a] * (scan[0] - given[0]) + r[3 + a] * (scan[1] - given[1]) +
+               r[6 + a] * (scan[2] - given[2]);
+      }
+      for (size_t k = 0; k < 9; ++k) {
+        const size_t b = k % 3;
+        const double moved = scan[b] - given[b] - ((double)e->vertices[3 * i + b] - full[b]);
+        h[k / 3][b] += p[k / 3] * (p[b] + moved);
+      }
+      for (size_t a = 0; a < 3 && turn == TURNS; ++a) {
+        e->vertices[3 * i + a] = (float)(full[a] + p[a]);
+      }
+    }
+    supine_rigid_rotation((const double(*)[3])h, r);
+  }
+}
+
 /* Metadata of the surface that do not hold for what is inside. */
 static bool dropped(const char *key) {
   static const char *const keys[] = {
@@ -284,6 +364,9 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     tensors[count++] =
         (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
   }
+  if (e->rigid_count > 0) {
+    tensors[count++] = (supine_tensor){"rigid", SUPINE_U32, 2, {e->rigid_count, 2}, e->rigid};
+  }
   return write_file(e, path, tensors, count, error);
 }
 
@@ -298,9 +381,10 @@ static bool allocate(embedding *e) {
   e->part = malloc(n * sizeof *e->part);
   e->group = malloc(n);
   e->triangles = malloc((3 * e->content->triangle_count + 1) * sizeof *e->triangles);
-  return e->place != NULL && e->lung != NULL && e->order != NULL && e->vertices != NULL &&
-         e->coefficients != NULL && e->depth != NULL && e->part != NULL && e->group != NULL &&
-         e->triangles != NULL;
+  e->rigid = malloc((2 * e->content->part_count + 1) * sizeof *e->rigid);
+  return e->rigid != NULL && e->place != NULL && e->lung != NULL && e->order != NULL &&
+         e->vertices != NULL && e->coefficients != NULL && e->depth != NULL && e->part != NULL &&
+         e->group != NULL && e->triangles != NULL;
 }
 
 supine_status supine_inside_embed(const supine_inside_shells *shells,
@@ -324,6 +408,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
     goto cleanup;
   }
   supine_parallel_for(content->count, GRAIN, 0, find_places, &e);
+  gather_parts(&e);
   if (sort_points(&e, report) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to sort %zu points",
                               content->count);
@@ -337,6 +422,9 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       status = embed_lung(&e, lung, begin, end, sums, report, error);
     }
     begin = end;
+  }
+  for (size_t i = 0; i < e.rigid_count && status == SUPINE_OK; ++i) {
+    take_back_rigid(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
   }
   if (status == SUPINE_OK) {
     report->left_percent = sums[1] > 0.0 ? 100.0 * sqrt(sums[0] / sums[1]) : 0.0;
@@ -352,5 +440,6 @@ cleanup:
   free(e.part);
   free(e.group);
   free(e.triangles);
+  free(e.rigid);
   return status;
 }

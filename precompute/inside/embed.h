@@ -12,6 +12,9 @@
  * with q the surface's point nearest to x and s(q) its motion, linear in its triangle: what is on
  * the surface moves with it exactly, although the centres of b are some of its vertices.
  *
+ * Rigid parts are in one lung, which most of their vertices are in, and are moved by the best rigid
+ * motion of that field (runtime/rigid.h).
+ *
  * Content is given where the scan has it, and x, q are there. The file holds it at full inflation,
  * as it does every surface: x less u at the scan's weights and scale. */
 #ifndef SUPINE_INSIDE_EMBED_H
@@ -39,6 +42,7 @@ typedef struct supine_inside_report {
   size_t outside;      /**< points outside of every lung; of a grid: nodes of its margin */
   size_t farthest;     /**< that of them which is farthest, as it was given */
   double farthest_mm;  /**< and how far that is */
+  size_t rigid;        /**< parts of several vertices that keep their size */
   size_t centres;      /**< of the interpolation, all lungs */
   size_t surface;      /**< vertices of the lungs in question */
   double left_percent; /**< what the interpolation alone leaves at them, RMS, of the RMS motion */
@@ -50,6 +54,7 @@ typedef struct supine_inside_report {
  *     part   U32 [N]  which name a point goes by; of a grid, its node
  *     depth  F32 [N]  mm below the surface in the scan, negative outside
  *     names  U8 [.]   the parts' names, separated by newlines (not of a grid)
+ *     rigid  U32 [R, 2] vertices begin <= i < end of each rigid part (where there is one)
  *     grid   F64 [4, 3] origin and the three steps, mm; grid_size U32 [3] (of a grid)
  *
  * and the metadata "content": "points", "mesh" or "grid".

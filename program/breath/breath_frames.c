@@ -99,14 +99,15 @@ static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t fir
   return true;
 }
 
-/* Runs, greedily; within one, gains and volumes become those of the equal steps. */
+/* Runs, greedily; within one, gains and volumes become those of the equal steps. Rigid parts turn,
+ * which no equal steps do. */
 static void find_runs(breath_frames *frames) {
   const breath_course *course = frames->course;
   supine_pose pose;
   for (size_t t = 0; t < course->count; ++t) {
     frames->run[t] = t;
   }
-  if (!course->fixed ||
+  if (!course->fixed || supine_basis_tensor(frames->basis, "rigid") != NULL ||
       supine_basis_weights(frames->basis, course->gravity, pose.weights) != SUPINE_OK) {
     return;
   }

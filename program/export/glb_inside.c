@@ -64,6 +64,27 @@ static void place_vertices(glb_inside *inside, const export_source *content,
   }
 }
 
+/* Rigid parts keep their size: all their vertices have the mean motion. Morph targets, which add
+ * up, cannot turn them. */
+static void hold_rigid(glb_inside *inside, const export_source *content, const uint32_t *first) {
+  const size_t row = 3 * content->info->mode_count;
+  const supine_tensor *rigid = supine_basis_tensor(content->basis, "rigid");
+  for (size_t r = 0; rigid != NULL && r < rigid->shape[0]; ++r) {
+    const uint32_t *range = (const uint32_t *)rigid->data + 2 * r;
+    const size_t end =
+        range[1] < content->info->vertex_count ? first[range[1]] : inside->info.vertex_count;
+    for (size_t k = 0; k < row; ++k) {
+      double sum = 0.0;
+      for (size_t i = range[0]; i < range[1]; ++i) {
+        sum += (double)content->coefficients[i * row + k];
+      }
+      for (size_t i = first[range[0]]; i < end; ++i) {
+        inside->coefficients[i * row + k] = (float)(sum / (double)(range[1] - range[0]));
+      }
+    }
+  }
+}
+
 /* Triangles part by part. */
 static void group_parts(glb_inside *inside, const export_source *content, const export_parts *parts,
                         const unsigned char *point, const uint32_t *first,
@@ -143,6 +164,7 @@ supine_status supine_export_glb_inside_make(const export_source *content, const 
       inside->xyz != NULL) {
     ball(corner, triangle);
     place_vertices(inside, content, point, corner, first);
+    hold_rigid(inside, content, first);
     group_parts(inside, content, parts, point, first, triangle);
     inside->source = *content;
     inside->source.info = &inside->info;

@@ -177,8 +177,14 @@ static json_t *describe_inside(const page *p) {
     json_t *name = json_string(p->shown->parts->name[i]);
     (void)json_array_append_new(names, name != NULL ? name : json_string("?")); /* not UTF-8 */
   }
-  return json_pack("{s:I, s:o, s:o, s:o}", "vertices", (json_int_t)info->vertex_count, "lungBegin",
-                   lung_begins(info), "names", names, "units",
+  const supine_tensor *rigid = supine_basis_tensor(p->shown->inside->basis, "rigid");
+  json_t *parts = json_array();
+  for (size_t i = 0; rigid != NULL && i < rigid->shape[0]; ++i) {
+    const uint32_t first = ((const uint32_t *)rigid->data)[2 * i];
+    (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->parts->of[first]));
+  }
+  return json_pack("{s:I, s:o, s:o, s:o, s:o}", "vertices", (json_int_t)info->vertex_count,
+                   "lungBegin", lung_begins(info), "names", names, "rigid", parts, "units",
                    numbers(p->inside_unit, info->mode_count));
 }
 

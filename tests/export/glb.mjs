@@ -174,12 +174,12 @@ async function checkAnimation(basis) {
 }
 
 /** What is inside: its parts have names, lungs are seen through, and each goes where `deform` says. */
-async function checkInside(basis, words, tolerance) {
+async function checkInside(basis, words, tolerance, rigid = []) {
   const [points, ball, inside, path, moved] =
     ['points.csv', 'ball.ply', 'inside.safetensors', 'inside.glb', 'moved.csv'].map((n) => join(folder, n));
   writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\nfiducial,70,-160,-60\n');
   supine('phantom', '-o', ball, '--vertices', '100', '--volume', '5000'); // a mesh within the lungs
-  supine('embed', basis, points, ball, '-o', inside);
+  supine('embed', basis, points, ball, ...rigid, '-o', inside);
   supine('export', basis, '--inside', inside, '-o', path, ...words);
   await validate(path);
   const { meshes } = await open(path);
@@ -204,6 +204,12 @@ async function checkInside(basis, words, tolerance) {
         const [is, wanted] = [mean([...corners].map((c) => xyz[3 * c + k])), mean(truth.map((row) => +row[2 + k]))];
         assert.ok(Math.abs(is - wanted) < tolerance, `${part}: ${is} and not ${wanted}`);
       }
+      if (rigid.includes(part)) { // which morph targets shift and do not turn
+        const [first] = corners;
+        const { array } = named[part].geometry.attributes.position;
+        const across = (at, c) => Math.hypot(...[0, 1, 2].map((k) => at[3 * c + k] - at[3 * first + k]));
+        for (const c of corners) assert.ok(Math.abs(across(xyz, c) - across(array, c)) < tolerance, `${part} is deformed`);
+      }
     }
   }
 }
@@ -224,4 +230,5 @@ for (const [basis, raw, eight] of [[modes, 4, 4], [many, 16, 8]]) {
 }
 await checkAnimation(modes);
 await checkInside(modes, [], 2 * FLOAT_MM); // the table has three decimals
+await checkInside(modes, [], 2 * FLOAT_MM, ['--rigid', 'ball']);
 await checkInside(modes, ['--quantise', '--animate'], 2 * FLOAT_MM);

@@ -14,7 +14,8 @@ const TOLERANCE_MM = 0.005; // of displacements in 16 bits
 const PRINTED_MM = 0.001;   // of a text file's numbers
 const WRITTEN_MM = 0.051;   // of a move as the table has it
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
-const files = Object.fromEntries(['tumour.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
+const PARTS = [...NAMES, 'tumour', 'metastasis'];
+const files = Object.fromEntries(['tumour.obj', 'metastasis.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
 /** Four named points, and an octahedron that is a mesh. */
 const at = [[-80, -120, -90], [60, -150, -110], [70, -160, -60], [-70, -90, -150]];
@@ -22,7 +23,8 @@ writeFileSync(files['points.csv'], `name,x,y,z\n${at.map((p, i) => `${NAMES[i]},
 const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]].map((c) => c.map((x, i) => 14 * x + [80, -110, -130][i]));
 const faces = [[1, 3, 5], [3, 2, 5], [2, 4, 5], [4, 1, 5], [3, 1, 6], [2, 3, 6], [4, 2, 6], [1, 4, 6]];
 writeFileSync(files['tumour.obj'], `${corners.map((c) => `v ${c.join(' ')}\n`).join('')}${faces.map((f) => `f ${f.join(' ')}\n`).join('')}`);
-supine('embed', basis, files['points.csv'], files['tumour.obj'], '-o', files['inside.safetensors']);
+writeFileSync(files['metastasis.obj'], `${corners.map((c) => `v ${c.map((x, i) => (x - [80, -110, -130][i]) * (1 + i / 2) + [-80, -110, -120][i]).join(' ')}\n`).join('')}${faces.map((f) => `f ${f.join(' ')}\n`).join('')}`);
+supine('embed', basis, files['points.csv'], files['tumour.obj'], files['metastasis.obj'], '--rigid', 'metastasis', '-o', files['inside.safetensors']);
 supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['inside.html']);
 
 /** What the program makes of it: {name: [places]}. */
@@ -48,7 +50,7 @@ async function checkPositions(page) {
     }, [gravity, volume]);
     assert.deepEqual(found.map(([name]) => name).sort(), Object.keys(truth).sort());
     for (const [name, places] of found) {
-      assert.equal(places.length, name === 'tumour' ? 6 : 1);
+      assert.equal(places.length, /tumour|metastasis/.test(name) ? 6 : 1);
       worst = Math.max(worst, largestDistance(places.flat(), truth[name].flat()));
     }
   }
@@ -70,7 +72,7 @@ async function checkTable(page) {
     const now = deformed('prone', `rest+${depth}`);
     const from = kind === 'difference' ? deformed('supine', `rest+${depth}`) : rest;
     const rows = await page.evaluate(() => [...document.querySelectorAll('#inside-rows tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
-    assert.deepEqual(rows.map(([name]) => name).sort(), [...NAMES, 'tumour'].sort());
+    assert.deepEqual(rows.map(([name]) => name).sort(), PARTS.sort());
     for (const [name, place, move] of rows) {
       const far = mean(now[name].map((p, i) => distance(p, from[name][i])));
       assert.ok(far > 0.5, `${name} does not move`);
@@ -112,10 +114,10 @@ async function pointed(page, [x, y]) {
 async function checkPointer(page, rest) {
   const depth = await page.evaluate(() => window.supine.state.depth);
   const now = deformed('prone', `rest+${depth}`);
-  for (const name of [...NAMES, 'tumour']) {
+  for (const name of PARTS) {
     const text = await pointed(page, await onPage(page, name));
     assert.ok(text.startsWith(name), `at ${name}: ${text}`);
-    const said = Number(/([\d.]+) mm/.exec(text.slice(name.length))[1]);
+    const said = Number(/moved ([\d.]+) mm/.exec(text.slice(name.length))[1]);
     const moves = now[name].map((p, i) => distance(p, rest[name][i]));
     assert.ok(said > Math.min(...moves) - 0.02 && said < Math.max(...moves) + 0.02, `${name}: ${said}, not ${moves}`);
   }
@@ -146,15 +148,15 @@ async function checkControls(page) {
   await page.mouse.move(5, 5); // off the rows, which show their names as well
   await page.locator('#inside').focus();
   const reached = [];
-  for (let i = 0; i < 5; ++i) {
+  for (let i = 0; i < PARTS.length; ++i) {
     await page.keyboard.press('Tab');
     reached.push(await page.evaluate(() => document.activeElement.getAttribute('aria-label')));
     await page.waitForFunction((label) => { // its name is in the picture, and no other
       const shown = [...document.querySelectorAll('.name:not([hidden])')].map((e) => e.textContent);
-      return shown.length === 1 && label.startsWith(shown[0].replace(/ [\d.]+ mm$/, ''));
+      return shown.length === 1 && label.startsWith(shown[0].replace(/ moved [\d.]+ mm$/, ''));
     }, reached.at(-1));
   }
-  assert.ok([...NAMES, 'tumour'].every((name) => reached.some((label) => label.startsWith(`${name}, moved `) && / mm, at [LR] \d+  [PA] \d+  [HF] \d+ mm$/.test(label))), reached.join('\n'));
+  assert.ok(PARTS.every((name) => reached.some((label) => label.startsWith(`${name}, moved `) && / mm, at [LR] \d+  [PA] \d+  [HF] \d+ mm$/.test(label))), reached.join('\n'));
   await page.keyboard.press('Enter');
   await page.waitForFunction(() => window.supine.state.named.length === 1);
   await page.evaluate(() => document.activeElement.blur());

@@ -12,6 +12,7 @@ function takeInside(inside) {
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', n)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
+  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // whose vertices stay together
   const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
@@ -46,8 +47,8 @@ function normalsOf({ rest, vertices, corners }) {
   return normals;
 }
 
-/** Where a vertex inside is. */
-function insidePlace({ rest, fields, units: { length: k } }, { weights, gains }, vertex) {
+/** Where the field puts a vertex inside. */
+function fieldPlace({ rest, fields, units: { length: k } }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
     for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
@@ -55,27 +56,61 @@ function insidePlace({ rest, fields, units: { length: k } }, { weights, gains },
   });
 }
 
+/** The rotation, rows, that fits `h`, sums of products of places before and after, counted from their
+ * means: the largest eigenvector of a symmetric matrix, by powers (as runtime/rigid.c). */
+function rotationOf(h) {
+  const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
+    [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
+  const shift = Math.hypot(...m.flat());
+  let q = [1, 0.03, 0.02, 0.01];
+  for (let step = 0; step < 200 && shift > 0; ++step) {
+    const next = m.map((row, a) => shift * q[a] + row.reduce((sum, x, b) => sum + x * q[b], 0));
+    q = next.map((x) => x / Math.hypot(...next));
+  }
+  const [w, x, y, z] = q;
+  return [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
+}
+
+/** Where the vertices of a part are: of a rigid one, moved by the rigid motion that fits the field best. */
+function insidePlaces(inside, moment, part) {
+  const members = inside.members[part];
+  const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
+  if (!inside.rigid.includes(part)) return to;
+  const from = members.map((vertex) => [0, 1, 2].map((axis) => inside.rest[4 * vertex + axis]));
+  const [before, after] = [from, to].map((places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length));
+  const h = new Array(9).fill(0);
+  from.forEach((p, i) => { for (let k = 0; k < 9; ++k) h[k] += (p[Math.floor(k / 3)] - before[Math.floor(k / 3)]) * (to[i][k % 3] - after[k % 3]); });
+  const rotation = rotationOf(h);
+  return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
+}
+
+/** Where a vertex inside is. */
+function insidePlace(inside, moment, vertex) {
+  return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
+}
+
 /** Where a part is in one moment, the middle of a mesh, and how far its vertices have moved since
  * another, in the mean. */
 function insidePart(inside, part, now, from) {
-  const members = inside.members[part];
+  const [places, before] = [now, from].map((moment) => insidePlaces(inside, moment, part));
   const place = [0, 0, 0];
   let move = 0;
-  for (const vertex of members) {
-    const [a, b] = [insidePlace(inside, now, vertex), insidePlace(inside, from, vertex)];
-    a.forEach((x, i) => { place[i] += x / members.length; });
-    move += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / members.length;
-  }
+  places.forEach((a, j) => {
+    const b = before[j];
+    a.forEach((x, i) => { place[i] += x / places.length; });
+    move += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / places.length;
+  });
   return { place, move };
 }
 
 /** The vertex of a part nearest a place. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
-  for (const vertex of inside.members[part]) {
-    const far = Math.hypot(...insidePlace(inside, moment, vertex).map((x, i) => x - place[i]));
-    if (far < least) [best, least] = [vertex, far];
-  }
+  insidePlaces(inside, moment, part).forEach((at, j) => {
+    const far = Math.hypot(...at.map((x, i) => x - place[i]));
+    if (far < least) [best, least] = [inside.members[part][j], far];
+  });
   return best;
 }
 

@@ -166,7 +166,7 @@ function start() {
       tip.lastChild.textContent = `${basis.lungNames[found.lung]}   ${placeText(found.at)}`;
     } else {
       Object.assign(found, insideAt(found));
-      tip.firstChild.textContent = `${inside.names[found.part]}  ${found.move.toFixed(2)} mm`;
+      tip.firstChild.textContent = `${inside.names[found.part]}  moved ${found.move.toFixed(2)} mm`;
       tip.lastChild.textContent = placeText(found.place);
     }
     const [x, y] = [Math.max(4, Math.min(pointer.x + 16, canvas.clientWidth - tip.offsetWidth - 8)), Math.max(8, pointer.y - tip.offsetHeight - 10)];
@@ -249,7 +249,7 @@ function start() {
     insideNames.show(shown.map((part) => {
       const { place, move } = partNow(part);
       const at = project(pane, place, ratio());
-      return { text: `${inside.names[part]} ${move.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
+      return { text: `${inside.names[part]} moved ${move.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
     }));
   }
 

@@ -279,7 +279,16 @@ class Picture {
     const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
     this.capture(moment, this.fewInputs, [few, this.unread], this.fewCount);
-    if (inside) this.capture(moment, this.insideInputs, [inside], this.basis.inside.vertices, this.insideMoving);
+    if (inside) this.captureInside(moment, inside);
+  }
+
+  /** Moves what is inside by its field, then its rigid parts, of which each vertex needs all others. */
+  captureInside(moment, target) {
+    const { gl, basis: { inside } } = this;
+    this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
+    gl.bindBuffer(gl.ARRAY_BUFFER, target);
+    for (const part of inside.rigid) gl.bufferSubData(gl.ARRAY_BUFFER, 16 * inside.members[part][0], new Float32Array(insidePlaces(inside, moment, part).flatMap((p) => [...p, 1])));
+    gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
   /** uniformsOf a moment, once for all that it moves. */
@@ -303,7 +312,7 @@ class Picture {
   readInside(moment) {
     const { gl, basis: { inside } } = this;
     const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
-    this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
+    this.captureInside(moment, target);
     return this.take(target, inside.vertices);
   }
 
