@@ -5,16 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/physics/chebyshev.h"
 #include "precompute/physics/conjugate_gradients.h"
 
-/* Rows from fetching a force to its use. */
+/* Steps of a solve at most, and the prefetch distance in rows. */
 enum { STEPS_MAX = 400, AHEAD = 4 };
 
-/* What single precision gains before the residual is taken anew. */
+/* Relative residual at which single-precision steps stop and the residual is recomputed in double.
+ */
 static const double round_gain = 2.5e-6;
 
-/* Of a column of the transfer, most of which is small. */
+/* Relative tolerance for one column of the transfer matrix, most of which is small. */
 static const double column_tolerance = 1e-14;
 
 struct supine_equilibrium {
@@ -26,7 +26,6 @@ struct supine_equilibrium {
   size_t count;     /* right-hand sides of this solve */
   double *solution; /* [N, count] t */
   supine_system system;
-  double radius;     /* of its eigenvalues over its diagonal about 1 */
   supine_rows links; /* without a reach: the network's, with values of the stiffness */
   supine_gradients gradients;
 };
@@ -146,7 +145,6 @@ typedef struct solve_pass {
   bool warm;                     /* catch_ holds a guess */
   double unit[SUPINE_RHS_MAX];   /* norm of the force, that single precision counts in */
   double wanted[SUPINE_RHS_MAX]; /* of the next round, squared */
-  double gain;                   /* asked of the next round */
   double relative;               /* largest residual over the force's norm */
 } solve_pass;
 
@@ -199,8 +197,6 @@ static void prepare(const solve_pass *pass) {
   if (!eq->prepared) {
     run(pass, prepare_range);
     supine_physics_system_set_masses(system);
-    eq->radius =
-        system->stage_count > 1 ? 1.0 : supine_physics_chebyshev_radius(system, eq->gradients.sums);
     eq->prepared = true;
   }
 }
@@ -323,28 +319,12 @@ static double total(const solve_pass *pass, size_t lane) {
 /* What the next round shall bring the residual to. */
 static void aim(solve_pass *pass, double tolerance) {
   pass->relative = 0.0;
-  pass->gain = 1.0;
   for (size_t r = 0; r < pass->eq->count; ++r) {
     const double relative = sqrt(total(pass, r)) / pass->unit[r];
     const double next = fmax(round_gain * relative, 0.5 * tolerance);
     pass->wanted[r] = next * next;
-    pass->gain = fmin(pass->gain, next / relative);
     pass->relative = relative <= pass->relative ? pass->relative : relative; /* keeps NaN */
   }
-}
-
-/* Where the diagonal dominates less, conjugate gradients find their way better. */
-static const double radius_max = 0.8;
-
-/* One round in single precision; returns its steps. */
-static size_t improve(const solve_pass *pass, size_t steps_max) {
-  supine_equilibrium *eq = pass->eq;
-  if (eq->radius > radius_max) {
-    return supine_physics_conjugate_gradients(&eq->gradients, steps_max);
-  }
-  const size_t steps = supine_physics_chebyshev_steps(eq->radius, pass->gain);
-  supine_physics_chebyshev(&eq->system, eq->radius, steps, pass->unit, eq->solution);
-  return steps;
 }
 
 /* Rounds until the residual is as wanted, or no longer halves. */
@@ -355,7 +335,7 @@ static size_t iterate(solve_pass *pass, double tolerance) {
   aim(pass, tolerance); /* cold, of the norms that are there already */
   while (pass->relative > tolerance && pass->relative < 0.5 * last && steps < STEPS_MAX) {
     last = pass->relative;
-    steps += improve(pass, STEPS_MAX - steps);
+    steps += supine_physics_conjugate_gradients(&pass->eq->gradients, STEPS_MAX - steps);
     run(pass, residual_range);
     aim(pass, tolerance);
   }
