@@ -2,15 +2,19 @@
 /* The arrays of a VTP file, and their bytes, compressed as VTK has them. */
 #include <stdlib.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include "sh/base/parallel.h"
 
 #include "mesh/io/vtp.h"
 
-/* Bytes that are compressed together, a multiple of every item's, and zlib's level: 3 takes twice
- * as long for 4 % less. */
+/* Bytes that are compressed together, a multiple of every item's, and libdeflate's level: 2 takes
+ * half as long again for 5 % less. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
+
+static size_t room_of_block(void) {
+  return libdeflate_zlib_compress_bound(NULL, BLOCK);
+}
 
 static void put_point(const vtp *file, size_t i, unsigned char **at) {
   float position[3];
@@ -84,7 +88,7 @@ supine_status supine_mesh_vtp_begin(vtp *file) {
   const size_t blocks = 12 * (points > triangles ? points : triangles) / BLOCK + 1;
   file->threads = supine_thread_count();
   file->raw = malloc(file->threads * BLOCK);
-  file->packed = malloc(blocks * compressBound(BLOCK));
+  file->packed = malloc(blocks * room_of_block());
   file->sizes = calloc(blocks + 3, sizeof *file->sizes);
   if (file->offsets == NULL || file->raw == NULL || file->packed == NULL || file->sizes == NULL) {
     supine_mesh_vtp_end(file);
@@ -121,14 +125,17 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
   for (size_t i = begin; i < end; ++i) {
     const size_t left = array->count - i * each;
     const size_t items = left < each ? left : each;
-    uLongf size = compressBound(BLOCK);
-    unsigned char *packed = file->packed + i * size;
     unsigned char *at = raw;
     for (size_t k = 0; k < items; ++k) {
       array->put(file, i * each + k, &at);
     }
+    struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
     file->sizes[3 + i] = /* 0: no memory */
-        compress2(packed, &size, raw, items * array->item, LEVEL) == Z_OK ? size : 0;
+        compressor == NULL
+            ? 0
+            : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
+                                       file->packed + i * room_of_block(), room_of_block());
+    libdeflate_free_compressor(compressor);
   }
 }
 
@@ -146,7 +153,7 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
   put_sizes(out, file->sizes, blocks + 3);
   file->written += 8 * (blocks + 3);
   for (size_t i = 0; i < blocks; ++i) {
-    (void)fwrite(file->packed + i * compressBound(BLOCK), 1, file->sizes[3 + i], out);
+    (void)fwrite(file->packed + i * room_of_block(), 1, file->sizes[3 + i], out);
     file->written += file->sizes[3 + i];
     status = file->sizes[3 + i] > 0 ? status : SUPINE_ERROR_MEMORY;
   }
