@@ -14,9 +14,9 @@
 #include "test.h"
 #include <supine/safetensors.h>
 
+#include "command_helpers.h"
 #include "lungs_helpers.h"
 #include "program/breath/breath_course.h"
-#include "program/options/command.h"
 
 #include "tests/poses.h"
 
@@ -96,36 +96,7 @@ static size_t count_names(const char *prefix) {
   return count;
 }
 
-/* Runs "breathe WORDS..." */
-static int run(const char *const *words) {
-  char *argv[24] = {strdup("breathe")};
-  int argc = 1;
-  for (; words[argc - 1] != NULL; ++argc) {
-    argv[argc] = strdup(words[argc - 1]);
-  }
-  (void)fflush(stdout);
-  (void)fflush(stderr);
-  const int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)};
-  FILE *file = tmpfile();
-  assert_non_null(file);
-  assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
-  optind = 0;
-  const int code = supine_options_run(&supine_command_breathe, argc, argv);
-  (void)fflush(stdout);
-  (void)fflush(stderr);
-  assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
-  (void)close(kept[0]);
-  (void)close(kept[1]);
-  rewind(file);
-  text[fread(text, 1, sizeof text - 1, file)] = '\0';
-  (void)fclose(file);
-  for (int i = 0; i < argc; ++i) {
-    free(argv[i]);
-  }
-  return code;
-}
-
-#define RUN(...) run((const char *const[]){__VA_ARGS__, NULL})
+#define RUN(...) COMMAND_RUN(&supine_command_breathe, KEPT_BOTH, text, __VA_ARGS__)
 
 /* Volume, mL, of the triangles whose vertices lie from `begin` to `end`, about the box's centre. */
 static double measure(const float *xyz, const uint32_t *triangles, size_t count, size_t begin,

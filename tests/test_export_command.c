@@ -28,7 +28,7 @@ static int teardown(void **state) {
 
 #define EXPECT(code, message, ...)                                                                 \
   do {                                                                                             \
-    const int got = EXPORT_RUN(folder, text, __VA_ARGS__);                                         \
+    const int got = EXPORT_RUN(text, __VA_ARGS__);                                                 \
     if (got != (code) || strstr(text, message) == NULL) {                                          \
       fail_msg("exit %d, \"%s\"", got, text);                                                      \
     }                                                                                              \

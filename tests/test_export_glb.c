@@ -149,22 +149,22 @@ static void check_positions(const char *path, double depth, double tolerance) {
 
 static void test_glb_raw_targets_make_the_library_s_positions(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, scalar, "-o", out), 0);
+  assert_int_equal(EXPORT_RUN(text, scalar, "-o", out), 0);
   assert_non_null(strstr(text, "11 morph targets"));
   check_positions(scalar, 40, 1e-4);
-  assert_int_equal(EXPORT_RUN(folder, text, vector, "-o", out, "--profile", "raw"), 0);
+  assert_int_equal(EXPORT_RUN(text, vector, "-o", out, "--profile", "raw"), 0);
   check_positions(vector, 0.7, 1e-4);
-  assert_int_equal(EXPORT_RUN(folder, text, open_surface, "-o", out), 0);
+  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out), 0);
   check_positions(open_surface, 0.7, 1e-4);
 }
 
 static void test_glb_clamp_safe_and_quantised_targets_do_too(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, open_surface, "-o", out, "--profile", "clamp-safe"), 0);
+  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--profile", "clamp-safe"), 0);
   check_positions(open_surface, 0.3, 1e-4);
-  assert_int_equal(EXPORT_RUN(folder, text, vector, "-o", out, "--quantise"), 0);
+  assert_int_equal(EXPORT_RUN(text, vector, "-o", out, "--quantise"), 0);
   check_positions(vector, 0.3, 0.01);
-  assert_int_equal(EXPORT_RUN(folder, text, open_surface, "-o", out, "--quantize", "--profile",
+  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--quantize", "--profile",
                               "clamp-safe", "--scale", "3"),
                    0);
   check_positions(open_surface, 0.05, 0.01);
@@ -220,7 +220,7 @@ static void test_glb_eight_targets_carry_a_basis_of_rank_eight(void **state) {
     }
   }
   fixture_write(f, path);
-  assert_int_equal(EXPORT_RUN(folder, text, path, "-o", out, "--profile", "8"), 0);
+  assert_int_equal(EXPORT_RUN(text, path, "-o", out, "--profile", "8"), 0);
   assert_non_null(strstr(text, "8 morph targets"));
   check_positions(path, 0.4, 1e-4);
   fixture_destroy(f);
@@ -277,7 +277,7 @@ static void test_targets_reduce_states_its_loss(void **state) {
 
 static void test_glb_animation_has_its_channels(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, open_surface, "-o", out, "--animate"), 0);
+  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--animate"), 0);
   assert_non_null(strstr(text, "and an animation"));
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -302,7 +302,7 @@ static void test_glb_without_triangles_is_refused(void **state) {
   fixture *f = fixture_create(4, 2, 1, 1, false, false, 5, 5); /* too few vertices for triangles */
   fixture_write(f, path);
   fixture_destroy(f);
-  assert_int_equal(EXPORT_RUN(folder, text, path, "-o", out), 2);
+  assert_int_equal(EXPORT_RUN(text, path, "-o", out), 2);
   assert_non_null(strstr(text, "without triangles"));
 }
 

@@ -139,7 +139,7 @@ static void check_corners(const char *page, const char *name, const uint32_t *co
 
 static void test_page_carries_the_basis(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, basis, "-o", out), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   char *page = read_page();
   export_source s = {0};
   assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
@@ -160,7 +160,7 @@ static void test_page_carries_the_basis(void **state) {
 
 static void test_page_of_an_open_surface_has_no_volumes(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, open_surface, "-o", out, "--scale", "12"), 0);
+  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--scale", "12"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "&quot;hasVolume&quot;:false"));
   assert_non_null(strstr(page, "&quot;breathLargest&quot;:12"));
@@ -170,7 +170,7 @@ static void test_page_of_an_open_surface_has_no_volumes(void **state) {
 
 static void test_page_title_stays_text(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, basis, "-o", out, "--title", "</script><b>&"), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--title", "</script><b>&"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>"));
   assert_null(strstr(page, "</script><b>"));
@@ -179,9 +179,9 @@ static void test_page_title_stays_text(void **state) {
 
 static void test_page_of_too_many_modes_or_vectors_is_refused(void **state) {
   (void)state;
-  assert_int_equal(EXPORT_RUN(folder, text, many, "-o", out), 3);
+  assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
   assert_non_null(strstr(text, "--modes 16"));
-  assert_int_equal(EXPORT_RUN(folder, text, vector, "-o", out), 3);
+  assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);
   assert_non_null(strstr(text, "a vector basis"));
 }
 

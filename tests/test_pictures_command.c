@@ -1,84 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine compare and supine render, as their users meet them. */
-#include <dirent.h>
-#include <sys/wait.h>
-
-#include "test.h"
+#include "program_helpers.h"
 
 #include <jansson.h>
 
 #include <cairo.h>
 #include <webp/demux.h>
 
-#include <supine/status.h>
-
-static char folder[] = "/tmp/supine-pictures-XXXXXX";
-static char printed[65536]; /* by the last run, stdout and stderr together */
-
-/* Runs "ENVIRONMENT supine ARGUMENTS" in the folder; its exit code, or -1 where a signal or the
- * clock ended it. */
-SUPINE_PRINTF(2, 3)
-static int run_with(const char *environment, const char *format, ...) {
-  char arguments[1024];
-  char command[2048];
-  va_list list;
-  va_start(list, format);
-  (void)vsnprintf(arguments, sizeof arguments, format, list);
-  va_end(list);
-  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 \"%s\" %s 2>&1", folder,
-                 environment, SUPINE_PROGRAM, arguments);
-  FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
-  assert_non_null(pipe);
-  printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
-  const int status = pclose(pipe);
-  return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
-}
-
-#define run(...) run_with("", __VA_ARGS__)
-
-static void expect(int code, const char *words, int got) {
-  if (got != code || strstr(printed, words) == NULL) {
-    fail_msg("exit code %d, not %d, or no \"%s\" in: %s", got, code, words, printed);
-  }
-}
-
-#define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
-
 /* No driver is found through this. */
 static const char no_gl[] = "__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent";
-
-static char *read_file(const char *name, size_t *size) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  assert_int_equal(fseek(file, 0, SEEK_END), 0);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  char *text = malloc(*size + 1);
-  assert_non_null(text);
-  assert_int_equal(fread(text, 1, *size, file), *size);
-  text[*size] = '\0';
-  (void)fclose(file);
-  return text;
-}
 
 static size_t count_words(const char *text, const char *word) {
   size_t count = 0;
   for (const char *at = strstr(text, word); at != NULL; at = strstr(at + 1, word)) {
     ++count;
   }
-  return count;
-}
-
-static int count_files(const char *suffix) {
-  int count = 0;
-  DIR *entries = opendir(folder);
-  assert_non_null(entries);
-  for (struct dirent *e = readdir(entries); e != NULL; e = readdir(entries)) {
-    count += strstr(e->d_name, suffix) != NULL;
-  }
-  (void)closedir(entries);
   return count;
 }
 
@@ -118,13 +54,6 @@ static int setup(void **state) {
                  run("precompute open.obj -o open.safetensors") == 0
              ? 0
              : -1;
-}
-
-static int teardown(void **state) {
-  (void)state;
-  char command[256];
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c): removes what the tests made */
 }
 
 static double number(const json_t *root, const char *key, const char *inner) {
@@ -738,5 +667,5 @@ int main(void) {
       cmocka_unit_test(test_render_options_change_the_picture),
       cmocka_unit_test(test_render_many_postures_and_open_surfaces_work),
   };
-  return cmocka_run_group_tests(tests, setup, teardown);
+  return cmocka_run_group_tests(tests, setup, remove_folder);
 }

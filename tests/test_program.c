@@ -1,46 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The program as its users meet it: results, exit codes, messages, and what bad input leaves
  * behind. */
-#include <dirent.h>
-#include <errno.h>
+#include "program_helpers.h"
+
 #include <ftw.h>
-#include <sys/stat.h>
-#include <sys/wait.h>
-
-#include "test.h"
-
-#include <supine/status.h>
-
-static char folder[] = "/tmp/supine-program-XXXXXX";
-static char printed[65536]; /* by the last run, stdout and stderr together */
-
-/* Runs "supine ARGUMENTS" in the folder; its exit code, or -1 where a signal or the clock ended it.
- */
-SUPINE_PRINTF(1, 2)
-static int run(const char *format, ...) {
-  char arguments[2048];
-  char command[4096];
-  va_list list;
-  va_start(list, format);
-  (void)vsnprintf(arguments, sizeof arguments, format, list);
-  va_end(list);
-  (void)snprintf(command, sizeof command, "cd %s && timeout 60 \"%s\" %s 2>&1", folder,
-                 SUPINE_PROGRAM, arguments);
-  FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
-  assert_non_null(pipe);
-  printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
-  const int status = pclose(pipe);
-  return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
-}
-
-static void expect(int code, const char *words, int got) {
-  if (got != code || strstr(printed, words) == NULL) {
-    fail_msg("exit code %d, not %d, or no \"%s\" in: %s", got, code, words, printed);
-  }
-}
-
-/* Runs, and asks for an exit code and for words in what is printed. */
-#define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
 static void write_file(const char *name, const void *bytes, size_t size) {
   char path[256];
@@ -55,26 +18,14 @@ static void write_text(const char *name, const char *text) {
   write_file(name, text, strlen(text));
 }
 
-static size_t read_file(const char *name, char *bytes, size_t size) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  const size_t length = fread(bytes, 1, size, file);
-  (void)fclose(file);
+/* A file of the folder into bytes [size]; returns its length. */
+static size_t take_file(const char *name, char *bytes, size_t size) {
+  size_t length = 0;
+  char *text = read_file(name, &length);
+  length = length < size ? length : size;
+  memcpy(bytes, text, length);
+  free(text);
   return length;
-}
-
-/* Files in the folder whose name begins so. */
-static size_t count_files(const char *prefix) {
-  size_t count = 0;
-  DIR *entries = opendir(folder);
-  assert_non_null(entries);
-  for (const struct dirent *entry; (entry = readdir(entries)) != NULL;) {
-    count += strncmp(entry->d_name, prefix, strlen(prefix)) == 0 ? 1 : 0;
-  }
-  (void)closedir(entries);
-  return count;
 }
 
 static int setup(void **state) {
@@ -84,18 +35,6 @@ static int setup(void **state) {
   }
   return run("phantom -o lungs.ply --vertices 500") != 0 ||
          run("precompute lungs.ply -o lungs.safetensors --band 3 --modes harmonics") != 0;
-}
-
-static int remove_entry(const char *path, const struct stat *status, int type, struct FTW *walk) {
-  (void)status;
-  (void)type;
-  (void)walk;
-  return remove(path);
-}
-
-static int teardown(void **state) {
-  (void)state;
-  return nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
 }
 
 static void test_help_every_command_teaches(void **state) {
@@ -129,11 +68,11 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
   static char other[1 << 20];
   EXPECT(0, "from the scan, 2820.14 mL (-3179.86 mL)", "deform lungs.safetensors %s -o way.stl",
          ways[0]);
-  const size_t length = read_file("way.stl", first, sizeof first);
+  const size_t length = take_file("way.stl", first, sizeof first);
   for (size_t i = 1; i < sizeof ways / sizeof *ways; ++i) {
     EXPECT(0, "from the scan, 2820.14 mL (-3179.86 mL)", "deform lungs.safetensors %s -o way.stl",
            ways[i]);
-    assert_int_equal(read_file("way.stl", other, sizeof other), length);
+    assert_int_equal(take_file("way.stl", other, sizeof other), length);
     size_t differing = 0;
     for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
       for (size_t k = 3; k < 12; ++k) {
@@ -211,7 +150,7 @@ static double positions_apart(const char *first, const char *second) {
   size_t stride[2];
   size_t count[2];
   for (int i = 0; i < 2; ++i) {
-    assert_true(read_file(names[i], text[i], sizeof text[i]) > 0);
+    assert_true(take_file(names[i], text[i], sizeof text[i]) > 0);
     const char *end = strstr(text[i], "end_header\n");
     const char *element = strstr(text[i], "element vertex ");
     assert_true(end != NULL && element != NULL);
@@ -254,7 +193,7 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   EXPECT(0, "ras.ply",
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
   char head[256] = "";
-  (void)read_file("ras.ply", head, sizeof head - 1);
+  (void)take_file("ras.ply", head, sizeof head - 1);
   assert_non_null(strstr(head, "SPACE=RAS cm\n"));
   /* That put the left lung first; from here on the order stays. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
@@ -266,7 +205,7 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   assert_true(positions_apart("ras.ply", "solved.ply") < 2e-5);
   EXPECT(0, "breath", "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath");
   static char text[1 << 20];
-  assert_true(read_file("breath/frame_00000.vtp", text, sizeof text) > 0);
+  assert_true(take_file("breath/frame_00000.vtp", text, sizeof text) > 0);
   assert_non_null(strstr(text, "RAS"));
   EXPECT(1, "is for a series",
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
@@ -329,7 +268,7 @@ static void test_output_impossible_exit_4_and_nothing_left(void **state) {
 static void test_basis_damaged_or_foreign_refused(void **state) {
   (void)state;
   static char bytes[1 << 20];
-  const size_t size = read_file("lungs.safetensors", bytes, sizeof bytes);
+  const size_t size = take_file("lungs.safetensors", bytes, sizeof bytes);
   assert_true(size < sizeof bytes);
   write_file("bad.safetensors", bytes, size - 1);
   EXPECT(2, "bad.safetensors", "info bad.safetensors");
@@ -351,7 +290,7 @@ static void test_mesh_bad_input_named_and_nothing_left(void **state) {
   EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
   write_text("empty.ply", "");
   EXPECT(2, "empty.ply", "precompute empty.ply -o f.safetensors");
-  const size_t size = read_file("lungs.ply", bytes, sizeof bytes);
+  const size_t size = take_file("lungs.ply", bytes, sizeof bytes);
   write_file("cut.ply", bytes, size / 2);
   EXPECT(2, "cut.ply", "precompute cut.ply -o f.safetensors");
   write_text("nan.obj",
@@ -420,7 +359,7 @@ static void test_solve_unit_force_writes_column(void **state) {
   (void)state;
   static char text[1 << 20];
   EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");
-  text[read_file("column.csv", text, sizeof text - 1)] = '\0';
+  text[take_file("column.csv", text, sizeof text - 1)] = '\0';
   assert_non_null(strstr(text, "vertex,x_mm,y_mm,z_mm,response\n0,"));
   EXPECT(1, "they count from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
 }
@@ -479,5 +418,5 @@ int main(void) {
       cmocka_unit_test(test_solve_unit_force_writes_column),
       cmocka_unit_test(test_mesh_hostile_files_never_crash),
   };
-  return cmocka_run_group_tests(tests, setup, teardown);
+  return cmocka_run_group_tests(tests, setup, remove_folder);
 }

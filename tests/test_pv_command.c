@@ -6,10 +6,10 @@
 
 #include "program/breath/pv.h"
 
-#include "program/options/command.h"
+#include "command_helpers.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
-static char good[64], bad[64], out[64], printed[64];
+static char good[64], bad[64], out[64];
 static char text[65536];
 
 static void write_samples(const char *path, bool spoiled) {
@@ -35,7 +35,6 @@ static int setup(void **state) {
   (void)snprintf(good, sizeof good, "%s/good.csv", folder);
   (void)snprintf(bad, sizeof bad, "%s/bad.csv", folder);
   (void)snprintf(out, sizeof out, "%s/out.csv", folder);
-  (void)snprintf(printed, sizeof printed, "%s/printed", folder);
   write_samples(good, false);
   write_samples(bad, true);
   return 0;
@@ -46,41 +45,14 @@ static int teardown(void **state) {
   (void)unlink(good);
   (void)unlink(bad);
   (void)unlink(out);
-  (void)unlink(printed);
   return rmdir(folder);
 }
 
-/* Runs the command with one of its two streams in a file, then in `text`. */
-static int run(int stream, const char *const *words) {
-  char *argv[16] = {strdup("pv")};
-  int argc = 1;
-  for (; words[argc - 1] != NULL; ++argc) {
-    argv[argc] = strdup(words[argc - 1]);
-  }
-  FILE *target = stream == STDOUT_FILENO ? stdout : stderr;
-  (void)fflush(target);
-  const int kept = dup(stream);
-  FILE *file = fopen(printed, "w+b");
-  assert_non_null(file);
-  assert_true(kept >= 0 && dup2(fileno(file), stream) == stream);
-  const int code = supine_options_run(&supine_command_pv, argc, argv);
-  (void)fflush(target);
-  assert_true(dup2(kept, stream) == stream);
-  (void)close(kept);
-  rewind(file);
-  text[fread(text, 1, sizeof text - 1, file)] = '\0';
-  (void)fclose(file);
-  for (int i = 0; i < argc; ++i) {
-    free(argv[i]);
-  }
-  return code;
-}
-
-#define RUN(stream, ...) run(stream, (const char *const[]){__VA_ARGS__, NULL})
+#define RUN(kept, ...) COMMAND_RUN(&supine_command_pv, kept, text, __VA_ARGS__)
 
 static void test_command_fit_writes_parameters_that_load(void **state) {
   (void)state;
-  assert_int_equal(RUN(STDOUT_FILENO, "fit", good, "-o", out), 0);
+  assert_int_equal(RUN(KEPT_OUT, "fit", good, "-o", out), 0);
   assert_non_null(strstr(text, "inhale: 16 samples, 0 to 30 cmH2O"));
   assert_non_null(strstr(text, "exhale: no samples"));
   assert_non_null(strstr(text, "95 % confidence"));
@@ -92,7 +64,7 @@ static void test_command_fit_writes_parameters_that_load(void **state) {
 
 static void test_command_fit_json_has_each_field(void **state) {
   (void)state;
-  assert_int_equal(RUN(STDOUT_FILENO, "fit", "--json", "--confidence", "0.5", good), 0);
+  assert_int_equal(RUN(KEPT_OUT, "fit", "--json", "--confidence", "0.5", good), 0);
   static const char *const keys[] = {"{\"confidence\": 0.5, \"inhale\": {\"samples\": 16",
                                      "\"pressure_cmH2O\": [0.0, 30.0]",
                                      "\"control\": [",
@@ -110,7 +82,7 @@ static void test_command_fit_json_has_each_field(void **state) {
 
 static void test_command_show_prints_curve(void **state) {
   (void)state;
-  assert_int_equal(RUN(STDOUT_FILENO, "show", "--step", "12.5"), 0);
+  assert_int_equal(RUN(KEPT_OUT, "show", "--step", "12.5"), 0);
   double cell[4][5];
   char *at = strchr(text, '\n');
   for (int row = 0; row < 4; ++row) {
@@ -134,7 +106,7 @@ static void test_command_show_prints_curve(void **state) {
 
 static void test_command_help_teaches(void **state) {
   (void)state;
-  assert_int_equal(RUN(STDOUT_FILENO, "--help"), 0);
+  assert_int_equal(RUN(KEPT_OUT, "--help"), 0);
   assert_non_null(strstr(text, "pressure_cmH2O,volume_mL,limb"));
   assert_non_null(strstr(text, "Examples:"));
 }
@@ -147,23 +119,23 @@ static void expect_printed(const char *message) {
 
 static void test_command_failures_have_their_exit_codes(void **state) {
   (void)state;
-  assert_int_equal(RUN(STDERR_FILENO, "fit"), 1);
+  assert_int_equal(RUN(KEPT_ERR, "fit"), 1);
   expect_printed("one file of samples");
-  assert_int_equal(RUN(STDERR_FILENO, "fit", good, bad), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "draw", good), 1);
+  assert_int_equal(RUN(KEPT_ERR, "fit", good, bad), 1);
+  assert_int_equal(RUN(KEPT_ERR, "draw", good), 1);
   expect_printed("not 'draw'");
-  assert_int_equal(run(STDERR_FILENO, (const char *const[]){NULL}), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "1"), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "--confidence", "x"), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "show", "--step", "0"), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "show", "--step", "1e-9"), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "show", good, out), 1);
-  assert_int_equal(RUN(STDERR_FILENO, "fit", "/nonexistent/s.csv"), 2);
+  assert_int_equal(RUN(KEPT_ERR, NULL), 1);
+  assert_int_equal(RUN(KEPT_ERR, "fit", good, "--confidence", "1"), 1);
+  assert_int_equal(RUN(KEPT_ERR, "fit", good, "--confidence", "x"), 1);
+  assert_int_equal(RUN(KEPT_ERR, "show", "--step", "0"), 1);
+  assert_int_equal(RUN(KEPT_ERR, "show", "--step", "1e-9"), 1);
+  assert_int_equal(RUN(KEPT_ERR, "show", good, out), 1);
+  assert_int_equal(RUN(KEPT_ERR, "fit", "/nonexistent/s.csv"), 2);
   expect_printed("/nonexistent/s.csv");
-  assert_int_equal(RUN(STDERR_FILENO, "fit", bad, "-o", out), 2);
+  assert_int_equal(RUN(KEPT_ERR, "fit", bad, "-o", out), 2);
   expect_printed("bad.csv:11: volume 0 mL");
-  assert_int_equal(RUN(STDERR_FILENO, "show", good), 2);
-  assert_int_equal(RUN(STDERR_FILENO, "fit", good, "-o", "/nonexistent/p.csv"), 4);
+  assert_int_equal(RUN(KEPT_ERR, "show", good), 2);
+  assert_int_equal(RUN(KEPT_ERR, "fit", good, "-o", "/nonexistent/p.csv"), 4);
   expect_printed("/nonexistent/p.csv");
 }
 

@@ -5,12 +5,12 @@
 #include "test.h"
 #include <supine/runtime.h>
 
-#include "program/options/command.h"
+#include "command_helpers.h"
 
 #include "tests/poses.h"
 
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
-static char lungs[64], csv[64], out[64], other[64], printed[64];
+static char lungs[64], csv[64], out[64], other[64];
 static char text[16384]; /* what the command said on stderr */
 
 static int setup(void **state) {
@@ -22,7 +22,6 @@ static int setup(void **state) {
   (void)snprintf(csv, sizeof csv, "%s/a.csv", folder);
   (void)snprintf(out, sizeof out, "%s/out.ply", folder);
   (void)snprintf(other, sizeof other, "%s/other", folder);
-  (void)snprintf(printed, sizeof printed, "%s/printed", folder);
   supine_mesh mesh = {0};
   const bool made = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
                     supine_mesh_save(lungs, &mesh, NULL, NULL) == SUPINE_OK;
@@ -36,7 +35,6 @@ static int teardown(void **state) {
   (void)unlink(csv);
   (void)unlink(out);
   (void)unlink(other);
-  (void)unlink(printed);
   return rmdir(folder);
 }
 
@@ -47,40 +45,9 @@ static void write_text(const char *content) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Runs a command with stderr in `text` and stdout dropped. */
-static int run(const supine_command *command, const char *const *words) {
-  char *argv[24] = {NULL};
-  int argc = 0;
-  for (; words[argc] != NULL; ++argc) {
-    argv[argc] = strdup(words[argc]);
-  }
-  (void)fflush(stdout);
-  (void)fflush(stderr);
-  const int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)};
-  FILE *file = fopen(printed, "w+b");
-  FILE *dropped = fopen("/dev/null", "wb");
-  assert_true(file != NULL && dropped != NULL);
-  assert_true(dup2(fileno(dropped), STDOUT_FILENO) >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
-  const int code = supine_options_run(command, argc, argv);
-  (void)fflush(stdout);
-  (void)fflush(stderr);
-  assert_true(dup2(kept[0], STDOUT_FILENO) >= 0 && dup2(kept[1], STDERR_FILENO) >= 0);
-  (void)close(kept[0]);
-  (void)close(kept[1]);
-  rewind(file);
-  text[fread(text, 1, sizeof text - 1, file)] = '\0';
-  (void)fclose(file);
-  (void)fclose(dropped);
-  for (int i = 0; i < argc; ++i) {
-    free(argv[i]);
-  }
-  return code;
-}
-
 static int solve(const char *option, const char *value, const char *path) {
-  const char *const words[] = {"solve", lungs, "--posture", "supine", "--volume", "scan+400",
-                               "-o",    path,  option,      value,    NULL};
-  return run(&supine_command_solve, words);
+  return COMMAND_RUN(&supine_command_solve, KEPT_ERR, text, lungs, "--posture", "supine",
+                     "--volume", "scan+400", "-o", path, option, value);
 }
 
 static bool same_bytes(const char *first, const char *second) {
@@ -202,9 +169,9 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
   supine_basis *healthy = NULL;
   static const char *const shares[] = {"left:1", "left:0.3"};
   for (int ill = 0; ill < 2; ++ill) {
-    const char *const words[] = {"precompute", lungs,    "-o",        other, "--band",
-                                 "5",          "--lung", shares[ill], NULL};
-    assert_int_equal(run(&supine_command_precompute, words), SUPINE_EXIT_OK);
+    assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                                 "--band", "5", "--lung", shares[ill]),
+                     SUPINE_EXIT_OK);
     supine_basis *basis = NULL;
     supine_error error = {0};
     if (supine_basis_open(other, &basis, &error) != SUPINE_OK) {
@@ -281,9 +248,9 @@ static void test_lung_that_is_not_there_is_refused(void **state) {
   left.triangle_count = mesh.triangle_count / 2;
   assert_int_equal(supine_mesh_save(one, &left, NULL, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
-  const char *const words[] = {"solve", one,      "--posture", "prone", "-o",
-                               out,     "--lung", "right:0.5", NULL};
-  assert_int_equal(run(&supine_command_solve, words), SUPINE_EXIT_USAGE);
+  assert_int_equal(COMMAND_RUN(&supine_command_solve, KEPT_ERR, text, one, "--posture", "prone",
+                               "-o", out, "--lung", "right:0.5"),
+                   SUPINE_EXIT_USAGE);
   assert_non_null(strstr(text, "no right lung"));
   (void)unlink(one);
 }

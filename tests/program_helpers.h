@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Run the program in a folder of its own, as its users do. */
+#ifndef SUPINE_PROGRAM_HELPERS_H
+#define SUPINE_PROGRAM_HELPERS_H
+
+#include "test.h"
+
+#include <dirent.h>
+#include <sys/wait.h>
+
+#include <supine/status.h>
+
+static char folder[] = "/tmp/supine-program-XXXXXX";
+static char printed[65536]; /* by the last run, stdout and stderr together */
+
+/* Run "ENVIRONMENT supine ARGUMENTS" in the folder; return its exit code, or -1 where a signal or
+ * the clock ended it. */
+SUPINE_PRINTF(2, 3)
+static int run_with(const char *environment, const char *format, ...) {
+  char arguments[2048];
+  char command[4096];
+  va_list list;
+  va_start(list, format);
+  (void)vsnprintf(arguments, sizeof arguments, format, list);
+  va_end(list);
+  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 \"%s\" %s 2>&1", folder,
+                 environment, SUPINE_PROGRAM, arguments);
+  FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
+  assert_non_null(pipe);
+  printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
+  const int status = pclose(pipe);
+  return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
+}
+
+#define run(...) run_with("", __VA_ARGS__)
+
+static void expect(int code, const char *words, int got) {
+  if (got != code || strstr(printed, words) == NULL) {
+    fail_msg("exit code %d, not %d, or no \"%s\" in: %s", got, code, words, printed);
+  }
+}
+
+/* Run, and ask for an exit code and for words in what is printed. */
+#define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
+
+/* A file of the folder, ended by a NUL (malloc). */
+static char *read_file(const char *name, size_t *size) {
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  char *text = malloc(*size + 1);
+  assert_non_null(text);
+  assert_int_equal(fread(text, 1, *size, file), *size);
+  text[*size] = '\0';
+  (void)fclose(file);
+  return text;
+}
+
+/* Files in the folder whose name begins so. */
+static size_t count_files(const char *prefix) {
+  size_t count = 0;
+  DIR *entries = opendir(folder);
+  assert_non_null(entries);
+  for (const struct dirent *entry; (entry = readdir(entries)) != NULL;) {
+    count += strncmp(entry->d_name, prefix, strlen(prefix)) == 0 ? 1 : 0;
+  }
+  (void)closedir(entries);
+  return count;
+}
+
+static int remove_folder(void **state) {
+  char command[256];
+  (void)state;
+  (void)snprintf(command, sizeof command, "rm -r %s", folder);
+  return system(command); /* NOLINT(cert-env33-c): removes what the tests made */
+}
+
+#endif
