@@ -90,26 +90,26 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
 }
 
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target) {
+                         size_t end, supine_target target) {
+  target.stream = basis->stream && end - begin > STREAM_RANGE;
+  target.prefetch = basis->prefetch;
   float folded[SUPINE_MODES_MAX + 3];
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
-      const supine_target here = supine_target_after(target, first - begin);
+      const supine_target here = supine_target_after(&target, first - begin);
       supine_fold(basis, pose, lung, folded);
       supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, first, last, &here);
     }
   }
-  supine_stream_fence(target->stream);
-  supine_deform_rigid(basis, pose, begin, end, target);
+  supine_stream_fence(target.stream);
+  supine_deform_rigid(basis, pose, begin, end, &target);
 }
 
 void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, float *xyz) {
-  const supine_target target = {
-      .x = xyz, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, pose, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, (supine_target){.x = xyz, .rest = true});
 }
 
 void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
@@ -118,13 +118,10 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_separate(const supine_basis *basis, const supine_pose *pose, size_t begin,
                             size_t end, float *x, float *y, float *z) {
-  const supine_target target = {
-      .x = x, .y = y, .z = z, .rest = true, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, pose, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, (supine_target){.x = x, .y = y, .z = z, .rest = true});
 }
 
 void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                            size_t end, float *xyz) {
-  const supine_target target = {.x = xyz, .stream = basis->stream, .prefetch = basis->prefetch};
-  deform_lungs(basis, pose, begin, end, &target);
+  deform_lungs(basis, pose, begin, end, (supine_target){.x = xyz});
 }

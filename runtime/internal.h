@@ -8,12 +8,13 @@
 
 #include "runtime/kernels/tiles.h"
 
-/** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
- * through the caches rather than stay there. */
 /** Harmonics of bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24 };
+/** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
+ * through the caches rather than stay there; but not a range of so few vertices, which its caller
+ * reads at once. */
+enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
 /** Room for a lung's name. */
 enum { LUNG_NAME_SIZE = 32 };

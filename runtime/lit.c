@@ -20,8 +20,8 @@ uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size
 }
 
 /* Word `word` of 16 vertices along one axis. */
-SUPINE_CLONES static void pack_word(const supine_basis *basis, size_t tile, size_t axis, size_t word,
-                      unsigned char *at) {
+SUPINE_CLONES static void pack_word(const supine_basis *basis, size_t tile, size_t axis,
+                                    size_t word, unsigned char *at) {
   const size_t last = basis->info.vertex_count - 1;
   const size_t count = basis->info.normal_count;
   double three[3][TILE] = {{0}};
@@ -118,7 +118,7 @@ supine_status supine_deform_lit_range(const supine_basis *basis, const supine_po
   if (xyz != NULL) {
     supine_deform_range(basis, pose, begin, end, xyz);
   }
-  light(basis, pose, begin, end, basis->stream, normals);
+  light(basis, pose, begin, end, basis->stream && end - begin > STREAM_RANGE, normals);
   return SUPINE_OK;
 }
 

@@ -7,9 +7,11 @@
 #include "program/stream/crc64.h"
 #include "program/stream/frame.h"
 #include "program/stream/strips.h"
+#include "sh/base/parallel.h"
 
-/* Positions, their bytes and their checksum are done while a piece is in the first cache. */
-enum { PIECE = 1024 };
+/* Positions, their bytes and their checksum are done while a piece is in the first cache. A thread
+ * is worth starting for 64 pieces. */
+enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256 };
 
 struct supine_stream_frames {
   const supine_basis *basis;
@@ -123,12 +125,32 @@ static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   return good;
 }
 
+/* Checksums of the parts that threads place. */
+typedef struct placing {
+  const supine_stream_frames *frames;
+  const supine_stream_frame *frame;
+  uint64_t crc[THREADS_MAX];
+  size_t size[THREADS_MAX]; /* bytes; 0 after the last */
+} placing;
+
+static void place_range(void *context, size_t begin, size_t end, size_t thread) {
+  placing *p = context;
+  _Alignas(64) float xyz[3 * PIECE];
+  p->size[thread] = 12 * (end - begin);
+  for (; begin < end; begin += PIECE) {
+    const size_t next = begin + PIECE < end ? begin + PIECE : end;
+    unsigned char *bytes = p->frame->points + 12 * begin;
+    supine_deform_range(p->frames->basis, &p->frame->moment.pose, begin, next, xyz);
+    supine_stream_put_points(next - begin, xyz, p->frames->ras, bytes);
+    p->crc[thread] = supine_stream_crc64(p->crc[thread], bytes, 12 * (next - begin));
+  }
+}
+
 /* The points of a frame, once for all peers. */
 static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
-  float xyz[3 * PIECE];
   if (frame->points == NULL) {
-    frame->points = malloc(12 * count + 1);
+    frame->points = aligned_alloc(64, (12 * count + 64) / 64 * 64); /* for stores of 64 bytes */
     if (frame->points == NULL) {
       return false;
     }
@@ -136,16 +158,13 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   if (frame->moment.location != NULL && !frame->placed && !place_located(f, frame)) {
     return false;
   }
-  uint64_t crc = 0;
-  for (size_t begin = 0; begin < count && !frame->placed; begin += PIECE) {
-    const size_t end = begin + PIECE < count ? begin + PIECE : count;
-    unsigned char *bytes = frame->points + 12 * begin;
-    supine_deform_range(f->basis, &frame->moment.pose, begin, end, xyz);
-    supine_stream_put_points(end - begin, xyz, f->ras, bytes);
-    crc = supine_stream_crc64(crc, bytes, 12 * (end - begin));
-  }
   if (!frame->placed) {
-    frame->points_crc = crc;
+    placing p = {.frames = f, .frame = frame};
+    supine_parallel_for(count, GRAIN, 0, place_range, &p);
+    for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
+      frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t],
+                                                   supine_stream_crc64_power(p.size[t]));
+    }
     frame->placed = true;
   }
   return true;
