@@ -39,7 +39,7 @@ Doubles = NDArray[np.float64]
 _FLOAT = np.dtype(np.float32)
 STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
-SIMDS = ("auto", "portable", "avx2", "avx512")
+SIMDS = ("auto", "portable", "avx2", "avx512", "vector128")
 _SUPINE = (0.0, 1.0, 0.0)
 
 
