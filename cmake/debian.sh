@@ -15,7 +15,7 @@ build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libass
   help2man"
 tests="g++ poppler-utils libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
   python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
-  plastimatch elastix"
+  plastimatch elastix clang lld wasi-libc libclang-rt-dev-wasm32"
 
 install_missing() {
   missing=""
@@ -49,9 +49,9 @@ build | test)
   command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086
   install_missing $build $tests
-  [ -d tests/export/node_modules ] ||
+  [ -d tests/export/node_modules/vtk.js ] ||
     npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
-    echo "npm's packages are missing: the tests of exported files that need them are skipped" >&2
+    echo "npm's packages are missing: the tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   [ "$1" = build ] || exec ctest --preset release

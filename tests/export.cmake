@@ -11,14 +11,13 @@ find_program(NODE_PROGRAM NAMES node nodejs)
 find_program(CHROMIUM_PROGRAM NAMES chromium chromium-browser google-chrome)
 set(SUPINE_NODE_MODULES ${CMAKE_CURRENT_SOURCE_DIR}/export CACHE PATH
   "Folder whose node_modules the tests of exported files use")
+if(NODE_PROGRAM)
+  set(SUPINE_NODE ${NODE_PROGRAM})
+else()
+  set(SUPINE_NODE sh -c "echo 'skipped: node is not installed'; exit 77")
+endif()
 foreach(what colour glb pages) # pages.mjs: everything that a browser shows, in one process
-  if(NODE_PROGRAM)
-    add_test(NAME export_${what}_node
-      COMMAND ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)
-  else()
-    add_test(NAME export_${what}_node
-      COMMAND sh -c "echo 'skipped: node is not installed'; exit 77")
-  endif()
+  add_test(NAME export_${what}_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)
   set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()

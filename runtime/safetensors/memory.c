@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+/* Memory where there are no files, as in WebAssembly. */
+#include <stdlib.h>
+
+#include "runtime/safetensors/platform.h"
+
+supine_status supine_platform_map(const char *path, supine_platform_file *file,
+                                  supine_error *error) {
+  *file = (supine_platform_file){NULL, 0};
+  return supine_error_set(error, SUPINE_ERROR_READ, "%s: there are no files here: open its bytes",
+                          path);
+}
+
+void supine_platform_unmap(const supine_platform_file *file) {
+  (void)file;
+}
+
+void *supine_platform_allocate(size_t bytes) {
+  enum { LINE = 64 };
+  return aligned_alloc(LINE, (bytes + LINE - 1) / LINE * LINE);
+}
+
+void supine_platform_free(void *memory) {
+  free(memory);
+}

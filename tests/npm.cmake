@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The package for JavaScript, where clang and wasi-libc make it: against plain C in node and in Chromium.
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
+  set(tarball ${PROJECT_BINARY_DIR}/runtime/npm/supine-${PROJECT_VERSION}.tgz)
+  add_executable(npm_native npm/native.c)
+  target_link_libraries(npm_native PRIVATE supine_build supine_runtime)
+  add_test(NAME npm_package COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/npm/package.sh ${CMAKE_COMMAND} ${PROJECT_BINARY_DIR}
+    ${tarball})
+  set_tests_properties(npm_package PROPERTIES FIXTURES_SETUP npm_package TIMEOUT 300 SKIP_RETURN_CODE 77)
+  foreach(where node browser)
+    add_test(NAME npm_${where} COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/npm/${where}.mjs)
+    set_tests_properties(npm_${where} PROPERTIES FIXTURES_REQUIRED npm_package TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
+      "SUPINE=$<TARGET_FILE:supine>;NATIVE=$<TARGET_FILE:npm_native>;TARBALL=${tarball};GOLDEN=${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_1.safetensors;LUNGS=${SUPINE_LUNGS};README=${PROJECT_SOURCE_DIR}/README.md;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
+  endforeach()
+endif()

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pose every basis in states and hold what the package gives, here or in a browser, against plain C.
+import assert from 'node:assert/strict';
+import { bases, native } from './made.mjs';
+import { largestDistance } from '../export/support.mjs';
+
+async function check(basis, states, ask) {
+  const said = await ask(basis, states);
+  for (const [i, state] of states.entries()) {
+    const [js, c] = [said[i], native(basis, state, said[i].volumes.length)];
+    const apart = largestDistance(js.positions, c.positions);
+    assert.ok(js.error < 0.01 && apart <= 2 * js.error, `${basis} ${state}: ${apart} mm apart, where ${js.error} mm are allowed`);
+    assert.ok(largestDistance(js.normals, c.normals) < 1e-3, `${basis} ${state}: normals`);
+    js.volumes.forEach((volume, lung) => assert.ok(Math.abs(volume - c.volumes[lung]) <= 1e-9 * c.volumes[lung], `${basis} ${state}: ${volume} mL`));
+    assert.equal(js.expected.length, c.expected.length);
+    js.expected.forEach((sigma, v) => assert.ok(Math.abs(sigma - c.expected[v]) < 1e-3, `${basis} ${state}: expected error ${sigma} mm of vertex ${v}`));
+  }
+}
+
+/** What both node and a browser run: results of an open basis as arrays. */
+export function pose(lungs, states) {
+  return states.map((state) => {
+    lungs.pose(state).deformLit();
+    return { positions: lungs.positions.slice(), normals: lungs.normals.slice(), volumes: Object.values(lungs.volumes), expected: lungs.expectedError().slice(), error: lungs.error };
+  });
+}
+
+/** Compare every basis in its last states: `ask(basis, states)` gives what `pose` does. */
+export async function checkAll(ask, most = Infinity) {
+  for (const [basis, states] of bases) await check(basis, states.slice(-most), ask);
+  console.log(`${bases.length} bases as in C`);
+}

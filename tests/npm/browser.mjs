@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The package for JavaScript in Chromium: as plain C; the examples draw lungs that move as C's do.
+import assert from 'node:assert/strict';
+import { copyFileSync, existsSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
+import { basename, extname, join } from 'node:path';
+import { checkAll, pose } from './agree.mjs';
+import { browser, settled } from '../export/browser.mjs';
+import { folder } from '../export/support.mjs';
+
+/** A page of a folder as a server would give it: nothing leaves this process. */
+const origin = 'http://lungs.test/';
+const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
+async function visit(path) {
+  const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+  const complaints = [];
+  page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(error.stack));
+  await page.route('**/*', (route) => {
+    const file = join(folder, decodeURI(new URL(route.request().url()).pathname));
+    return existsSync(file) ? route.fulfill({ contentType: kinds[extname(file)] ?? 'application/octet-stream', body: readFileSync(file) }) : route.fulfill({ status: 404 });
+  });
+  await page.goto(origin + path);
+  return { page, complaints };
+}
+
+for (const example of ['three', 'vtk']) copyFileSync(join(folder, `node_modules/supine/examples/${example}.html`), join(folder, `${example}.html`));
+writeFileSync(join(folder, 'blank.html'), '<!doctype html>');
+const { page } = await visit('blank.html');
+await checkAll((basis, states) => page.evaluate(async ([file, states, code]) => {
+  const { open } = await import('/node_modules/supine/supine.js');
+  const lungs = await open(await (await fetch(file)).arrayBuffer());
+  const plain = (value) => (ArrayBuffer.isView(value) ? Array.from(value) : value);
+  return new Function(`return ${code}`)()(lungs, states).map((one) => Object.fromEntries(Object.entries(one).map(([name, value]) => [name, plain(value)])));
+}, [`/${basename(basis)}`, states, pose.toString()]), 2);
+await page.close();
+
+/** Take a picture: its pixels as grey values. */
+async function look(page) {
+  await settled(page);
+  const shot = (await page.screenshot()).toString('base64');
+  if (process.env.PICTURES) writeFileSync(join(process.env.PICTURES, `${await page.title()}.png`), Buffer.from(shot, 'base64'));
+  return page.evaluate(async (data) => {
+    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
+    const canvas = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    canvas.drawImage(image, 0, 0);
+    return Array.from(canvas.getImageData(0, 0, image.width, image.height).data).filter((_, i) => i % 4 === 0);
+  }, shot);
+}
+
+/** Two pictures of an example differ, and each shows something that fills a good part of it. */
+async function check(name, change) {
+  if (!existsSync(join(process.env.MODULES, 'node_modules', name))) {
+    console.log(`${name} is not installed: its example is not tried`);
+    return;
+  }
+  symlinkSync(join(process.env.MODULES, 'node_modules', name), join(folder, 'node_modules', name));
+  const { page, complaints } = await visit(`${name.replace('.js', '')}.html`);
+  await page.waitForSelector('canvas');
+  const before = await look(page);
+  await change(page);
+  const after = await look(page);
+  for (const picture of [before, after]) {
+    const share = picture.filter((red) => red > 40).length / picture.length;
+    assert.ok(share > 0.1 && share < 0.6, `${name}: ${share} of the picture is drawn`);
+  }
+  const moved = before.filter((red, i) => Math.abs(red - after[i]) > 20).length / before.length;
+  assert.ok(moved > 0.005, `${name}: ${moved} of the picture changes`);
+  assert.deepEqual(complaints, []);
+  console.log(`${name}: ${(100 * moved).toFixed(1)} % of the picture changes`);
+  await page.close();
+}
+await check('three', (page) => page.waitForTimeout(1500));
+await check('vtk.js', (page) => page.selectOption('select', 'left'));
+await browser.close();

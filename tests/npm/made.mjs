@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the tests of the package for JavaScript share: a folder with the package in node_modules, bases, and what
+// plain C makes of them. NATIVE names npm_native, TARBALL the package, GOLDEN a basis of version 1, LUNGS the real lungs.
+import { execFileSync } from 'node:child_process';
+import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { folder, skip, supine } from '../export/support.mjs';
+
+if (!existsSync(process.env.TARBALL)) skip('no package: clang, lld, wasi-libc and libclang-rt-dev-wasm32 make it');
+export const packed = join(folder, 'node_modules/supine');
+mkdirSync(packed, { recursive: true });
+execFileSync('tar', ['xzf', process.env.TARBALL, '-C', packed, '--strip-components=1']);
+
+export const [mesh, demo, content, inside, old] = ['lungs.ply', 'lungs.safetensors', 'content.csv', 'inside.safetensors', 'old.safetensors'].map((name) => join(folder, name));
+copyFileSync(process.env.GOLDEN, old);
+supine('phantom', '-o', mesh);
+supine('precompute', mesh, '-o', demo);
+writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
+supine('embed', demo, content, mesh, '-o', inside);
+const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
+const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // version 1 knows no rest
+/** Bases, and states of each. */
+export const bases = [[demo, states], [inside, states], [old, ofScan]];
+const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));
+if (real.every(existsSync)) {
+  bases.push([join(folder, 'real.safetensors'), states]);
+  supine('precompute', ...real, '-o', bases.at(-1)[0]);
+}
+
+/** Read what C writes: {volumes, positions, normals, expected}. */
+export function native(basis, state, lungs) {
+  const out = join(folder, 'native');
+  execFileSync(process.env.NATIVE, [basis, state, out], { stdio: 'pipe' });
+  const { buffer, byteOffset } = Buffer.concat([readFileSync(out)]);
+  const bytes = buffer.slice(byteOffset);
+  const n = (bytes.byteLength - 8 * lungs) / 28;
+  const floats = (at, count) => new Float32Array(bytes, 8 * lungs + 4 * at, count);
+  return { volumes: Array.from(new Float64Array(bytes, 0, lungs)), positions: floats(0, 3 * n), normals: floats(3 * n, 3 * n), expected: floats(6 * n, n) };
+}

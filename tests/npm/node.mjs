@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The package for JavaScript in node: as plain C, as small and as fast as promised; what it refuses; README's lines; types.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { brotliCompressSync } from 'node:zlib';
+import { checkAll, pose } from './agree.mjs';
+import { demo, inside, native, packed } from './made.mjs';
+import { folder, largestDistance, loadCommon, supine } from '../export/support.mjs';
+
+const { open, SupineError } = await import(join(packed, 'supine.js'));
+const bytes = readFileSync(demo);
+
+await checkAll(async (basis, states) => pose(await open(readFileSync(basis)), states));
+
+/* Small. */
+const wasm = readFileSync(join(packed, 'supine.wasm'));
+const small = brotliCompressSync(wasm).length;
+console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
+assert.ok(wasm.length <= 150000 && small <= 40000);
+
+/* Two at once, each with arrays that stay; a state by gravity, a gain, a refusal that changes nothing. */
+const [lungs, other] = [await open(bytes), await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm })];
+const { positions, normals } = lungs;
+assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'the surface of the file before the first pose');
+lungs.pose('prone:rest+500').deformLit();
+const prone = positions.slice();
+other.pose({ gravity: new Float32Array([0, -2, 0]), volume: 'rest+500' }).deform();
+assert.deepEqual(other.positions, prone);
+other.pose('left').deform();
+assert.notDeepEqual(other.positions, prone);
+assert.equal(lungs.deform(), positions);
+assert.deepEqual(positions, prone);
+for (let i = 0; i < 2000; ++i) lungs.pose(`left:rest+${i}`).expectedError('prone');
+assert.ok(lungs.positions === positions && lungs.normals === normals && positions.length === 3 * lungs.vertexCount);
+lungs.pose({ gravity: [0, -1, 0], gain: 0 }).deform();
+assert.ok(largestDistance(positions, lungs.vertices) < 0.002);
+lungs.pose('prone:rest+500');
+for (const [state, status, words] of [['pron', 'argument', /did you mean 'prone'/], ['prone:500', 'argument', /500/], ['prone:1mL', 'numerical', /folds/],
+  [{ gravity: [0, 0, 0] }, 'argument', /gravity/], [{ gravity: [0, NaN, 0], gain: 1 }, 'argument', /gravity/], [`prone:${'0'.repeat(600)}mL`, 'argument', /at most 511/]]) {
+  assert.throws(() => lungs.pose(state), (error) => error instanceof SupineError && error.status === status && words.test(error.message), `${JSON.stringify(state)}`);
+}
+assert.deepEqual(lungs.deform(), prone);
+try {
+  native(demo, 'pron', 2);
+  assert.fail('C takes it');
+} catch (error) {
+  assert.throws(() => lungs.pose('pron'), { message: error.stderr.toString().trim() });
+}
+for (const cut of [0, 7, 1000, bytes.length - 1]) {
+  await assert.rejects(open(bytes.subarray(0, cut)), (error) => error instanceof SupineError && error.status === 'format', `${cut} bytes`);
+}
+
+/* What the file holds. */
+assert.deepEqual(Object.keys(lungs.lungs), ['left', 'right']);
+assert.deepEqual(Object.values(lungs.lungs).flat(), [0, lungs.lungs.right[0], lungs.lungs.right[0], lungs.vertexCount]);
+assert.equal(lungs.metadata.format, 'supine-basis');
+assert.equal(Math.max(...lungs.triangles), lungs.vertexCount - 1);
+assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
+assert.equal(lungs.tensor('none'), undefined);
+assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
+
+/* A surface that encloses nothing has no volumes, but gains; its normals are the triangles'. */
+const sheet = join(folder, 'sheet.obj');
+const corners = Array.from({ length: 100 }, (_, i) => `v ${30 + 8 * (i % 10)} ${-90 - 3 * (i % 7)} ${-100 - 9 * Math.floor(i / 10)}`);
+const faces = Array.from({ length: 81 }, (_, i) => i + Math.floor(i / 9) + 1).map((a) => `f ${a} ${a + 1} ${a + 11}\nf ${a} ${a + 11} ${a + 10}`);
+writeFileSync(sheet, `${corners.join('\n')}\n${faces.join('\n')}\n`);
+supine('precompute', sheet, '-o', join(folder, 'sheet.safetensors'), '--scanned', 'none', '--band', '3');
+const opened = await open(readFileSync(join(folder, 'sheet.safetensors')));
+assert.throws(() => opened.volumes, { status: 'open surface' });
+assert.throws(() => opened.pose('prone:rest+500'), SupineError);
+opened.pose({ gravity: [0, -1, 0], gain: 3 }).deformLit();
+assert.notDeepEqual(opened.positions, opened.vertices);
+assert.ok(Math.abs(Math.hypot(...opened.normals.slice(0, 3)) - 1) < 1e-6);
+
+/* README's lines, of the package and of the project. */
+for (const readme of [join(packed, 'README.md'), process.env.README]) {
+  const [, code] = /```js\n([\s\S]*?)```/.exec(readFileSync(readme, 'utf8'));
+  writeFileSync(join(folder, 'readme.mjs'), code);
+  assert.match(execFileSync(process.execPath, ['readme.mjs'], { cwd: folder, encoding: 'utf8' }), /Float32Array/);
+}
+
+/* Types: what is right compiles, and each line that is wrong does not. */
+const typescript = loadCommon('typescript');
+const use = `import { open, SupineError, type State } from 'supine';
+const lungs = await open(new ArrayBuffer(8), { wasm: new Uint8Array(8) });
+const state: State = { gravity: [0, 1, 0], volume: 'rest+500' };
+const numbers: Float32Array = lungs.pose(state).deformLit();
+const [begin, end]: [number, number] = lungs.lungs.left;
+try { lungs.pose('pron'); } catch (error) { if (error instanceof SupineError && error.status === 'argument') throw error; }
+`;
+const wrong = ['lungs.pose(5);', 'lungs.positions = numbers;', "await open('file');", 'lungs.volumes.left = "much";'];
+const compile = (text) => {
+  const file = join(folder, 'use.ts');
+  writeFileSync(file, text);
+  const program = typescript.createProgram([file], { strict: true, noEmit: true, target: typescript.ScriptTarget.ES2022, module: typescript.ModuleKind.NodeNext, moduleResolution: typescript.ModuleResolutionKind.NodeNext, types: [] });
+  return typescript.getPreEmitDiagnostics(program).map(({ messageText }) => typescript.flattenDiagnosticMessageText(messageText, '\n'));
+};
+writeFileSync(join(folder, 'package.json'), '{ "type": "module" }');
+assert.deepEqual(compile(use), []);
+for (const line of wrong) assert.equal(compile(use + line).length, 1, line);
+
+/* Fast: nanoseconds a vertex against those of plain C, in turns, the fastest of each. */
+const fastest = [[Infinity, Infinity], [Infinity, Infinity]];
+const calls = Math.ceil(1000000 / lungs.vertexCount);
+for (let round = 0; round < 5; ++round) {
+  const c = execFileSync(process.env.NATIVE, [demo, 'prone'], { encoding: 'utf8' }).split(' ').map(Number);
+  for (const [i, call] of ['deform', 'deformLit'].entries()) {
+    for (let again = 0; again < 9; ++again) {
+      const begin = performance.now();
+      for (let j = 0; j < calls; ++j) lungs[call]();
+      fastest[0][i] = Math.min(fastest[0][i], (1e6 * (performance.now() - begin)) / calls / lungs.vertexCount);
+    }
+    fastest[1][i] = Math.min(fastest[1][i], c[i]);
+  }
+}
+const ratios = fastest[0].map((taken, i) => taken / fastest[1][i]);
+console.log(`ns a vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ${ratios.map((x) => x.toFixed(2))} times`);
+assert.ok(Math.max(...ratios) <= 2.5);
