@@ -15,7 +15,8 @@ build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libass
   help2man"
 tests="g++ poppler-utils libcmocka-dev libsuitesparse-dev libopenigtlink-dev mono-mcs mono-runtime
   python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
-  plastimatch elastix clang lld wasi-libc libclang-rt-dev-wasm32"
+  plastimatch elastix clang lld wasi-libc libclang-rt-dev-wasm32
+  binaryen"
 
 install_missing() {
   missing=""
