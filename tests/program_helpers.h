@@ -13,26 +13,24 @@
 static char folder[] = "/tmp/supine-program-XXXXXX";
 static char printed[65536]; /* by the last run, stdout and stderr together */
 
-/* Run "ENVIRONMENT supine ARGUMENTS" in the folder; return its exit code, or -1 where a signal or
- * the clock ended it. */
-SUPINE_PRINTF(2, 3)
-static int run_with(const char *environment, const char *format, ...) {
+/* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 where a signal or the clock
+ * ended it. */
+SUPINE_PRINTF(1, 2)
+static int run(const char *format, ...) {
   char arguments[2048];
   char command[4096];
   va_list list;
   va_start(list, format);
   (void)vsnprintf(arguments, sizeof arguments, format, list);
   va_end(list);
-  (void)snprintf(command, sizeof command, "cd %s && %s timeout 100 \"%s\" %s 2>&1", folder,
-                 environment, SUPINE_PROGRAM, arguments);
+  (void)snprintf(command, sizeof command, "cd %s && timeout 100 \"%s\" %s 2>&1", folder,
+                 SUPINE_PROGRAM, arguments);
   FILE *pipe = popen(command, "r"); /* NOLINT(cert-env33-c): the program under test */
   assert_non_null(pipe);
   printed[fread(printed, 1, sizeof printed - 1, pipe)] = '\0';
   const int status = pclose(pipe);
   return WIFEXITED(status) && WEXITSTATUS(status) < 124 ? WEXITSTATUS(status) : -1;
 }
-
-#define run(...) run_with("", __VA_ARGS__)
 
 static void expect(int code, const char *words, int got) {
   if (got != code || strstr(printed, words) == NULL) {

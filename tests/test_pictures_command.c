@@ -7,9 +7,6 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-/* No driver is found through this. */
-static const char no_gl[] = "__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent";
-
 static size_t count_words(const char *text, const char *word) {
   size_t count = 0;
   for (const char *at = strstr(text, word); at != NULL; at = strstr(at + 1, word)) {
@@ -241,19 +238,6 @@ static void test_report_is_well_formed_and_needs_nothing_else(void **state) {
   check_report("report.html");
 }
 
-static void test_report_without_gl_says_so_and_carries_on(void **state) {
-  (void)state;
-  expect(0, "",
-         run_with(no_gl, "compare lungs.safetensors --postures supine,prone,left "
-                         "-o plain.html"));
-  check_report("plain.html");
-  size_t size = 0;
-  char *text = read_file("plain.html", &size);
-  assert_null(strstr(text, "<img"));
-  assert_int_equal(count_words(text, "No pictures: "), 1);
-  free(text);
-}
-
 static void test_compare_open_surface_wants_rms(void **state) {
   (void)state;
   EXPECT(2, "--rms MM", "compare open.safetensors");
@@ -286,14 +270,6 @@ static void test_compare_misuse_is_a_usage_error(void **state) {
   EXPECT(4, "nowhere", "compare lungs.safetensors --csv nowhere/rows.csv");
   EXPECT(5, "volume", "compare lungs.safetensors --volume scan-1e9");
   EXPECT(0, "Usage", "compare --help");
-}
-
-static void test_render_without_gl_is_code_3_and_one_line(void **state) {
-  (void)state;
-  expect(3, "supine render: ",
-         run_with(no_gl, "render lungs.safetensors --posture prone -o none.png"));
-  assert_int_equal(count_words(printed, "\n"), 1);
-  assert_int_equal(count_files("none.png"), 0);
 }
 
 static void test_render_misuse_is_a_usage_error(void **state) {
@@ -653,10 +629,8 @@ int main(void) {
       cmocka_unit_test(test_compare_csv_has_six_fields_a_row),
       cmocka_unit_test(test_compare_without_breath_finds_nothing_moved),
       cmocka_unit_test(test_report_is_well_formed_and_needs_nothing_else),
-      cmocka_unit_test(test_report_without_gl_says_so_and_carries_on),
       cmocka_unit_test(test_compare_open_surface_wants_rms),
       cmocka_unit_test(test_compare_misuse_is_a_usage_error),
-      cmocka_unit_test(test_render_without_gl_is_code_3_and_one_line),
       cmocka_unit_test(test_render_misuse_is_a_usage_error),
       cmocka_unit_test(test_render_agrees_with_golden_picture),
       cmocka_unit_test(test_render_arrow_points_where_gravity_does),

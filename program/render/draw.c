@@ -1,69 +1,66 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* One drawing of the lungs. */
+/* One drawing of the lungs: projected, the nearest triangle of each sample found, then lit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/render/gl.h"
+#include "program/render/render.h"
+#include "sh/base/parallel.h"
 
-/* Each pixel is the mean of 2 x 2 drawn ones; four samples of each on top make drivers in software
- * take 2.7 times as long for edges that look the same. */
-enum { OVERSAMPLE = 2 };
+/* Each pixel is the mean of 2 x 2 samples. */
+enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
 static const double distance_in_radii = 5.0; /* of the viewer */
 static const double depth_in_radii = 3.0;    /* drawn, in front of the centre and behind */
 static const double margin = 1.03;
+static const float gamma_exponent = 2.2F;
 
-/* The lungs that a scene shows. */
-static void shown_lungs(const supine_renderer *r, const supine_scene *scene, size_t *begin,
-                        size_t *end) {
-  *begin = scene->one_lung ? scene->lung : 0;
-  *end = scene->one_lung ? scene->lung + 1 : r->info->lung_count;
+/* A vertex in the picture. */
+typedef struct corner {
+  float x, y;      /* samples, from the left and upper edge */
+  float nearness;  /* 1 / distance along the view; 0: not drawn */
+  float normal[3]; /* right, up, towards the viewer */
+  float eye[3];    /* from the vertex to the viewer, mm */
+  float value;
+} corner;
+
+struct supine_renderer {
+  const supine_basis *basis;
+  const supine_basis_info *info; /* of it */
+  float *scratch;                /* [N, 6]: positions, normals */
+  corner *corners;               /* [N] */
+};
+
+supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
+                                   supine_error *error) {
+  supine_renderer *r = calloc(1, sizeof *r);
+  if (r != NULL) {
+    r->basis = basis;
+    r->info = supine_basis_get_info(basis);
+    r->scratch = malloc(6 * r->info->vertex_count * sizeof *r->scratch);
+    r->corners = malloc(r->info->vertex_count * sizeof *r->corners);
+  }
+  if (r == NULL || r->scratch == NULL || r->corners == NULL) {
+    supine_render_destroy(r);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  *renderer = r;
+  return SUPINE_OK;
 }
 
-/* What changes with the state: normals, values and, where the GPU cannot displace, displacements.
- */
-static void load_state(supine_renderer *r, const supine_scene *scene) {
-  const size_t n = r->info->vertex_count;
-  float *xyz = r->scratch;
-  float *normals = r->scratch + 3 * n;
-  supine_deform(r->basis, scene->pose, xyz);
-  supine_normals(r->basis, xyz, normals);
-  glBindBuffer(GL_ARRAY_BUFFER, r->buffer[2]);
-  glBufferSubData(GL_ARRAY_BUFFER, 0, (GLsizeiptr)(3 * n * sizeof *normals), normals);
-  glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(3 * n * sizeof *normals),
-                  (GLsizeiptr)(n * sizeof *scene->value), scene->value);
-  if (!r->packed) {
-    for (size_t i = 0; i < 3 * n; ++i) {
-      xyz[i] -= r->info->vertices[i];
-    }
-    glBindBuffer(GL_ARRAY_BUFFER, r->buffer[1]);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * n * sizeof *xyz), xyz, GL_DYNAMIC_DRAW);
-    glEnableVertexAttribArray(ATTRIBUTE_DIRECTION);
-    glVertexAttribPointer(ATTRIBUTE_DIRECTION, 3, GL_FLOAT, GL_FALSE, 0, NULL);
-    for (GLuint k = 0; k < 4; ++k) {
-      glDisableVertexAttribArray(ATTRIBUTE_COEFFICIENTS + k);
-      glVertexAttrib4f(ATTRIBUTE_COEFFICIENTS + k, k == 0 ? 1.0F : 0.0F, 0, 0, 0);
-    }
+void supine_render_destroy(supine_renderer *renderer) {
+  if (renderer != NULL) {
+    free(renderer->scratch);
+    free(renderer->corners);
+    free(renderer);
   }
 }
 
-static void uniform(const supine_renderer *r, const char *name, size_t count,
-                    const double *values) {
-  float v[4];
-  const GLint at = glGetUniformLocation(r->program, name);
-  for (size_t i = 0; i < count; ++i) {
-    v[i] = (float)values[i];
-  }
-  if (count == 1) {
-    glUniform1fv(at, 1, v);
-  } else if (count == 2) {
-    glUniform2fv(at, 1, v);
-  } else if (count == 3) {
-    glUniform3fv(at, 1, v);
-  } else {
-    glUniform4fv(at, 1, v);
-  }
+/* The vertices that a scene shows. */
+static void shown_vertices(const supine_renderer *r, const supine_scene *scene, size_t *begin,
+                           size_t *end) {
+  *begin = r->info->lung_begin[scene->one_lung ? scene->lung : 0];
+  *end = r->info->lung_begin[scene->one_lung ? scene->lung + 1 : r->info->lung_count];
 }
 
 /* A viewer in front of the middle of the resting lungs, whatever their state. */
@@ -77,11 +74,11 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   camera c = {.radius = 1e-3};
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  size_t first;
-  size_t last;
+  size_t begin;
+  size_t end;
   supine_render_view_axes(scene->view, c.axes);
-  shown_lungs(r, scene, &first, &last);
-  for (size_t i = 3 * r->info->lung_begin[first]; i < 3 * r->info->lung_begin[last]; ++i) {
+  shown_vertices(r, scene, &begin, &end);
+  for (size_t i = 3 * begin; i < 3 * end; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)r->info->vertices[i]);
     high[i % 3] = fmax(high[i % 3], (double)r->info->vertices[i]);
   }
@@ -93,20 +90,30 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   return c;
 }
 
+/* A vector of the body as the viewer has it: right, up, towards the viewer. */
+static void turn(const camera *c, const double v[3], double seen[3]) {
+  for (size_t row = 0; row < 3; ++row) {
+    seen[row] = c->axes[row][0] * v[0] + c->axes[row][1] * v[1] + c->axes[row][2] * v[2];
+  }
+}
+
+/* A position likewise, from the centre. */
+static void place(const camera *c, const float xyz[3], double seen[3]) {
+  const double from[3] = {(double)xyz[0] - c->centre[0], (double)xyz[1] - c->centre[1],
+                          (double)xyz[2] - c->centre[2]};
+  turn(c, from, seen);
+}
+
 void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
   const camera c = find_camera(r, scene);
   const double closest = c.away - 0.98 * depth_in_radii * c.radius;
-  size_t first;
-  size_t last;
-  shown_lungs(r, scene, &first, &last);
+  size_t begin;
+  size_t end;
+  shown_vertices(r, scene, &begin, &end);
   supine_deform(r->basis, scene->pose, r->scratch);
-  for (size_t i = r->info->lung_begin[first]; i < r->info->lung_begin[last]; ++i) {
-    double p[3] = {0, 0, 0};
-    for (size_t row = 0; row < 3; ++row) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        p[row] += c.axes[row][axis] * ((double)r->scratch[3 * i + axis] - c.centre[axis]);
-      }
-    }
+  for (size_t i = begin; i < end; ++i) {
+    double p[3];
+    place(&c, r->scratch + 3 * i, p);
     for (int side = 0; side < 2; ++side) {
       const double at = p[side] * c.away / fmax(closest, c.away - p[2]);
       extent[2 * side] = fmin(extent[2 * side], at);
@@ -133,19 +140,13 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-static void load_camera(supine_renderer *r, const supine_scene *scene) {
-  const camera c = find_camera(r, scene);
-  const double depth[2] = {c.away, depth_in_radii * c.radius};
-  double frame[4];
-  find_frame(r, scene, frame);
-  float columns[9];
-  for (int i = 0; i < 9; ++i) {
-    columns[i] = (float)c.axes[i % 3][i / 3];
+/* Where a point that the viewer sees at p lies in a picture of that size, the first row on top. */
+static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
+                    double at[2]) {
+  for (int side = 0; side < 2; ++side) {
+    const double off = (p[side] * c->away / (c->away - p[2]) - frame[side]) * frame[2 + side];
+    at[side] = 0.5 * (1 + (side == 0 ? off : -off)) * size[side];
   }
-  glUniformMatrix3fv(glGetUniformLocation(r->program, "view"), 1, GL_FALSE, columns);
-  uniform(r, "centre", 3, c.centre);
-  uniform(r, "frame", 4, frame);
-  uniform(r, "depth", 2, depth);
 }
 
 void supine_render_project(supine_renderer *r, const supine_scene *scene, const supine_marks *marks,
@@ -155,137 +156,282 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
   double frame[4];
   find_frame(r, scene, frame);
   for (size_t i = 0; i < marks->count; ++i) {
-    double p[3] = {0, 0, 0};
-    for (size_t row = 0; row < 3; ++row) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        p[row] += c.axes[row][axis] * ((double)marks->mark[i].xyz[axis] - c.centre[axis]);
-      }
-    }
-    for (size_t side = 0; side < 2; ++side) { /* as lungs.vert.glsl does; the first row is on top */
-      const double away = p[side] * c.away / (c.away - p[2]) - frame[side];
-      pixel[i][side] = 0.5 * (1 + away * frame[2 + side] * (side == 0 ? 1 : -1)) * size[side];
-    }
+    double p[3];
+    place(&c, marks->mark[i].xyz, p);
+    project(&c, frame, p, size, pixel[i]);
   }
 }
 
-static void draw_lungs(const supine_renderer *r, const supine_scene *scene) {
-  float weights[SUPINE_GL_MODES] = {1};
-  float gains[3 * SUPINE_LUNGS_MAX];
-  size_t begin;
-  size_t end;
-  shown_lungs(r, scene, &begin, &end);
-  for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
-    gains[i] = 1;
-  }
-  if (r->packed) {
-    (void)supine_gl_weights(r->basis, scene->pose, weights, gains);
-  }
-  glUniform4fv(glGetUniformLocation(r->program, "supine_weights"), (GLsizei)r->vector_count,
-               weights);
-  glUniform3fv(glGetUniformLocation(r->program, "supine_gains"), (GLsizei)r->lung_count, gains);
-  glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (r->index_begin[end] - r->index_begin[begin])),
-                 GL_UNSIGNED_INT,
-                 (const void *)(uintptr_t)(3 * r->index_begin[begin] * sizeof(uint32_t)));
-}
+/* --- the nearest triangle of each sample ----------------------------------------------------- */
 
-/* A framebuffer to draw on and read from. */
+/* What the threads that draw share. */
 typedef struct canvas {
-  GLuint frame;
-  GLuint buffer[2];
-  GLsizei width, height;
+  const supine_renderer *renderer;
+  const supine_scene *scene;
+  size_t begin, end;                /* vertices that are shown */
+  size_t width, height;             /* samples */
+  uint32_t *nearest;                /* [height, width] triangle; NOTHING: none */
+  float *nearness;                  /* [height, width] of it */
+  float colours[SHADES + 1][3];     /* of the map, linear */
+  unsigned char encode[SHADES + 1]; /* linear to sRGB, 0 to 255 */
+  uint32_t *pixels;
 } canvas;
 
-static bool canvas_open(canvas *c, const supine_scene *scene) {
-  static const GLenum formats[] = {GL_RGBA8, GL_DEPTH_COMPONENT24};
-  static const GLenum places[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
-  GLint largest = 0;
-  glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &largest);
-  const size_t limit = (size_t)largest / OVERSAMPLE;
-  if (scene->width == 0 || scene->height == 0 || scene->width > limit || scene->height > limit) {
-    return false;
+static void find_corners(const canvas *c) {
+  const supine_renderer *r = c->renderer;
+  const camera cam = find_camera(r, c->scene);
+  const double size[2] = {(double)c->width, (double)c->height};
+  const double near = cam.away - depth_in_radii * cam.radius;
+  double frame[4];
+  find_frame((supine_renderer *)(uintptr_t)r, c->scene, frame);
+  supine_deform(r->basis, c->scene->pose, r->scratch);
+  const float *normals = r->scratch + 3 * r->info->vertex_count;
+  supine_normals(r->basis, r->scratch, r->scratch + 3 * r->info->vertex_count);
+  for (size_t i = c->begin; i < c->end; ++i) {
+    const double n[3] = {(double)normals[3 * i], (double)normals[3 * i + 1],
+                         (double)normals[3 * i + 2]};
+    double p[3];
+    double seen[3];
+    double at[2];
+    place(&cam, r->scratch + 3 * i, p);
+    turn(&cam, n, seen);
+    project(&cam, frame, p, size, at);
+    const double away = cam.away - p[2];
+    r->corners[i] = (corner){.x = (float)at[0],
+                             .y = (float)at[1],
+                             .nearness = away > near ? (float)(1.0 / away) : 0.0F,
+                             .normal = {(float)seen[0], (float)seen[1], (float)seen[2]},
+                             .eye = {(float)-p[0], (float)-p[1], (float)away},
+                             .value = c->scene->value[i]};
   }
-  c->width = (GLsizei)(OVERSAMPLE * scene->width);
-  c->height = (GLsizei)(OVERSAMPLE * scene->height);
-  glGenFramebuffers(1, &c->frame);
-  glGenRenderbuffers(2, c->buffer);
-  glBindFramebuffer(GL_FRAMEBUFFER, c->frame);
-  for (int i = 0; i < 2; ++i) {
-    glBindRenderbuffer(GL_RENDERBUFFER, c->buffer[i]);
-    glRenderbufferStorage(GL_RENDERBUFFER, formats[i], c->width, c->height);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, places[i], GL_RENDERBUFFER, c->buffer[i]);
-  }
-  return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE &&
-         glGetError() == GL_NO_ERROR;
 }
 
-static void canvas_close(canvas *c) {
-  glDeleteFramebuffers(1, &c->frame);
-  glDeleteRenderbuffers(2, c->buffer);
+/* A triangle of the drawing: its corners, and twice its area in samples; below 0: seen from
+ * behind. */
+typedef struct face {
+  const corner *at[3];
+  float area;
+} face;
+
+static face face_of(const canvas *c, size_t triangle) {
+  const uint32_t *v = c->renderer->info->triangles + 3 * triangle;
+  const corner *all = c->renderer->corners;
+  face f = {{&all[v[0]], &all[v[1]], &all[v[2]]}, 0.0F};
+  f.area = (f.at[2]->x - f.at[0]->x) * (f.at[1]->y - f.at[0]->y) -
+           (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y); /* rows go down */
+  return f;
 }
 
-/* Means of 2 x 2 pixels, the top row first. Nothing drawn is 0 in colour and alpha alike, so that
- * the means are premultiplied. */
-static void shrink(const canvas *c, const unsigned char *rgba, const supine_scene *scene,
-                   uint32_t *pixels) {
-  enum { COUNT = OVERSAMPLE * OVERSAMPLE };
-  for (size_t y = 0; y < scene->height; ++y) {
-    for (size_t x = 0; x < scene->width; ++x) {
-      uint32_t sum[4] = {COUNT / 2, COUNT / 2, COUNT / 2, COUNT / 2};
-      for (size_t sub = 0; sub < COUNT; ++sub) {
-        const size_t row = (scene->height - 1 - y) * OVERSAMPLE + sub / OVERSAMPLE;
-        const size_t column = x * OVERSAMPLE + sub % OVERSAMPLE;
-        const unsigned char *from = rgba + 4 * (row * (size_t)c->width + column);
-        for (int k = 0; k < 4; ++k) {
-          sum[k] += from[k];
-        }
+/* Shares of the corners at a place of the picture. */
+static void shares_at(const face *f, float x, float y, float share[3]) {
+  for (int k = 0; k < 3; ++k) {
+    const corner *a = f->at[(k + 1) % 3];
+    const corner *b = f->at[(k + 2) % 3];
+    share[k] = ((b->x - x) * (a->y - y) - (a->x - x) * (b->y - y)) / f->area;
+  }
+}
+
+static float nearness_at(const face *f, const float share[3]) {
+  return share[0] * f->at[0]->nearness + share[1] * f->at[1]->nearness +
+         share[2] * f->at[2]->nearness;
+}
+
+/* Draw a triangle's part in the rows from `begin` to `end`. */
+static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
+  const face f = face_of(c, triangle);
+  const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));
+  const float right = fmaxf(f.at[0]->x, fmaxf(f.at[1]->x, f.at[2]->x));
+  const float top = fminf(f.at[0]->y, fminf(f.at[1]->y, f.at[2]->y));
+  const float bottom = fmaxf(f.at[0]->y, fmaxf(f.at[1]->y, f.at[2]->y));
+  if (!(f.area != 0.0F) || !(bottom >= (float)begin && top <= (float)end) ||
+      !(right >= 0.0F && left <= (float)c->width)) {
+    return;
+  }
+  const size_t first = top > (float)begin ? (size_t)top : begin;
+  const size_t last = bottom < (float)end ? (size_t)bottom + 1 : end;
+  const size_t from = left > 0.0F ? (size_t)left : 0;
+  const size_t to = right < (float)c->width ? (size_t)right + 1 : c->width;
+  for (size_t y = first; y < last && y < end; ++y) {
+    for (size_t x = from; x < to && x < c->width; ++x) {
+      float share[3];
+      shares_at(&f, (float)x + 0.5F, (float)y + 0.5F, share);
+      const float nearness = nearness_at(&f, share);
+      const size_t at = y * c->width + x;
+      if (share[0] >= 0.0F && share[1] >= 0.0F && share[2] >= 0.0F && nearness > c->nearness[at]) {
+        c->nearness[at] = nearness;
+        c->nearest[at] = (uint32_t)triangle;
       }
-      pixels[y * scene->width + x] =
-          (sum[3] / COUNT) << 24 | (sum[0] / COUNT) << 16 | (sum[1] / COUNT) << 8 | sum[2] / COUNT;
     }
+  }
+}
+
+/* --- light and colour ------------------------------------------------------------------------ */
+
+static float smoothstep(float low, float high, float x) {
+  const float t = fminf(1.0F, fmaxf(0.0F, (x - low) / (high - low)));
+  return t * t * (3.0F - 2.0F * t);
+}
+
+static float dot(const float a[3], const float b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void normalise(float v[3]) {
+  const float length = sqrtf(dot(v, v));
+  for (int k = 0; k < 3; ++k) {
+    v[k] /= length > 0.0F ? length : 1.0F;
+  }
+}
+
+static float value_at(const face *f, float x, float y) {
+  float share[3];
+  shares_at(f, x, y, share);
+  return (share[0] * f->at[0]->nearness * f->at[0]->value +
+          share[1] * f->at[1]->nearness * f->at[1]->value +
+          share[2] * f->at[2]->nearness * f->at[2]->value) /
+         nearness_at(f, share);
+}
+
+/* How much of a contour line is here, as contour.glsl has it. */
+static float contour(const face *f, float x, float y, float value, float spacing) {
+  const float steps = value / spacing;
+  const float width =
+      (fabsf(value_at(f, x + 1.0F, y) - value) + fabsf(value_at(f, x, y + 1.0F) - value)) / spacing;
+  const float middle = steps - 0.5F;
+  const float away = fabsf(middle - floorf(middle) - 0.5F) / fmaxf(width, 1e-6F);
+  return steps < 0.5F
+             ? 0.0F
+             : (1.0F - smoothstep(0.5F, 1.7F, away)) * (1.0F - smoothstep(0.3F, 0.8F, width));
+}
+
+/* The share of light from a direction, which need not be of length 1. */
+static float lambert(const float n[3], const float from[3]) {
+  float to[3] = {from[0], from[1], from[2]};
+  normalise(to);
+  return fmaxf(0.0F, dot(n, to));
+}
+
+/* The colour of a triangle at a sample, 0 to 255. */
+static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgb[3]) {
+  static const float key[3] = {-0.55F, 0.75F, 0.8F};
+  static const float fill[3] = {0.9F, -0.1F, 0.5F};
+  const supine_scene *scene = c->scene;
+  const face f = face_of(c, triangle);
+  float share[3];
+  float n[3] = {0.0F, 0.0F, 0.0F};
+  float eye[3] = {0.0F, 0.0F, 0.0F};
+  float half[3] = {key[0], key[1], key[2]};
+  shares_at(&f, x, y, share);
+  for (int k = 0; k < 3; ++k) {
+    for (int v = 0; v < 3; ++v) {
+      const float weight = share[v] * f.at[v]->nearness;
+      n[k] += weight * f.at[v]->normal[k] * (f.area > 0.0F ? 1.0F : -1.0F);
+      eye[k] += weight * f.at[v]->eye[k];
+    }
+  }
+  normalise(n);
+  normalise(eye);
+  normalise(half);
+  for (int k = 0; k < 3; ++k) {
+    half[k] += eye[k];
+  }
+  const float value = value_at(&f, x, y);
+  const float spacing = (float)scene->line_step;
+  const float facing = fmaxf(0.0F, dot(n, eye));
+  float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
+  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darker towards the outline */
+  light *= spacing > 0.0F ? 1.0F - 0.275F * contour(&f, x, y, value, spacing) : 1.0F;
+  const float shine = 0.08F * powf(lambert(n, half), 48.0F);
+  const float rim = (scene->dark ? 1.0F : 0.0F) * powf(1.0F - facing, 3.0F);
+  static const float rims[3] = {0.10F, 0.14F, 0.20F};
+  const float t = fminf(1.0F, fmaxf(0.0F, value / (float)scene->largest));
+  const float *base = c->colours[(size_t)lrintf(t * SHADES)];
+  for (int k = 0; k < 3; ++k) {
+    const float lit = base[k] * light + shine + rim * rims[k];
+    rgb[k] = c->encode[(size_t)lrintf(fminf(1.0F, fmaxf(0.0F, lit)) * SHADES)];
+  }
+}
+
+/* The mean of a pixel's samples. Nothing drawn is 0 in colour and alpha alike, so that the means
+ * are premultiplied. */
+static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
+  enum { COUNT = OVERSAMPLE * OVERSAMPLE };
+  uint32_t sum[4] = {COUNT / 2, COUNT / 2, COUNT / 2, COUNT / 2};
+  for (size_t sub = 0; sub < COUNT; ++sub) {
+    const size_t row = OVERSAMPLE * y + sub / OVERSAMPLE;
+    const size_t column = OVERSAMPLE * x + sub % OVERSAMPLE;
+    const uint32_t triangle = c->nearest[row * c->width + column];
+    unsigned char rgb[3];
+    if (triangle != NOTHING) {
+      shade(c, triangle, (float)column + 0.5F, (float)row + 0.5F, rgb);
+      for (int k = 0; k < 3; ++k) {
+        sum[k] += rgb[k];
+      }
+      sum[3] += 255;
+    }
+  }
+  return (sum[3] / COUNT) << 24 | (sum[0] / COUNT) << 16 | (sum[1] / COUNT) << 8 | sum[2] / COUNT;
+}
+
+/* Draws rows of pixels. */
+static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
+  const canvas *c = context;
+  const supine_basis_info *info = c->renderer->info;
+  const corner *corners = c->renderer->corners;
+  (void)thread;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    const uint32_t *v = info->triangles + 3 * t;
+    if (v[0] >= c->begin && v[0] < c->end && corners[v[0]].nearness > 0.0F &&
+        corners[v[1]].nearness > 0.0F && corners[v[2]].nearness > 0.0F) {
+      draw_face(c, t, OVERSAMPLE * begin, OVERSAMPLE * end);
+    }
+  }
+  for (size_t y = begin; y < end; ++y) {
+    for (size_t x = 0; x < c->scene->width; ++x) {
+      c->pixels[y * c->scene->width + x] = mean_of(c, x, y);
+    }
+  }
+}
+
+static void find_colours(canvas *c) {
+  for (int i = 0; i <= SHADES; ++i) {
+    const float share = (float)i / SHADES;
+    double rgb[3];
+    supine_render_colour(c->scene->colours, (double)share, rgb);
+    for (int k = 0; k < 3; ++k) {
+      c->colours[i][k] = powf((float)rgb[k], gamma_exponent);
+    }
+    c->encode[i] = (unsigned char)lrintf(255.0F * powf(share, 1.0F / gamma_exponent));
   }
 }
 
 supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, uint32_t *pixels,
                                  supine_error *error) {
-  canvas c = {0, {0}, 0, 0};
-  unsigned char *rgba = NULL;
-  const double dark = scene->dark ? 1 : 0;
+  if (scene->width == 0 || scene->height == 0 || scene->width > SIDE_MAX ||
+      scene->height > SIDE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%zu x %zu pixels cannot be drawn: 1 to %d a side", scene->width,
+                            scene->height, SIDE_MAX);
+  }
+  const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
+  canvas c = {.renderer = r,
+              .scene = scene,
+              .width = OVERSAMPLE * scene->width,
+              .height = OVERSAMPLE * scene->height,
+              .nearest = malloc(count * sizeof *c.nearest),
+              .nearness = calloc(count, sizeof *c.nearness),
+              .pixels = pixels};
   supine_status status = SUPINE_OK;
-  if (!supine_render_gl_use(&r->gl)) {
-    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED, "the OpenGL context is lost");
-  }
-  if (!canvas_open(&c, scene)) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the OpenGL driver cannot draw %zu x %zu pixels", scene->width,
-                              scene->height);
-    goto cleanup;
-  }
-  rgba = malloc(4 * (size_t)c.width * (size_t)c.height);
-  if (rgba == NULL) {
+  if (c.nearest == NULL || c.nearness == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
+  } else {
+    memset(c.nearest, 0xFF, count * sizeof *c.nearest);
+    shown_vertices(r, scene, &c.begin, &c.end);
+    find_colours(&c);
+    find_corners(&c);
+    supine_parallel_for(scene->height, GRAIN, 0, draw_rows, &c);
   }
-  glViewport(0, 0, c.width, c.height);
-  glClearColor(0, 0, 0, 0);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  glEnable(GL_DEPTH_TEST);
-  glUseProgram(r->program);
-  glBindVertexArray(r->array);
-  glBindTexture(GL_TEXTURE_2D, r->colours[scene->colours]);
-  load_camera(r, scene);
-  load_state(r, scene);
-  uniform(r, "largest", 1, &scene->largest);
-  uniform(r, "line_step", 1, &scene->line_step);
-  uniform(r, "dark", 1, &dark);
-  draw_lungs(r, scene);
-  glReadPixels(0, 0, c.width, c.height, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
-  if (glGetError() != GL_NO_ERROR) {
-    status = supine_error_set(error, SUPINE_ERROR_UNSUPPORTED, "the OpenGL driver failed");
-    goto cleanup;
-  }
-  shrink(&c, rgba, scene, pixels);
-cleanup:
-  canvas_close(&c);
-  free(rgba);
+  free(c.nearest);
+  free(c.nearness);
   return status;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Pictures of deformed lungs: drawn off screen by OpenGL ES 3, composed by cairo. Not part of the
- * run-time library. Where cairo is not installed, pictures answer SUPINE_ERROR_UNSUPPORTED. */
+ * Pictures of deformed lungs, composed by cairo. Where cairo is not installed, pictures answer
+ * SUPINE_ERROR_UNSUPPORTED. */
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 
@@ -44,11 +44,10 @@ typedef enum supine_colours {
  * and page. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
-/** An OpenGL context with the surface of one basis. For the thread that made it. */
+/** The space to draw one basis in. For one thread at a time. */
 typedef struct supine_renderer supine_renderer;
 
 /** @param basis  must outlive the renderer
- * @retval SUPINE_ERROR_UNSUPPORTED  no EGL in the build, or no driver that draws
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
                                    supine_error *error);
@@ -78,10 +77,9 @@ typedef struct supine_scene {
  * so that several states can be drawn to one scale. The scenes must share view and lungs. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
-/** Draws on a transparent ground.
+/** Draws on a transparent ground. Uses all cores.
  * @param pixels  [height, width] premultiplied ARGB as cairo has it, top row first; written
- * @retval SUPINE_ERROR_ARGUMENT     a size that the driver cannot draw
- * @retval SUPINE_ERROR_UNSUPPORTED  the driver failed
+ * @retval SUPINE_ERROR_ARGUMENT  0 or more than 16384 pixels a side
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
