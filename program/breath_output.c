@@ -12,7 +12,7 @@
 #include "precompute/writer.h"
 
 #include "program/breath_output.h"
-#include "program/template/template.h"
+#include "program/export/template.h"
 
 /* mm: half of it is less than what storage may cost (supine_basis_info's storage_error). */
 static const double rounding = 1.0 / 256.0;

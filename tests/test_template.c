@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Templates: names, sections, escapes. */
-#include "program/template/template.h"
+#include "program/export/template.h"
 #include "test.h"
 
 static void write_large(const void *context, const char *name, FILE *file) {

@@ -8,8 +8,8 @@
 
 #include "program/export/base64.h"
 #include "program/export/export.h"
+#include "program/export/template.h"
 #include "program/render/render.h"
-#include "program/template/template.h"
 
 extern const supine_asset supine_export_assets[]; /* page/, put in by the build */
 

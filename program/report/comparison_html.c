@@ -10,9 +10,9 @@
 
 #include "sh/base/text.h"
 
+#include "program/export/template.h"
 #include "program/options/basis_input.h"
 #include "program/report/comparison_parts.h"
-#include "program/template/template.h"
 
 extern const supine_asset supine_report_assets[]; /* page/, put in by the build */
 

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "program/export/template.h"
 #include "program/export/export.h"
 #include "program/stream/live_page.h"
-#include "program/template/assets.h"
 
 extern const supine_asset supine_stream_assets[]; /* live.js, put in by the build */
 

@@ -37,7 +37,7 @@ foreach(path IN LISTS FILES)
   math(EXPR number "${number} + 1")
 endforeach()
 file(WRITE "${OUTPUT}" "/* Made by embed.cmake. */
-#include \"program/template/assets.h\"
+#include \"program/export/template.h\"
 
 ${arrays}
 extern const supine_asset ${ARRAY}[];

@@ -18,7 +18,16 @@
 
 #include <jansson.h>
 
-#include "program/template/assets.h"
+/** A file that the build puts into the program (supine_embed); its array ends with a name of NULL. */
+typedef struct supine_asset {
+  const char *name;  /**< "page.css" */
+  const char *bytes; /**< ends with a 0 that `size` does not count */
+  size_t size;
+} supine_asset;
+
+/** The asset of that name, `length` bytes long, or NULL. */
+const supine_asset *supine_template_asset(const supine_asset *assets, const char *name,
+                                          size_t length);
 
 /** What fills a template. */
 typedef struct supine_template {
