@@ -17,6 +17,7 @@ export const browser = await chromium.launch({
 export async function open(path, options = {}, hash = '') {
   const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
   page.setDefaultTimeout(60000);
+  if (options.init) await page.addInitScript(options.init);
   const complaints = [];
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(error.stack));
@@ -26,11 +27,19 @@ export async function open(path, options = {}, hash = '') {
   return { page, complaints };
 }
 
-/** The same for the page of a basis, drawn once. */
-export async function openLungs(path, options, hash) {
+/** The same for the page of a basis, drawn once, with all controls in reach; unless told, supine in a breath
+ * with the patient still, as the tests' places on the picture want it. */
+export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0') {
   const opened = await open(path, options, hash);
   await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
+  await opened.page.evaluate(() => { document.getElementById('more').open = true; });
   return opened;
+}
+
+/** Presses a key on the picture, which alone listens to letters and digits. */
+export async function press(page, key) {
+  await page.locator('#picture').focus();
+  await page.keyboard.press(key);
 }
 
 /** The picture after it has been drawn. */

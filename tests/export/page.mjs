@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs as open, picture } from './browser.mjs';
+import { browser, openLungs as open, picture, press } from './browser.mjs';
 import { evaluate, folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.005; // displacements in 16 bits
@@ -50,11 +50,11 @@ async function checkControls(page) {
   await changes('dragging the ball', () => drag('#ball', 30, 10));
   await changes('the tilt slider', () => page.locator('#tilt').fill('30'));
   await changes('the volume slider', () => page.locator('#depth').fill('900'));
-  await changes('a key', () => page.keyboard.press('5'));
+  await changes('a key', () => press(page, '5'));
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
   await changes('pinning', () => page.getByRole('button', { name: 'Take as the other posture' }).click());
-  await changes('another key', () => page.keyboard.press('3')); /* upright, the room turns nothing */
+  await changes('another key', () => press(page, '3')); /* upright, the room turns nothing */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });
     await page.waitForFunction(() => window.supine.state.roomBlend > 0.99);

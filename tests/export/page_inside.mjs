@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture, settled } from './browser.mjs';
+import { browser, openLungs, picture, settled, press } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
@@ -64,7 +64,7 @@ const mean = (values) => values.reduce((sum, x) => sum + x, 0) / values.length;
 /** The moves that the table has are those between the program's places. */
 async function checkTable(page) {
   const rest = deformed('supine', 'rest');
-  await page.keyboard.press('2');
+  await press(page, '2');
   for (const [depth, kind] of [[500, 'displacement'], [800, 'difference']]) {
     await page.locator('#depth').fill(String(depth));
     await page.locator(`[name=kind][value=${kind}]`).check();
@@ -222,7 +222,7 @@ async function checkMany() {
   await page.close();
 }
 
-const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 760, height: 480 } });
+const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 1000, height: 700 } });
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
 await checkControls(page);

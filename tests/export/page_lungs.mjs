@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture, settled } from './browser.mjs';
+import { browser, openLungs, picture, settled, press } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 import { evaluate, folder, largestDistance, randomDirections, supine } from './support.mjs';
 
@@ -76,7 +76,7 @@ async function checkRight(page) {
   const { page: alone, complaints } = await openLungs(lungHtml, { viewport: { width: 760, height: 480 } });
   assert.deepEqual(await alone.evaluate(() => window.supine.basis.lungNames), ['right lung']);
   for (const [key, behind] of [['a', false], ['p', true]]) { // from the front, then from behind
-    await alone.keyboard.press(key);
+    await press(alone, key);
     await settled(alone);
     const [at, ends] = await alone.evaluate(() => {
       const letters = Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => { const box = e.getBoundingClientRect(); return [e.textContent, box.x + box.width / 2]; }));
@@ -143,6 +143,7 @@ async function checkHeadset() {
   page.on('pageerror', (error) => complaints.push(error.stack));
   await page.goto(`file://${html}`);
   await page.waitForFunction(() => window.supine?.panes().length > 0);
+  await page.evaluate(() => { document.getElementById('more').open = true; });
   await page.locator('#vr:not([hidden])').waitFor();
   const before = await picture(page);
   await page.locator('#vr').click();

@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, settled } from './browser.mjs';
+import { browser, openLungs, settled, press } from './browser.mjs';
 import { html } from './lungs.mjs';
 
 mkdirSync('page_sizes', { recursive: true });
@@ -13,7 +13,7 @@ mkdirSync('page_sizes', { recursive: true });
 async function checkLetters(page, what) {
   const { letters, plates, arrow } = await page.evaluate(() => {
     const middle = (box) => [box.x + box.width / 2, box.y + box.height / 2];
-    const stage = document.getElementById('stage').getBoundingClientRect();
+    const stage = document.getElementById('picture').getBoundingClientRect();
     const pane = window.supine.panes()[0];
     const onScreen = ([x, y, z]) => {
       const m = pane.toEye;
@@ -23,7 +23,7 @@ async function checkLetters(page, what) {
     };
     return {
       letters: [...document.querySelectorAll('.letter:not([hidden])')].map((e) => ({ letter: e.textContent, at: middle(e.getBoundingClientRect()) })),
-      plates: ['legend', 'title'].map((id) => { const { left, right, top, bottom } = document.getElementById(id).getBoundingClientRect(); return { id, left, right, top, bottom }; }),
+      plates: ['legend', 'ball'].map((id) => { const { left, right, top, bottom } = document.getElementById(id).getBoundingClientRect(); return { id, left, right, top, bottom }; }),
       arrow: pane.arrowEnds.map(onScreen),
     };
   });
@@ -48,12 +48,12 @@ for (const [width, height] of sizes) {
     if (touch) { // a tap keeps a probe and says what is there; dragging turns
       const box = await sized.locator('#picture').boundingBox();
       const azimuth = await sized.evaluate(() => window.supine.state.camera.azimuth);
-      await sized.touchscreen.tap(box.x + box.width * 0.38, box.y + box.height * 0.48);
+      await sized.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);
       await sized.waitForFunction(() => window.supine.state.probes.length === 1);
       assert.equal(await sized.evaluate(() => window.supine.state.camera.azimuth), azimuth);
     }
     for (const key of ['1', '4', '5', '3']) {
-      await sized.keyboard.press(key);
+      await press(sized, key);
       await settled(sized);
       await checkLetters(sized, `${width} x ${height}, posture ${key}`);
     }

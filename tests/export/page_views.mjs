@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What people reach for in the page: views, pan, zoom, postures, probes, cut, links, a lost context.
 import assert from 'node:assert/strict';
-import { browser, openLungs, picture, settled } from './browser.mjs';
+import { browser, openLungs, picture, settled, press } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
 /** The letters that are shown, and where. */
@@ -14,13 +14,13 @@ const letters = (page) => page.evaluate(() => Object.fromEntries([...document.qu
 async function checkViews(page) {
   const expected = { a: ['R', 'L', 'H', 'F'], p: ['L', 'R', 'H', 'F'], l: ['A', 'P', 'H', 'F'], r: ['P', 'A', 'H', 'F'], f: ['R', 'L', 'A', 'P'], h: ['R', 'L', 'P', 'A'] };
   for (const [key, [left, right, top, bottom]] of Object.entries(expected)) {
-    await page.keyboard.press(key);
+    await press(page, key);
     await settled(page);
     const at = await letters(page);
     assert.deepEqual(Object.keys(at).sort(), [left, right, top, bottom].sort(), `seen from ${key}`);
     assert.ok(at[left][0] < at[top][0] && at[top][0] < at[right][0] && at[top][1] < at[left][1] && at[left][1] < at[bottom][1], `seen from ${key}: ${JSON.stringify(at)}`);
   }
-  await page.keyboard.press('a');
+  await press(page, 'a');
   await settled(page);
   /* The left lung's vertices are where L is. */
   const [left, middle] = await page.evaluate(() => {
@@ -48,13 +48,13 @@ async function checkCamera(page) {
   await settled(page);
   const after = await under();
   assert.ok(after[0] > before[0] + 5 && after[1] < before[1] - 2, 'the right button does not pan');
-  await page.keyboard.press('0');
+  await press(page, '0');
   await page.mouse.move(x, y);
   await page.mouse.wheel(0, -400);
   await settled(page);
   const pan = await page.evaluate(() => window.supine.state.camera.pan);
   assert.ok(pan[0] < -1 && pan[1] < -1, `zooming to the upper right moves the lungs to the lower left: ${pan}`);
-  await page.keyboard.press('0');
+  await press(page, '0');
 }
 
 /** Postures are written as the program reads them. */
@@ -112,7 +112,7 @@ async function checkProbes(page) {
   const [list, between] = [await page.locator('#probes').textContent(), await page.locator('#probes-text').textContent()];
   assert.match(list, /1  (left|right) lung  [\d.]+ mm  [LR] \d+  [PA] \d+  [HF] \d+ mm/);
   assert.match(between, /1 to 2: [\d.]+ mm; supine at rest [\d.]+ mm/);
-  await page.keyboard.press('2');
+  await press(page, '2');
   await settled(page);
   await page.waitForFunction(() => location.hash.includes('prone') && location.hash.includes('probes='));
   const hash = await page.evaluate(() => location.hash);
@@ -126,7 +126,7 @@ async function checkProbes(page) {
 
 /** A context that is lost comes back with the same picture. */
 async function checkLoss(page) {
-  await page.keyboard.press('3');
+  await press(page, '3');
   await page.mouse.move(5, 5);
   const before = await picture(page);
   await page.evaluate(() => { window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context'); window.lose.loseContext(); });

@@ -62,6 +62,7 @@ function readColours(text) {
 function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
+  basis.colours.expansion = divergingMap();
   basis.rest = takeTensor('vertices', Float32Array);
   basis.direction = takeCounts('direction', [1 / 32767]);
   basis.coefficients = takeCounts('coefficients', basis.units);
@@ -81,6 +82,11 @@ function readBasis() {
   const names = (basis.metadata.lungs ?? '').split(',');
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
   groupByLung(basis);
+  basis.lungMiddles = basis.lungNames.map((_, lung) => [0, 1, 2].map((axis) => {
+    let sum = 0;
+    for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v + axis];
+    return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]);
+  }));
   if (basis.inside) takeInside(basis.inside);
   return basis;
 }
@@ -286,6 +292,19 @@ function placeOf(basis, { weights, gains }, vertex) {
   let amount = 0;
   for (let k = 0; k < basis.modes; ++k) amount += weights[k] * basis.coefficients[vertex * basis.modes + k];
   return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
+}
+
+/** Where every vertex is: xyz of each, mm. */
+function placesOf({ rest, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
+  const places = new Float32Array(rest.length);
+  for (let lung = 0; lung < lungs; ++lung) {
+    for (let v = lungBegin[lung]; v < lungBegin[lung + 1]; ++v) {
+      let amount = 0;
+      for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[v * modes + k];
+      for (let axis = 0; axis < 3; ++axis) places[3 * v + axis] = rest[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis];
+    }
+  }
+  return places;
 }
 
 /** A few thousand triangles, for the range of the colours: the places of their corners. */

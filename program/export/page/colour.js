@@ -19,9 +19,19 @@ function rangeEnd(value) {
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },
-  expansion: { measure: 1, map: 'displacement', unit: '%' },
+  expansion: { measure: 1, map: 'expansion', unit: '%' },
   height: { measure: 2, map: 'displacement', unit: 'mm' },
 };
+
+/** RGBA bytes of a map that diverges about its middle: blue below, orange above. */
+function divergingMap() {
+  const stops = [[19, 66, 138], [113, 161, 214], [243, 242, 238], [230, 147, 92], [140, 45, 4]];
+  return Uint8Array.from({ length: 1024 }, (_, i) => {
+    const at = (Math.floor(i / 4) / 255) * 4;
+    const below = Math.min(3, Math.floor(at));
+    return i % 4 === 3 ? 255 : Math.round(stops[below][i % 4] + (at - below) * (stops[below + 1][i % 4] - stops[below][i % 4]));
+  });
+}
 
 /** A CSS gradient of a map. */
 function gradient(bytes) {

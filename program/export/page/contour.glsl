@@ -5,7 +5,7 @@ float contour(float value, float spacing) {
   float steps = value / spacing;
   float width = fwidth(steps);
   float away = abs(fract(steps - 0.5) - 0.5) / max(width, 1e-6);
-  return (1.0 - smoothstep(0.5, 1.7, away)) * (1.0 - smoothstep(0.3, 0.8, width)) * step(0.5, steps);
+  return (1.0 - smoothstep(0.3, 1.2, away)) * (1.0 - smoothstep(0.3, 0.8, width)) * step(0.5, steps);
 }
 
 /** A colour that has one on it. */

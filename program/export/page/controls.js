@@ -89,10 +89,13 @@ function makePostureButtons(choose) {
     button.title = `${posture.name} (${i + 1})`;
     const icon = document.createElement('canvas');
     icon.setAttribute('aria-hidden', 'true');
-    button.append(icon, posture.label);
+    const [name, answer] = ['strong', 'small'].map((tag) => document.createElement(tag));
+    name.textContent = posture.label;
+    button.className = 'card';
+    button.append(name, icon, answer);
     button.addEventListener('click', () => choose(i));
     $('postures').append(button);
-    return { button, icon, posture };
+    return { button, icon, posture, answer };
   });
 }
 
@@ -100,6 +103,7 @@ function makePostureButtons(choose) {
 function drawLegend(kind, range, title, colours) {
   $('colours').style.background = gradient(colours);
   $('colours').classList.toggle('beyond', range.beyond);
+  $('colours').classList.toggle('beneath', range.beyond && range.begin < 0);
   write('legend-title', title);
   write('legend-unit', KINDS[kind].unit);
   const size = range.end - range.begin;

@@ -97,7 +97,7 @@ const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
   const get = (name) => style.getPropertyValue(`--${name}`).trim();
-  for (const name of ['ink', 'soft', 'line', 'gravity', 'paper-solid', 'back-inner', 'back-outer', 'ball-light', 'ball-dark']) theme[name] = get(name);
+  for (const name of ['ink', 'soft', 'line', 'gravity', 'paper-solid', 'accent', 'table', 'back-inner', 'back-outer', 'ball-light', 'ball-dark']) theme[name] = get(name);
   theme.tones = {
     body: [get('figure-light'), get('figure-dark')], lung: [get('figure-lung'), get('figure-lung-dark')],
     hair: [get('figure-hair'), get('figure-hair')], face: [get('figure-face'), get('figure-light')],

@@ -3,6 +3,9 @@
 
 const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
 
+/** What was measured of lungs at rest, % of what they hold supine: mean and standard deviation. */
+const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
+
 /** mL that each lung holds. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + cubicAt(lungCubic(basis, lung, weights), gains[3 * lung]));
 
@@ -72,4 +75,67 @@ function findingOf(basis, moment, gravity, volume, stride) {
   if (!moment.held) return [`${where} ${move}`, ''];
   basis.fromHeld ??= heldBy(basis, from);
   return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, move.replace(/^t/, 'T')];
+}
+
+/** "L \u22121 %, R +18 %, 6.9 mm": the answer of a moment, as short as a card. */
+function answerOf(basis, moment) {
+  const { mean, largest } = moveBetween(basis, moment, basis.from, 1);
+  if (largest < 0.05) return 'reference';
+  if (moment.held) basis.fromHeld ??= heldBy(basis, basis.from);
+  const lungs = (moment.held ?? []).map((ml, lung) => `${basis.lungNames[lung].slice(0, 1).toUpperCase()} ${signed(Math.round((100 * ml) / basis.fromHeld[lung] - 100))} %, `);
+  return `${lungs.join('')}${mean.toFixed(1)}\u00a0mm`;
+}
+
+/** Write a finding with the changes of volume emphasised. */
+function writeFinding(element, text) {
+  if (element.written === text) return;
+  element.written = text;
+  element.replaceChildren(...text.split(/(\S+ \S+ (?:gains|loses) [^;]*?\))/).map((part, i) => {
+    if (i % 2 === 0) return part;
+    const change = document.createElement('em');
+    change.textContent = part;
+    return change;
+  }));
+}
+
+/** Bars of what each lung holds: grey before, and what has been gained or lost since. */
+class Holds {
+  constructor(parent, { lungNames }) {
+    this.rows = lungNames.map(() => {
+      const row = document.createElement('div');
+      row.className = 'hold';
+      const parts = Object.fromEntries([['who', 'span'], ['percent', 'strong'], ['amount', 'div'], ['was', 'i'], ['change', 'i'], ['published', 'i'], ['ml', 'span']].map(([name, tag]) => {
+        const part = document.createElement(tag);
+        part.className = name;
+        return [name, part];
+      }));
+      parts.amount.append(parts.was, parts.change, parts.published, parts.ml);
+      row.append(parts.who, parts.percent, parts.amount);
+      parent.append(row);
+      return parts;
+    });
+  }
+
+  /** `held` and `before` are mL of each lung, `most` is the longest bar to come, `heights` how high lungs lie,
+   * `measured` of PUBLISHED, where there is any. */
+  show({ lungNames }, held, before, most, heights, measured) {
+    const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
+    const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // mm
+    this.rows.forEach(({ who, percent, was, change, published, ml }, lung) => {
+      const [from, to] = [before[lung], held[lung]];
+      const place = (part, begin, end) => {
+        part.style.left = `${(100 * begin) / full}%`;
+        part.style.width = `${(100 * (end - begin)) / full}%`;
+      };
+      who.textContent = `${lungNames[lung]}${apart ? (heights[lung] > heights[1 - lung] ? ' (uppermost)' : ' (lowermost)') : ''}`;
+      percent.textContent = `${signed(Math.round((100 * to) / from - 100))} %`;
+      ml.textContent = `${from.toFixed(0)} \u2192 ${to.toFixed(0)}`;
+      place(was, 0, Math.min(from, to));
+      place(change, Math.min(from, to), Math.max(from, to));
+      change.classList.toggle('lost', to < from);
+      const [mean, deviation] = measured?.[lungNames[lung]] ?? [];
+      published.hidden = mean === undefined;
+      if (mean !== undefined) place(published, from * (1 + (mean - deviation) / 100), from * (1 + (mean + deviation) / 100));
+    });
+  }
 }

@@ -8,13 +8,13 @@ function linkOf(state) {
   const { camera } = state;
   const all = {
     posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
-    colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '1' : '',
+    colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '' : '0',
     show: ['contours', 'ghost', 'arrows', 'wires', 'beside'].filter((name) => state[name]).join('.') || 'nothing',
     lungs: state.opacity.every((x) => x === (state.basis.inside ? FADED : 1)) ? '' : state.opacity.join(':'),
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
     camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
-    probes: state.probes.join('.'), names: state.named.join('.'), inside: state.basis.inside && !state.inside ? '0' : '',
+    slices: state.slices.map((x) => round(x, 1)).join(':'), probes: state.probes.join('.'), names: state.named.join('.'), inside: state.basis.inside && !state.inside ? '0' : '',
   };
   return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
 }
@@ -31,9 +31,9 @@ function takeLink(text, state) {
   state.tidal = within(numbers('tidal')[0], 1e-3, state.depthMax, state.tidal);
   state.depth = within(numbers('depth')[0], 0, state.depthMax, state.depth);
   if (KINDS[link.get('colour')]) state.kind = link.get('colour');
-  state.room = link.get('room') === '1';
+  state.room = link.get('room') !== '0';
   state.roomBlend = state.room ? 1 : 0;
-  const shown = (link.get('show') ?? 'contours').split('.');
+  const shown = (link.get('show') ?? 'contours.ghost').split('.');
   for (const name of ['contours', 'ghost', 'arrows', 'wires', 'beside']) state[name] = shown.includes(name);
   const opacity = numbers('lungs');
   if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
@@ -45,6 +45,8 @@ function takeLink(text, state) {
   if (camera.length >= 5 && camera.every(Number.isFinite)) {
     state.camera = { azimuth: camera[0], elevation: within(camera[1], -1.58, 1.58, 0), zoom: within(camera[2], 0.3, 30, 1), pan: camera.slice(3, 5), pivot: camera.length === 8 ? camera.slice(5) : null };
   }
+  const slices = numbers('slices');
+  if (slices.length === 2 && [2, 1].every((axis, i) => slices[i] > state.body.low[axis] && slices[i] < state.body.high[axis])) state.slices = slices;
   state.inside = Boolean(state.basis.inside) && link.get('inside') !== '0';
   state.named = numbers('names', '.').filter((part) => Number.isInteger(part) && part >= 0 && part < (state.basis.inside?.names.length ?? 0));
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);

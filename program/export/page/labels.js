@@ -61,7 +61,7 @@ class Letters {
     }));
   }
 
-  show(panes, { centre, half }, ratio, plates) {
+  show(panes, { centre, half }, ratio, plates) { // half: of the lungs' box
     this.sets.forEach((set, i) => {
       const pane = panes[i];
       const middle = pane && project(pane, centre, ratio);
@@ -80,6 +80,7 @@ class Letters {
           off();
         }
         placed(set[j], at, Boolean(far));
+        if (far) set[j].classList.toggle('behind', pane.toEye[2] * end[0] + pane.toEye[6] * end[1] + pane.toEye[10] * end[2] < -0.35);
       });
     });
   }

@@ -10,16 +10,14 @@ const KIND_TEXT = {
   height: 'How high each place is above the lowest one, along gravity.',
 };
 
-function bounds(basis) {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  basis.rest.forEach((x, i) => {
-    low[i % 3] = Math.min(low[i % 3], x);
-    high[i % 3] = Math.max(high[i % 3], x);
-  });
+/** The box and the ball around places. */
+function boundsOf(places) {
+  const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  for (const place of places) {
+    for (let i = 0; i < 3; ++i) [low[i], high[i]] = [Math.min(low[i], place[i]), Math.max(high[i], place[i])];
+  }
   const centre = low.map((x, i) => (x + high[i]) / 2);
-  let radius = 0;
-  for (let i = 0; i < basis.rest.length; i += 3) radius = Math.max(radius, Math.hypot(basis.rest[i] - centre[0], basis.rest[i + 1] - centre[1], basis.rest[i + 2] - centre[2]));
+  const radius = places.reduce((most, [x, y, z]) => Math.max(most, Math.hypot(x - centre[0], y - centre[1], z - centre[2])), 0);
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
@@ -30,16 +28,19 @@ function arrowTurn(direction) {
   return w < 1e-6 ? turn([1, 0, 0], Math.PI) : unit([...axis, w]);
 }
 
-const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+const colourReader = document.createElement('canvas').getContext('2d');
+/** Parts of a colour, 0 to 1, whose name may be the system's. */
+const rgb = (name) => {
+  colourReader.fillStyle = name;
+  return [1, 3, 5].map((i) => parseInt(colourReader.fillStyle.slice(i, i + 2), 16) / 255);
+};
 
 function start() {
   const basis = readBasis();
   const state = new State(basis);
   takeLink(location.hash, state);
   const canvas = $('picture');
-  let picture = new Picture(canvas, basis);
-  const body = bounds(basis);
-  const { centre, radius } = body;
+  let picture = pictureOn(canvas, basis);
   const letters = new Letters($('letters'), 2);
   const { inside } = basis;
   const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
@@ -66,13 +67,13 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** How far the lungs reach along gravity, mm: all of their vertices where heights are shown; some are
-   * enough to know where to draw gravity. */
-  function lowest(moment) {
+  /** How far the lungs reach along a direction, mm: all of their vertices where heights are shown; some are
+   * enough to know where to draw gravity and the table. */
+  function reachAlong(moment, way) {
     const { rest, direction, coefficients, modes } = basis;
-    const { weights, gains, gravity } = moment;
-    const [x, y, z] = gravity;
-    const along = basis.references.map((_, lung) => gravity.map((g, axis) => g * gains[3 * lung + axis]));
+    const { weights, gains } = moment;
+    const [x, y, z] = way;
+    const along = basis.references.map((_, lung) => way.map((g, axis) => g * gains[3 * lung + axis]));
     const stride = state.kind === 'height' ? 1 : Math.ceil(basis.vertices / 400);
     let reach = -Infinity;
     for (let i = 0; i < basis.vertices; i += stride) {
@@ -85,16 +86,17 @@ function start() {
     return reach;
   }
 
-  const distanceNow = (aspect) => (radius * 1.32 * Math.max(1, 0.86 / aspect)) / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
+  const distanceNow = (aspect) => (state.body.radius * 1.2 * Math.max(1, 0.86 / aspect)) / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
 
   function makePane(name, moment, q, box) {
     const aspect = box[2] / box[3];
     const distance = distanceNow(aspect);
     const { pan } = state.camera;
+    const { body: { centre, radius, low, high } } = state;
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1], -away[2] - distance];
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // over the table
     const { gravity } = moment;
     const lowestAt = pane_lowest(name, moment);
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
@@ -105,21 +107,40 @@ function start() {
     const reach = 2.5 * radius + Math.hypot(...pivot.map((x, i) => x - centre[i]));
     const { axis, at } = state.cut;
     const kind = KINDS[state.kind];
+    const tableToEye = pane_table(name, moment, toRoom, offset);
     return {
       name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'from', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), body.low[axis] + at * (body.high[axis] - body.low[axis])],
+      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // seen through from below
+      cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
 
-  const depths = {}; // the lowest point of each state, kept while it does not move
-  function pane_lowest(name, moment) {
+  const depths = {}; // the lowest point of each state and its table, kept while it does not move
+  function pane_depth(name, moment) {
     const { kind } = state;
-    if (depths[name]?.moment !== moment || depths[name].kind !== kind) depths[name] = { moment, kind, value: lowest(moment) };
-    return depths[name].value;
+    if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
+      const { gravity } = moment;
+      const flat = Math.hypot(gravity[0], gravity[1]);
+      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // out of the table; standing patients have none
+      depths[name] = { moment, kind, value: reachAlong(moment, gravity), down, table: down && reachAlong(moment, down) };
+    }
+    return depths[name];
+  }
+  const pane_lowest = (name, moment) => pane_depth(name, moment).value;
+
+  /** The table of a posture, which tilts with the patient: from a box to the eye; null where there is none. */
+  function pane_table(name, moment, toRoom, offset) {
+    const { down, table } = pane_depth(name, moment);
+    if (!down) return null;
+    const { centre, radius } = state.body;
+    const far = table - dot(down, centre) + 0.46 * radius;
+    const at = rotate(toRoom, centre.map((c, i) => c + down[i] * far)).map((x, i) => x + offset[i]);
+    const columns = [cross(down, [0, 0, 1]).map((x) => 0.55 * radius * x), [0, 0, 1.25 * radius], down.map((x) => 0.02 * radius * x)].map((v) => rotate(toRoom, v));
+    return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...at, 1]);
   }
 
   function makePanes() {
@@ -274,14 +295,45 @@ function start() {
 
   const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
 
+  const holds = new Holds($('holds'), basis);
+  const outlines = new Outlines($('outlines'), basis, state, () => { told = null; look(); });
+  $('holds-section').hidden = !basis.hasVolume;
+
+  /** Write on each card what its posture does at a volume; `most` is what a lung holds at most in them. */
+  let answered = { depth: null };
+  function answerCards() {
+    if (answered.depth === state.depth) return;
+    answered = { depth: state.depth, most: 0 };
+    for (const { posture, answer } of buttons) {
+      const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
+      answer.textContent = moment.folds ? 'none: it would fold' : answerOf(basis, moment);
+      answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held ?? []));
+    }
+  }
+
+  /** How high each lung's middle lies, mm. */
+  const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
+
   let told = null; // the moment that the sentences are about, and how many vertices they tell of
   /** Write what the moment means, of all vertices or, while it changes, of some thousand. */
   function tellFinding(stride) {
     if (told?.moment === state.moment && told.stride <= stride) return;
     told = { moment: state.moment, stride };
+    if (!state.playing && stride === 1) answerCards();
     const above = basis.hasVolume && Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
+    const { held } = state.moment;
+    const measured = Math.round(state.depth) === 0 && basis.from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
+    if (held) {
+      basis.fromHeld ??= heldBy(basis, basis.from);
+      holds.show(basis, held, basis.fromHeld, answered.most ?? 0, lungHeights(state.gravity), measured);
+      write('holds-text', `Grey: ${basis.from.name}. Orange: gained. Hatched: lost.${measured ? ` Bracket: published, mean and SD (${measured.source}).` : ''}`);
+    }
+    outlines.show(state.moment, state.from);
+    write('outlines-text', `Dashed: ${basis.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Seen from the feet and the front; drag a line to move the slice.`);
     changed('breathing', state.playing, () => $('finding').setAttribute('aria-live', state.playing ? 'off' : 'polite'));
-    findingOf(basis, state.moment, state.gravity, above, stride).forEach((text, i) => write(['finding', 'finding-move'][i], text));
+    const [finding, move] = findingOf(basis, state.moment, state.gravity, above, stride);
+    writeFinding($('finding'), finding);
+    write('finding-move', move);
   }
 
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
@@ -415,16 +467,16 @@ function start() {
   /* What lies over the picture, CSS pixels; measured when its size changes. */
   let covers = null;
   const covered = new ResizeObserver(() => { covers = null; look(); });
-  for (const plate of ['legend', 'title']) covered.observe($(plate));
+  for (const plate of ['legend', 'ball']) covered.observe($(plate));
   function plates() {
-    covers ??= ['legend', 'title'].map((id) => ({ left: $(id).offsetLeft, top: $(id).offsetTop, right: $(id).offsetLeft + $(id).offsetWidth, bottom: $(id).offsetTop + $(id).offsetHeight }));
+    covers ??= ['legend', 'ball'].map((id) => ({ left: $(id).offsetLeft, top: $(id).offsetTop, right: $(id).offsetLeft + $(id).offsetWidth, bottom: $(id).offsetTop + $(id).offsetHeight }));
     return covers;
   }
 
   function draw() {
     panes = makePanes();
     picture.draw(panes);
-    letters.show(panes, body, ratio(), plates());
+    letters.show(panes, state.body, ratio(), plates());
     if (inside) showInside();
     if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
   }
@@ -517,8 +569,8 @@ function start() {
     if (arrow) event.preventDefault();
   });
   const lookFrom = (letter) => {
-    const { azimuth, elevation } = VIEWS[letter];
-    Object.assign(state.camera, { azimuth, elevation, pan: [0, 0] });
+    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // to the viewer
+    Object.assign(state.camera, { azimuth: Math.atan2(0 - x, 0 - y), elevation: Math.asin(Math.max(-1, Math.min(1, z))), pan: [0, 0] });
     look();
   };
 
@@ -560,6 +612,7 @@ function start() {
   $('posture-name').addEventListener('blur', () => { last.posture = null; look(); }); // what was typed may be none
   const play = () => {
     state.playing = !state.playing;
+    remeasure();
     const part = Math.min(1, state.depth / state.tidal);
     if (state.playing) state.phase = Math.acos(1 - 2 * part) / (2 * Math.PI);
     touch();
@@ -586,7 +639,7 @@ function start() {
   }
   $('range-auto').addEventListener('click', change(() => { delete state.ownRanges[state.kind]; }));
   $('probes-clear').addEventListener('click', () => { state.probes = []; look(); });
-  for (const [letter, { name }] of Object.entries(VIEWS)) {
+  for (const [letter, name] of Object.entries(VIEWS)) {
     const button = document.createElement('button');
     button.type = 'button';
     button.textContent = letter;
@@ -653,8 +706,8 @@ function start() {
     remeasure();
     touch();
   });
-  document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('input:not([type="range"], [type="radio"], [type="checkbox"]), select')) return;
+  canvas.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const posture = POSTURES[Number(event.key) - 1];
     const kinds = Object.keys(KINDS);
     const keys = {
@@ -662,7 +715,7 @@ function start() {
       b: () => flip('beside'), s: () => holdStill(!state.room), i: () => inside && flip('inside'), 0: reset,
     };
     if (posture) buttons[Number(event.key) - 1].button.click();
-    else if (event.key === ' ' && !event.target.closest('button, input, summary')) { event.preventDefault(); play(); }
+    else if (event.key === ' ') { event.preventDefault(); play(); }
     else if (keys[event.key]) keys[event.key]();
     else if (VIEWS[event.key.toUpperCase()] && event.key.length === 1) lookFrom(event.key.toUpperCase());
   });
@@ -695,7 +748,7 @@ function start() {
     tell('The graphics card was taken away; waiting for it.');
   });
   canvas.addEventListener('webglcontextrestored', () => {
-    picture = new Picture(canvas, basis);
+    picture = pictureOn(canvas, basis);
     touch();
   });
   resize();
@@ -716,9 +769,19 @@ function start() {
     /** Weights, gains and volumes. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** All of a frame but the graphics card's part. */
-    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, body, ratio(), plates()); showState(); },
-    findingOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
+    findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
+}
+
+/** What draws on a canvas: the graphics card, or where there is none the script. */
+function pictureOn(canvas, basis) {
+  try {
+    return new Picture(canvas, basis);
+  } catch (error) {
+    if (canvas.getContext('2d') === null) throw error;
+    return new Poster(canvas, basis);
+  }
 }
 
 /** What the basis is, in the program's own words. */

@@ -25,6 +25,7 @@ class Picture {
     this.makePick();
     this.maps = Object.fromEntries(Object.keys(basis.colours).map((name) => [name, this.makeMap(name)]));
     this.arrow = this.makeArrow();
+    this.table = this.makeTable();
     this.timer = gl.getExtension('EXT_disjoint_timer_query_webgl2');
     this.timing = null;
     this.gpuTime = NaN;
@@ -252,6 +253,21 @@ class Picture {
     return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
   }
 
+  /** A box from -1 to 1 each way. */
+  makeTable() {
+    const [places, normals] = [[], []];
+    for (let axis = 0; axis < 3; ++axis) {
+      for (const side of [-1, 1]) {
+        for (const [a, b] of [[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]]) {
+          const corner = [a, b];
+          places.push(...[0, 1, 2].map((i) => (i === axis ? side : corner.shift())));
+          normals.push(...[0, 1, 2].map((i) => (i === axis ? side : 0)));
+        }
+      }
+    }
+    return this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]);
+  }
+
   /** Every vertex of `array` into buffers: positions, normals. */
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
@@ -353,8 +369,22 @@ class Picture {
     gl.uniform2f(surface.at.range, pane.range.begin, pane.range.end);
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
-    set('ghost', 0);
     set('flatly', 0);
+    /** What displacements count from: a shell behind the lungs, then an outline over them. */
+    const ghost = (how) => {
+      if (!pane.ghost) return;
+      gl.bindVertexArray(this.shown('from', 'from'));
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+      set('ghost', how);
+      set('flatly', 0);
+      gl.depthMask(false);
+      gl.enable(gl.CULL_FACE);
+      for (const { lung } of lungs) this.drawLung(lung, gl.TRIANGLES);
+      gl.disable(gl.CULL_FACE);
+      gl.depthMask(true);
+    };
+    ghost(1);
+    set('ghost', 0);
     gl.bindVertexArray(this.shown(pane.state, pane.origin));
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
     for (const { opacity, lung } of lungs) {
@@ -375,15 +405,7 @@ class Picture {
       set('flatly', 1);
       for (const { lung } of lungs) this.drawLung(lung, gl.LINES);
     }
-    if (pane.ghost) {
-      gl.bindVertexArray(this.shown('from', 'from'));
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
-      set('ghost', 1);
-      set('flatly', 0);
-      gl.depthMask(false);
-      for (const { lung } of lungs) this.drawLung(lung, gl.TRIANGLES);
-      gl.depthMask(true);
-    }
+    ghost(2);
   }
 
   /** What is inside, balls of `radius` mm and meshes, by a program that usePane has set up. */
@@ -449,6 +471,18 @@ class Picture {
     }
   }
 
+  /** What the patient lies on. */
+  drawTable(pane) {
+    const { gl, solid } = this;
+    this.usePane(solid, pane);
+    gl.uniformMatrix4fv(solid.at.toEye, false, pane.tableToEye);
+    gl.uniform4fv(solid.at.cut, NO_CUT);
+    gl.uniform1f(solid.at.thick, 0);
+    gl.uniform4fv(solid.at.tint, pane.tableTint);
+    gl.bindVertexArray(this.table);
+    gl.drawArrays(gl.TRIANGLES, 0, 36);
+  }
+
   /** Draws panes on the canvas, or where else. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
@@ -462,6 +496,7 @@ class Picture {
     for (const pane of panes) {
       gl.viewport(...pane.box);
       gl.depthFunc(gl.LEQUAL);
+      if (pane.tableToEye) this.drawTable(pane);
       if (pane.inside) this.drawContent(pane); // first: lungs that are seen through lie over it
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);

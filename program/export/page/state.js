@@ -57,27 +57,20 @@ function postureFrom(text) {
 
 const FADED = 0.35; // opacity of lungs that are seen through
 
-const FIRST_CAMERA = { azimuth: -0.62, elevation: -0.1, zoom: 1, pan: [0, 0], pivot: null };
+const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
 
 /** Where the viewer stands, by the letter of what faces him. */
-const VIEWS = {
-  A: { name: 'From the front', azimuth: 0, elevation: 0 },
-  P: { name: 'From the back', azimuth: Math.PI, elevation: 0 },
-  L: { name: 'From the left', azimuth: -RIGHT_ANGLE, elevation: 0 },
-  R: { name: 'From the right', azimuth: RIGHT_ANGLE, elevation: 0 },
-  H: { name: 'From the head', azimuth: 0, elevation: RIGHT_ANGLE },
-  F: { name: 'From the feet', azimuth: 0, elevation: -RIGHT_ANGLE },
-};
+const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
 
 class State {
   constructor(basis) {
     this.basis = basis;
-    this.standing = { q: POSTURES[0].q, tilt: 0 }; // the posture, and the tilt on top of it
-    this.q = POSTURES[0].q;                        // as shown, on its way there
+    this.standing = { q: POSTURES[2].q, tilt: 0 }; // the posture, and the tilt on top of it
+    this.q = POSTURES[2].q;                        // as shown, on its way there
     this.turning = null;
     this.unit = basis.hasVolume ? 'mL' : 'mm';
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
-    this.depth = this.tidal;
+    this.depth = basis.hasVolume ? 0 : this.tidal;
     this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
     this.rate = 12;
     this.phase = 0.5;
@@ -85,7 +78,7 @@ class State {
     this.kind = 'displacement';
     this.pinnedQ = POSTURES[0].q;
     this.contours = true;
-    this.ghost = false;
+    this.ghost = true;
     this.arrows = false;
     this.wires = false;
     this.beside = false;                           // the reference posture beside this one
@@ -95,12 +88,13 @@ class State {
     this.cut = { axis: -1, at: 0.5 };              // across x, y or z, at a share of the body
     this.ownRanges = {};                           // {begin, end} by kind, where typed
     this.probes = [];                              // vertices
-    this.room = false;
-    this.roomBlend = 0; // 0: the patient stands still; 1: the room does
+    this.room = true;
+    this.roomBlend = 1; // 0: the patient stands still; 1: the room does
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
     this.from = basis.from;                        // what displacements count from: weights and gains
     this.measure();
+    this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // axial z, coronal y
   }
 
   get gravity() {
@@ -162,7 +156,7 @@ class State {
   }
 
   /** What the colours go through, at a kind: typed, or what 95 % of the surface stay within in six
-   * postures at the deepest breath in use. */
+   * postures at the deepest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -170,7 +164,7 @@ class State {
   }
 
   measure() {
-    const deepest = Math.max(this.tidal, this.playing ? 0 : this.depth);
+    const deepest = this.playing || this.depth > 0 ? Math.max(this.tidal, this.depth) : 0;
     if (deepest === this.measured) return;
     this.measured = deepest;
     const at95 = (values) => values.sort((a, b) => a - b)[Math.floor(0.95 * values.length)];
@@ -187,11 +181,13 @@ class State {
       found[kind].push(at95(values) || 0);
     };
     const restAreas = areas(rest);
+    const all = [rest];
     const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
       .filter((m) => !m.folds).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
     states.forEach(({ gravity, places }, i) => {
       take('displacement', far(places, rest));
-      take('expansion', Array.from(areas(places), (area, j) => 100 * (area / restAreas[j] - 1)));
+      all.push(places);
+      take('expansion', Array.from(areas(places), (area, j) => Math.abs(100 * (area / restAreas[j] - 1))));
       const along = places.map((p) => dot(p, gravity));
       const lowest = along.reduce((a, b) => Math.max(a, b), -Infinity);
       take('height', along.map((x) => lowest - x));
@@ -200,7 +196,9 @@ class State {
     this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
       const value = Math.max(...found[kind], 0);
       const end = rangeEnd(value > 1e-3 ? value : 0);
-      return [kind, { begin: 0, end, step: tickStep(end), beyond: most[kind] > end, most: most[kind] }];
+      const begin = kind === 'expansion' ? -end : 0; // less is as telling as more
+      return [kind, { begin, end, step: tickStep(end - begin), beyond: most[kind] > end, most: most[kind] }];
     }));
+    this.body = boundsOf(all.flat());
   }
 }

@@ -10,7 +10,7 @@ uniform float spacing; // of contour lines; 0: none
 uniform float dark;    // 1 on a dark background
 uniform vec4 cut;      // where dot(body, xyz) > w nothing is
 uniform float opacity;
-uniform float ghost;   // 1: a shell without colours
+uniform float ghost;   // 1: a shell without colours; 2: its outline alone
 uniform float flatly;  // 1: no light, for lines
 out vec4 colour;
 
@@ -20,15 +20,15 @@ void main() {
   vec3 n = normalize(dot(facing, facing) > 0.0 ? facing : cross(dFdx(eye), dFdy(eye)));
   vec3 view = normalize(-eye);
   n = dot(n, view) < 0.0 ? -n : n;
-  float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);
+  float edge = 1.0 - max(dot(n, view), 0.0);
   if (ghost > 0.5) {
-    float amount = 0.07 + 0.55 * rim;
+    float amount = ghost > 1.5 ? 0.6 * smoothstep(0.8, 1.0, edge) : 0.07 + 0.55 * pow(edge, 3.0);
     colour = vec4(vec3(dark > 0.5 ? 0.85 : 0.22) * amount, amount);
     return;
   }
   float at = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
   vec3 base = texture(colours, vec2(at * (255.0 / 256.0) + 0.5 / 256.0, 0.5)).rgb;
-  base = lined(base, value, spacing);
+  base = lined(base, abs(value), spacing);
   if (flatly > 0.5) {
     colour = vec4(mix(base, base * 0.7, 1.0 - dark), 1.0);
     return;
@@ -36,9 +36,8 @@ void main() {
   if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // looked into
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
-  float diffuse = 0.56 + 0.4 * max(dot(n, key), 0.0) + 0.14 * max(dot(n, fill), 0.0) + 0.06 * n.y;
-  float shine = pow(max(dot(n, normalize(key + view)), 0.0), 42.0);
-  vec3 lit = base * diffuse + 0.13 * shine;
-  lit = mix(lit, dark > 0.5 ? lit + vec3(0.10, 0.13, 0.16) : lit * 0.72, rim);
+  // So little light that a colour can be found on the bar; the edge, which darkens, shows the form.
+  float diffuse = 0.93 + 0.06 * max(dot(n, key), 0.0) + 0.02 * max(dot(n, fill), 0.0);
+  vec3 lit = base * diffuse * (1.0 - 0.5 * pow(edge, 7.0));
   colour = vec4(clamp(lit, 0.0, 1.0) * opacity, opacity);
 }

@@ -16,7 +16,7 @@ function xrPane(pane, view, { x, y, width, height }) {
   const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
   const toEye = product(view.transform.inverse.matrix, room);
   return {
-    ...pane, box: [x, y, width, height], toEye: product(toEye, pane.toEye), arrowToEye: product(toEye, pane.arrowToEye),
+    ...pane, box: [x, y, width, height], toEye: product(toEye, pane.toEye), arrowToEye: product(toEye, pane.arrowToEye), tableToEye: pane.tableToEye && product(toEye, pane.tableToEye),
     projection: view.projectionMatrix, pixel: 0, dark: true,
   };
 }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// The surface painted without a graphics card, farthest triangles first: what Picture does where there is
+// no WebGL 2, without light on it, lines, arrows, what is inside and what is pointed at.
+
+class Poster {
+  constructor(canvas, basis) {
+    Object.assign(this, { basis, context: canvas.getContext('2d'), places: {}, gpuTime: NaN, picking: null });
+  }
+
+  deform(name, moment) {
+    this.places[name] = placesOf(this.basis, moment);
+  }
+
+  read(moment) {
+    return [placesOf(this.basis, moment)];
+  }
+
+  pick() {}
+
+  picked() {}
+
+  draw(panes) {
+    this.context.clearRect(0, 0, this.context.canvas.width, this.context.canvas.height);
+    for (const pane of panes) this.paint(pane);
+  }
+
+  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure, gravity, lowest }) {
+    const { context, basis: { corners, cornerBegin, vertices, colours } } = this;
+    const [now, from] = [this.places[state], this.places[origin]];
+    const screen = new Float32Array(3 * vertices);
+    for (let v = 0; v < vertices; ++v) {
+      const [x, y, z] = [0, 1, 2].map((i) => m[i] * now[3 * v] + m[4 + i] * now[3 * v + 1] + m[8 + i] * now[3 * v + 2] + m[12 + i]);
+      screen[3 * v] = left + ((1 - (projection[0] * x) / z) / 2) * width;
+      screen[3 * v + 1] = canvasHeight - bottom - ((1 - (projection[5] * y) / z) / 2) * height;
+      screen[3 * v + 2] = z;
+    }
+    const across = (places, t, i) => places[3 * corners[t + 1] + i] - places[3 * corners[t] + i];
+    const down = (places, t, i) => places[3 * corners[t + 2] + i] - places[3 * corners[t] + i];
+    const normal = (places, t) => cross([0, 1, 2].map((i) => across(places, t, i)), [0, 1, 2].map((i) => down(places, t, i)));
+    const value = (t) => {
+      if (measure === 1) return 100 * (Math.hypot(...normal(now, t)) / Math.hypot(...normal(from, t)) - 1);
+      const at = 3 * corners[t];
+      return measure === 2 ? lowest - dot(gravity, now.subarray(at, at + 3)) : Math.hypot(now[at] - from[at], now[at + 1] - from[at + 1], now[at + 2] - from[at + 2]);
+    };
+    const seen = [];
+    opacity.forEach((amount, lung) => {
+      if (amount > 0) for (let t = cornerBegin[lung]; t < cornerBegin[lung + 1]; t += 3) if (across(screen, t, 0) * down(screen, t, 1) < across(screen, t, 1) * down(screen, t, 0)) seen.push(t);
+    });
+    seen.sort((a, b) => screen[3 * corners[a] + 2] - screen[3 * corners[b] + 2]);
+    for (const t of seen) {
+      const at = 4 * Math.round(255 * Math.max(0, Math.min(1, (value(t) - range.begin) / (range.end - range.begin))));
+      context.fillStyle = context.strokeStyle = `rgb(${colours[map].subarray(at, at + 3).join(' ')})`;
+      context.beginPath();
+      for (let i = 0; i < 3; ++i) context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
+      context.closePath();
+      context.fill();
+      context.stroke(); // no gaps between neighbours
+    }
+  }
+}

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page's first view answers: lying on the left side at rest, the cards and bars say what the
+// command says, outlines enclose the lungs' volumes, colours can be found on the bar again, and all
+// of it is there in a small window, in forced colours and without WebGL.
+import assert from 'node:assert/strict';
+import { openLungs, press, settled } from './browser.mjs';
+import { basis, html } from './lungs.mjs';
+import { supine } from './support.mjs';
+
+const { page, complaints } = await openLungs(html, { viewport: { width: 1400, height: 900 } }, '');
+assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine; return [document.getElementById('posture-name').value, s.depth, s.room, s.ghost]; }), ['left', 0, true, true]);
+assert.match(await page.locator('#finding em').first().textContent(), /^right lung gains \d+ mL \(\+\d+ %\)$/);
+
+/* Cards and bars against the command. */
+const json = JSON.parse(supine('compare', basis, '--postures', 'supine,prone,left,right,upright,supine+15', '--json').replace(/^[^{]*/, ''));
+const [rest] = json.postures;
+const cards = await page.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent));
+json.postures.forEach(({ name, volume_ml: ml, displacement_mm: mm }, i) => {
+  if (i === 0) return assert.equal(cards[0], 'reference');
+  const [, left, right, mean] = /^L (\S+) %, R (\S+) %, ([\d.]+).mm$/.exec(cards[i].replaceAll('\u2212', '-'));
+  for (const [lung, percent] of [['left', left], ['right', right]]) assert.ok(Math.abs(Number(percent) - (100 * ml[lung]) / rest.volume_ml[lung] + 100) <= 0.5, `${name}: ${cards[i]}`);
+  return assert.ok(Math.abs(Number(mean) - mm.mean) <= 0.051, `${name}: ${cards[i]}, not ${mm.mean}`);
+});
+const bars = await page.evaluate(() => [...document.querySelectorAll('.hold')].map((e) => [e.querySelector('.who').textContent, e.querySelector('.ml').textContent, e.querySelector('.published').hidden]));
+for (const [who, text, hidden] of bars) {
+  const lung = who.split(' ')[0];
+  assert.equal(who, `${lung} lung (${lung === 'left' ? 'lowermost' : 'uppermost'})`);
+  text.split(' \u2192 ').forEach((ml, i) => assert.ok(Math.abs(Number(ml) - [rest, json.postures[2]][i].volume_ml[lung]) <= 0.51, `${who}: ${text}`));
+  assert.equal(hidden, false);
+}
+
+/* What axial outlines enclose, summed over slices, is what the lungs hold; coronal ones likewise. */
+const [summed, held] = await page.evaluate(() => {
+  const { basis: b, state, linesAcross, placesOf } = window.supine;
+  const places = placesOf(b, state.moment);
+  const area = (line) => line.reduce((sum, [x, y], i) => sum + (x * line[(i + 1) % line.length][1] - line[(i + 1) % line.length][0] * y) / 2, 0);
+  const within = (line, [x, y]) => line.filter(([u, v], i) => { const [s, t] = line[(i + 1) % line.length]; return v > y !== t > y && x < u + ((y - v) * (s - u)) / (t - v); }).length % 2 === 1;
+  return [[2, 1].map((axis) => {
+    let ml = 0;
+    for (let at = state.body.low[axis] + 0.5; at < state.body.high[axis]; at += 2) {
+      const lines = linesAcross(b, places, axis, at);
+      for (const line of lines) ml += (lines.filter((other) => other !== line && within(other, line[0])).length % 2 ? -2 : 2) * Math.abs(area(line)) / 1000;
+    }
+    return ml;
+  }), state.moment.held.reduce((sum, x) => sum + x)];
+});
+for (const ml of summed) assert.ok(Math.abs(ml - held) < 0.001 * held, `outlines enclose ${summed} mL, lungs ${held}`);
+
+/* Dragging a picture's line, or its keys, move the other plane. */
+const slices = () => page.evaluate(() => [...window.supine.state.slices]);
+const before = await slices();
+const box = await page.locator('#outlines canvas').nth(1).boundingBox();
+await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+await page.mouse.down();
+await page.mouse.move(box.x + box.width / 2 - 15, box.y + box.height / 2, { steps: 3 }); // on the left, feet are left
+await page.mouse.up();
+const after = await slices();
+assert.ok(after[0] < before[0] - 5 && after[1] === before[1], `${before} to ${after}`);
+await page.locator('#outlines canvas').first().press('ArrowUp');
+assert.ok(Math.abs((await slices())[1] - after[1]) > 1);
+
+/* Colours of the surface as found on the bar, beside the data: at most 3 % of the range at the median,
+ * 8 % at the 90th percentile. Growth of area counts both ways. */
+for (const kind of ['displacement', 'expansion']) {
+  await page.locator(`[name=kind][value=${kind}]`).check();
+  await settled(page);
+  const errors = await page.evaluate(async () => {
+    const { picture: p, panes, basis: b } = window.supine;
+    const [pane] = panes();
+    const [width, height] = pane.box.slice(2);
+    const pixels = new Uint8Array(4 * width * height);
+    p.draw(panes());
+    p.gl.readPixels(0, 0, width, height, p.gl.RGBA, p.gl.UNSIGNED_BYTE, pixels);
+    const answer = p.picked.bind(p);
+    p.picked = () => undefined; // the page asks for no answer meanwhile
+    const bar = b.colours[pane.map];
+    const found = [];
+    for (let i = 0; found.length < 120 && i < 4000; ++i) {
+      const [x, y] = [(i * 0.754877666) % 1, (i * 0.569840291) % 1].map((part, k) => Math.floor(part * [width, height][k]));
+      const at = 4 * (y * width + x);
+      if (pixels[at + 3] < 255) continue;
+      p.pick(pane, (2 * x + 1) / width - 1, (2 * y + 1) / height - 1);
+      let picked;
+      while ((picked = answer()) === undefined) await new Promise((done) => { setTimeout(done, 0); });
+      if (!picked) continue;
+      const far = (colour) => [0, 1, 2].reduce((sum, k) => sum + (bar[4 * colour + k] - pixels[at + k]) ** 2, 0);
+      let best = 0;
+      for (let colour = 1; colour < 256; ++colour) if (far(colour) < far(best)) best = colour;
+      const { begin, end } = pane.range;
+      found.push(Math.abs(best / 255 - Math.max(0, Math.min(1, (picked.value - begin) / (end - begin)))));
+    }
+    delete p.picked;
+    return found.sort((a, c) => a - c);
+  });
+  assert.ok(errors.length >= 100, `${errors.length} places`);
+  const [median, most] = [0.5, 0.9].map((part) => errors[Math.floor(part * errors.length)]);
+  console.log(`${kind}: on the bar within ${(100 * median).toFixed(1)} % of the range at the median, ${(100 * most).toFixed(1)} % at the 90th percentile`);
+  assert.ok(median < 0.03 && most < 0.08);
+}
+assert.deepEqual(await page.evaluate(() => { const { begin, end } = window.supine.state.range; return [begin, document.getElementById('colours').classList.contains('beneath')]; }), [-await page.evaluate(() => window.supine.state.range.end), await page.evaluate(() => window.supine.state.range.beyond)]);
+
+/* Letters and digits are the picture's alone. */
+await page.locator('#theme').focus();
+for (const key of ['2', 'g', 'c']) await page.keyboard.press(key);
+assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine; return [document.getElementById('posture-name').value, s.ghost, s.kind]; }), ['left', true, 'expansion']);
+await press(page, '2');
+await settled(page);
+assert.equal(await page.locator('#posture-name').inputValue(), 'prone');
+assert.deepEqual(complaints, []);
+await page.close();
+
+/* A window of 320 x 256, as 400 % of 1280 x 1024: nothing is cut, the picture is 240 px wide. */
+const { page: small } = await openLungs(html, { viewport: { width: 320, height: 256 } }, '');
+const { width, height, wide } = await small.evaluate(() => ({ ...document.getElementById('picture').getBoundingClientRect().toJSON(), wide: document.documentElement.scrollWidth }));
+assert.ok(width >= 240 && height >= 120 && wide <= 320, `${width} x ${height} in ${wide}`);
+const targets = await small.evaluate(() => [...document.querySelectorAll('button, select, summary, input')].filter((e) => e.checkVisibility()).map((e) => { const target = (e.type === 'checkbox' && e.labels.length ? e.labels[0] : e).getBoundingClientRect(); return [e.id || e.textContent, target.width, target.height]; }).filter(([, w, h]) => w < 24 || h < 24));
+assert.deepEqual(targets, []);
+await small.close();
+
+/* In forced colours the bar keeps its own, and what is pressed stands out. */
+const { page: forced } = await openLungs(html, { forcedColors: 'active' }, '');
+const [bar, pressed, other] = await forced.evaluate(() => [getComputedStyle(document.getElementById('colours')).backgroundImage, ...['true', 'false'].map((x) => getComputedStyle(document.querySelector(`[data-posture][aria-pressed=${x}]`)).outlineStyle)]);
+assert.match(bar, /gradient/);
+assert.ok(pressed === 'solid' && other === 'none');
+await forced.close();
+
+/* Without WebGL the numbers are the same, and the lungs are painted. */
+const { page: flat, complaints: said } = await openLungs(html, { init: () => {
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function context(kind, ...rest) { return kind === 'webgl2' ? null : getContext.call(this, kind, ...rest); };
+} }, '');
+await settled(flat);
+const painted = await flat.evaluate(() => {
+  const canvas = document.getElementById('picture');
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  let [count, colours] = [0, new Set()];
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200) { ++count; colours.add(data[i] >> 4); }
+  return [count / (canvas.width * canvas.height), colours.size, document.getElementById('message').textContent];
+});
+assert.ok(painted[0] > 0.04 && painted[1] > 4, `${painted}`);
+assert.deepEqual(await flat.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent)), cards);
+assert.deepEqual(said, []);
+await flat.close();
