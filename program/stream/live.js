@@ -4,21 +4,23 @@
 
 window.supineLive = (() => {
   const said = document.createElement('p');
+  const aged = document.createElement('p');
   const tilt = document.createElement('button');
   const bar = document.createElement('div');
   bar.id = 'live';
   bar.style.cssText = 'display:flex;gap:8px;align-items:center;margin-top:4px;pointer-events:auto';
-  said.style.cssText = 'margin:0;font-size:12px';
+  said.style.cssText = aged.style.cssText = 'margin:0;font-size:12px';
   said.setAttribute('role', 'status');
   tilt.type = 'button';
   tilt.textContent = "Use this device's tilt";
   tilt.title = 'Lay the phone on the breastbone, screen out, its top towards the head';
   tilt.hidden = typeof DeviceOrientationEvent === 'undefined' || !window.isSecureContext;
-  bar.append(said, tilt);
-  (document.querySelector('#stage > header') ?? document.body).append(bar);
+  bar.append(said, aged, tilt);
+  (document.querySelector('#title > :last-child') ?? document.body).append(bar);
 
   let socket = null;
   let moments = 0;
+  let posed = NaN; // ms of the page's clock, when the newest pose came; NaN: none did
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -35,8 +37,11 @@ window.supineLive = (() => {
     return all.map((x) => x / length);
   }
 
-  /** Shows a moment: gravity in the patient's axes (x left, y back, z head), mL above rest. */
-  function show({ gravity, above }) {
+  /** Shows a moment: gravity in the patient's axes (x left, y back, z head), mL above rest, s since
+   * the newest pose came, below 0 where none did. */
+  function show({ gravity, above, age }) {
+    posed = age < 0 ? NaN : performance.now() - 1000 * age;
+    tellAge();
     const page = window.supine;
     if (!page) return;
     moments += 1;
@@ -45,6 +50,13 @@ window.supineLive = (() => {
     page.state.settle(turned(page.state.q, gravity), 0, 0);
     page.touch();
   }
+
+  function tellAge() {
+    const age = (performance.now() - posed) / 1000;
+    const text = Number.isNaN(age) ? 'no tracker yet' : `pose ${age < 10 ? age.toFixed(1) : age.toFixed(0)} s old`;
+    if (aged.textContent !== text) aged.textContent = text;
+  }
+  setInterval(tellAge, 500);
 
   /** Where things fall, in the patient's axes, of a phone that lies on the breastbone. Its own axes
    * are x right of the screen, y up it, z out of it: left, head, front. DeviceOrientation turns it
@@ -59,7 +71,7 @@ window.supineLive = (() => {
     socket.addEventListener('open', () => { said.textContent = 'live'; });
     socket.addEventListener('message', (event) => show(JSON.parse(event.data)));
     socket.addEventListener('close', () => {
-      said.textContent = 'waiting for the server';
+      said.textContent = 'waiting for the server'; // what is shown grows old meanwhile
       setTimeout(connect, 1000);
     });
   }
@@ -74,5 +86,5 @@ window.supineLive = (() => {
   });
 
   connect();
-  return { gravityOfTilt, moments: () => moments };
+  return { gravityOfTilt, moments: () => moments, age: () => aged.textContent };
 })();

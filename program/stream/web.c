@@ -42,7 +42,8 @@ struct supine_stream_web {
   atomic_size_t viewers;
   pthread_mutex_t lock; /* of what follows */
   uint64_t told;        /* number of the moment in `text` */
-  char text[TEXT];
+  char text[TEXT];      /* JSON, but for the pose's age and the end */
+  double posed_at;      /* s of the clock, when the newest pose shown came; 0: none did */
   bool posed;
   double gravity[3], received;
 };
@@ -99,17 +100,19 @@ static void hear(supine_stream_web *web, const char *bytes, size_t size) {
 
 /* The newest moment, where the viewer has not seen it; 0, or -1 to end. */
 static int tell(supine_stream_web *web, struct lws *wsi, session *s) {
-  unsigned char bytes[LWS_PRE + TEXT];
+  enum { AGE = 32 };
+  unsigned char bytes[LWS_PRE + TEXT + AGE];
   (void)pthread_mutex_lock(&web->lock);
   const uint64_t told = web->told;
-  const size_t size = strlen(web->text);
-  memcpy(bytes + LWS_PRE, web->text, size);
+  const double age = web->posed_at > 0 ? supine_clock_seconds() - web->posed_at : -1;
+  const int size =
+      snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
   if (told == s->told) {
     return 0;
   }
   s->told = told;
-  return lws.write(wsi, bytes + LWS_PRE, size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
+  return lws.write(wsi, bytes + LWS_PRE, (size_t)size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
 }
 
 static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
@@ -296,9 +299,10 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
 
 void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *moment) {
   (void)pthread_mutex_lock(&web->lock);
-  (void)snprintf(
-      web->text, sizeof web->text, "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g}",
-      moment->gravity[0], moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
+  (void)snprintf(web->text, sizeof web->text,
+                 "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g", moment->gravity[0],
+                 moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
+  web->posed_at = moment->received >= 0 ? moment->received : web->posed_at;
   ++web->told;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {

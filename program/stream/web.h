@@ -3,7 +3,7 @@
  * The page that follows: served to browsers, and told each moment by WebSocket. It lives in a
  * thread of its own, so that no browser holds up the trackers' peers.
  *
- * To viewers, each time the newest:  {"gravity":[x,y,z],"volume":mL,"above":mL}
+ * To viewers, each time the newest:  {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s of the pose}
  *   (relative to the basis' reference, and to the posture's rest)
  * From viewers, a pose (of a phone): {"gravity":[x,y,z]} */
 #ifndef SUPINE_STREAM_WEB_H

@@ -55,6 +55,8 @@ async function view() {
 }
 
 const viewers = [await view(), await view()];
+const ages = () => Promise.all(viewers.map((page) => page.evaluate(() => window.supineLive.age())));
+assert.deepEqual(await ages(), ['no tracker yet', 'no tracker yet']);
 
 /** Every viewer comes to show that gravity, and the volume that the server was told. */
 async function expectGravity(wanted, what) {
@@ -83,6 +85,11 @@ for (const [name, left, back, head, gravity] of lies) {
     await page.waitForFunction((wanted) => document.getElementById('posture-name').value === wanted, name);
   }
 }
+for (const text of await ages()) assert.match(text, /^pose \d\.\d s old$/);
+await viewers[1].waitForFunction(() => /^pose (1[.]5|[2-9]).* s old$/.test(window.supineLive.age())); // it grows old
+viewers.push(await view()); // who comes late is told the same
+assert.match(await viewers[2].evaluate(() => window.supineLive.age()), /^pose (1\.[5-9]|[2-9]\.\d|\d\d+) s old$/);
+await viewers.pop().close();
 // A fast tracker: the last of many poses is what is seen.
 for (let i = 0; i <= 400; ++i) {
   const a = (i / 400) * 2.1;
