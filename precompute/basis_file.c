@@ -81,10 +81,12 @@ static void add_lesions(entries *list, size_t count, const double *factors) {
   add(list, "lesions", "vertices=%zu factors=%.6g..%.6g", changed, low, high);
 }
 
-static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model) {
+static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model,
+                      bool reference_known) {
   static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
   const double *c = model->direction.c;
+  const double *bend = model->bend;
   add(list, "law", "%s", supine_physics_law_names[model->law]);
   add(list, "midline_mm", "%.9g", lungs->midline);
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
@@ -97,6 +99,9 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
   if (model->lesions != NULL) {
     add_lesions(list, lungs->mesh.vertex_count, model->lesions);
+  }
+  if (reference_known && (bend[0] != 0.0 || bend[1] != 0.0 || bend[2] != 0.0)) {
+    add(list, "bend", "%.9g,%.9g,%.9g", bend[0], bend[1], bend[2]);
   }
   if (model->reach > 0.0) {
     add(list, "reach_mm", "%.9g", model->reach);
@@ -191,6 +196,8 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                   supine_error *error) {
   const supine_compression *field = content->compression;
   const supine_volume_forms *forms = content->forms;
+  static const double straight[3] = {0.0, 0.0, 0.0};
+  const double *field_bend = content->reference != NULL ? content->model->bend : straight;
   const supine_normals_surface surface = {.vertex_count = content->lungs->mesh.vertex_count,
                                           .triangle_count = content->lungs->mesh.triangle_count,
                                           .lung_count = content->lungs->lung_count,
@@ -205,7 +212,8 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                           .linear = forms != NULL ? forms->linear : NULL,
                                           .quadratic = forms != NULL ? forms->quadratic : NULL,
                                           .cubic = forms != NULL ? forms->cubic : NULL,
-                                          .resting = content->resting_total};
+                                          .resting = content->resting,
+                                          .bend = {field_bend[0], field_bend[1], field_bend[2]}};
   return supine_normals_modes_create(&surface, normals, error);
 }
 
@@ -254,7 +262,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
   }
   add(&list, "format", "supine-basis");
-  add(&list, "version", "2");
+  add(&list, "version", "3");
   add(&list, "kind", "%s", vector ? "vector" : "scalar");
   add(&list, "band", "%zu", field->band);
   add(&list, "modes", "%s", content->harmonics ? "harmonics" : "best");
@@ -263,7 +271,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   add(&list, "axes", "LPS");
   add_lungs(&list, lungs, share);
   if (content->model != NULL) {
-    add_model(&list, lungs, content->model);
+    add_model(&list, lungs, content->model, content->reference != NULL);
   }
   if (content->reference != NULL) {
     add_reference(&list, content->reference, share);
@@ -318,9 +326,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   }
   if (content->forms != NULL) {
     tensors[count++] =
-        (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, content->forms->linear};
+        (supine_tensor){"volume_linear", SUPINE_F64, 3, {g, 3, k}, content->forms->linear};
     tensors[count++] =
-        (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, content->forms->quadratic};
+        (supine_tensor){"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, content->forms->quadratic};
     tensors[count++] =
         (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
   }
@@ -338,7 +346,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     const size_t q = normals.count;
     tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes};
     tensors[count++] = (supine_tensor){
-        "normal_weights", SUPINE_F64, 3, {g, q, (k + 1) * (k + 2) / 2}, normals.weights};
+        "normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights};
   }
   status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:

@@ -2,10 +2,12 @@
 /* The offline pipeline: project, compress, measure, write. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
+#include "precompute/physics/inflate.h"
 #include "precompute/precompute.h"
 
 #include "precompute/basis_file.h"
@@ -114,7 +116,7 @@ static supine_status compress(pipeline *p, supine_error *error) {
 /* Move the full surface so that the compressed field leads to the scan to the last bit: by what the
  * field errs at the scan's gravity, and by what the fixed point left.
  *
- *     p' = scan - s F' d */
+ *     p'_j = scan_j - A_j F' d_j       A at which the volumes stay as they are */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -124,38 +126,37 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     return SUPINE_OK;
   }
   double *y = malloc(supine_sh_count(field->band) * sizeof *y);
+  double *amounts = malloc(n * sizeof *amounts);
   if (p->anchored.mesh.vertices == NULL) {
     p->anchored = *lungs;
     p->anchored.mesh.vertices = malloc(3 * n * sizeof(double));
   }
-  if (y == NULL || p->anchored.mesh.vertices == NULL) {
+  if (y == NULL || amounts == NULL || p->anchored.mesh.vertices == NULL) {
     free(y);
+    free(amounts);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   (void)supine_sh_evaluate(field->band, p->reference.scan.state.gravity, y); /* of unit length */
   supine_projection_compression_weights(field, y, weights);
   free(y);
   for (size_t i = 0; i < n; ++i) {
-    double amount = 0.0;
+    amounts[i] = 0.0;
     for (size_t k = 0; k < field->mode_count; ++k) {
-      amount += weights[k] * (double)field->coefficients[i * field->mode_count + k];
-    }
-    amount *= p->reference.scan_scale[lungs->lung_count == 2 && i >= lungs->lung_begin[1]];
-    for (size_t k = 3 * i; k < 3 * i + 3; ++k) {
-      p->anchored.mesh.vertices[k] = lungs->scanned[k] - amount * p->directions[k];
+      amounts[i] += weights[k] * (double)field->coefficients[i * field->mode_count + k];
     }
   }
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const supine_mesh after = supine_lungs_part(&p->anchored, lung);
-    const supine_reference *before = p->options->reference;
-    const double gained = 1e-3 * supine_mesh_volume(&after) - before->full_volume[lung];
-    p->reference.full_volume[lung] = before->full_volume[lung] + gained;
-    p->reference.anchored[lung] = gained;
-    p->reference.scan_volume[lung] = before->scan_volume[lung] - gained;
+  memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
+  const supine_status status = supine_reference_find_gains(
+      &p->anchored, p->options->model.bend, p->directions, amounts, &p->reference, error);
+  for (size_t i = 0; i < 3 * n; ++i) {
+    const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
+    p->anchored.mesh.vertices[i] -=
+        p->reference.scan_gains[lung][i % 3] * amounts[i / 3] * p->directions[i];
   }
+  free(amounts);
   p->lungs = &p->anchored;
   supine_physics_volume_forms_free(&p->column_forms);
-  return SUPINE_OK;
+  return status;
 }
 
 /* Finds the volume forms of the coefficients: those of the projection's columns carried along where

@@ -30,6 +30,7 @@ static supine_model choose_law(const supine_model_choice *choice) {
   }
   model.law = law.law;
   model.force.pair = law.force.pair;
+  memcpy(model.bend, law.bend, sizeof law.bend);
   model.reach = isnan(model.reach) ? law.reach : model.reach;
   model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
   model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;

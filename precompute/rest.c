@@ -22,10 +22,11 @@ static supine_status check_rest(const supine_compression *compression,
   supine_projection_compression_weights(compression, y, weights);
   free(y);
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
-    double cubic[3];
-    double scale = 0.0;
-    supine_physics_volume_forms_contract_lung(forms, lung, weights, cubic);
-    if (supine_volume_scale(cubic, volume[lung], &scale, &inner) != SUPINE_OK) {
+    static const double straight[3] = {0.0, 0.0, 0.0};
+    supine_volume_form form;
+    double gains[3];
+    supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
+    if (supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) != SUPINE_OK) {
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "with gravity along %g,%g,%g the lungs cannot rest %.0f mL below full inflation: %s; "

@@ -120,7 +120,7 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
     if (json_array_append_new(
             list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from",
                             c->postures->item[from].name, "to", c->postures->item[to].name, "name",
-                            c->names.text[name], "move", move[0], move[1], move[2], "moved_mm", length,
+                            c->names.text[name], "move", move[0], move[1], move[2], "mm", length,
                             "expected_error_mm", error_of(c, from, to, name))) != 0) {
       return false;
     }

@@ -88,8 +88,8 @@ static int write_glb(const export_source *source, const request *wanted) {
   export_glb_report report = {0};
   supine_error error;
   if (source->resting_rows > 1) {
-    supine_options_say(name, "morph targets have one gain for all lungs: their total volume is "
-                             "exact, each lung's own is not; a page (.html) has both");
+    supine_options_say(name, "morph targets have the same gains for both lungs: their total volume "
+                             "is exact, each lung's own is not; a page (.html) has both");
   }
   if (supine_export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
     return supine_options_fail(name, &error);

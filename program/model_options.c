@@ -147,7 +147,7 @@ static int read_lung(const char *command, const char *text, void *field) {
 static const char *const sexes[] = {"unknown", "female", "male", NULL}; /* as supine_sex */
 
 /* The laws' help, and the constants of each for the options that change one. */
-#define LAW_HELP(id, name, base, gain, box, constants, reach, pair, what) name ": " what "\n"
+#define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) " " name " " #base
 #define LAW_GAIN(id, name, base, gain, ...) " " name " " #gain
 #define LAW_BOX(id, name, base, gain, box, ...) " " name " " #box

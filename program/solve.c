@@ -116,16 +116,22 @@ static supine_status find_volumes(const supine_reference *reference, const supin
   return SUPINE_OK;
 }
 
-/* The scale of each lung: --scale, the state's volume, or 1. */
-static supine_status find_scales(const supine_lungs *lungs, const request *wanted,
-                                 const supine_solution *solution, double *scale,
-                                 supine_error *error) {
+static void fill(double gains[2][3], double gain) {
+  for (size_t i = 0; i < 6; ++i) {
+    gains[i / 3][i % 3] = gain;
+  }
+}
+
+/* The gains of each lung: by --scale, by the state's volume, or 1. */
+static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
+                                const supine_solution *solution, double gains[2][3],
+                                supine_error *error) {
   const supine_reference *reference = &wanted->model.prepared.reference;
   const supine_volume *volume = &wanted->state.volume;
-  scale[0] = scale[1] = 1.0;
+  fill(gains, 1.0);
   if (wanted->has_scale) {
     const double largest = supine_physics_solution_largest(solution);
-    scale[0] = scale[1] = wanted->scale / largest;
+    fill(gains, wanted->scale / largest);
     return largest > 0.0
                ? SUPINE_OK
                : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
@@ -140,21 +146,26 @@ static supine_status find_scales(const supine_lungs *lungs, const request *wante
   if (!reference->known) { /* breaths are added to the scan, at one scale */
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+    double scale = 0.0;
     const supine_status status =
         volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
-            ? supine_volume_scale(solution->cubic, volume->ml - held, scale, error)
+            ? supine_volume_scale(solution->cubic, volume->ml - held, &scale, error)
             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                "rest and full are unknown of a scan taken as it is: give scan+ML "
                                "or an absolute volume, as 2600mL");
-    scale[1] = scale[0];
+    fill(gains, scale);
     return status;
   }
+  const supine_model *model = &wanted->model.prepared.model;
   double ml[2];
+  double rest[2];
+  (void)supine_reference_rest(reference, wanted->state.gravity, rest);
   supine_status status = find_volumes(reference, &wanted->state, ml, error);
   for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
-    status = supine_volume_scale(solution->lung_cubic[lung],
-                                 wanted->model.prepared.model.share[lung] * ml[lung], &scale[lung],
-                                 error);
+    const double share = model->share[lung];
+    status = supine_volume_form_gains(&solution->form[lung], model->bend,
+                                      share * (rest[lung] - reference->full_volume[lung]),
+                                      share * ml[lung], gains[lung], error);
   }
   return status;
 }
@@ -207,13 +218,23 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   return status;
 }
 
+static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const double *gain = gains[lung];
+    (void)printf(", %s lung's gain %.6g", supine_lungs_name(lungs, lung), gain[0]);
+    if (gain[1] != gain[0] || gain[2] != gain[0]) {
+      (void)printf(",%.6g,%.6g", gain[1], gain[2]);
+    }
+  }
+}
+
 static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
                                     supine_error *error) {
   const double *g = wanted->state.gravity;
   supine_solution solution = {0};
   supine_mesh deformed = lungs->mesh;
   supine_mesh rest = lungs->mesh;
-  double scale[2];
+  double gains[2][3];
   deformed.vertices = NULL;
   rest.vertices = NULL;
   const supine_model *model = &wanted->model.prepared.model;
@@ -224,7 +245,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = find_scales(lungs, wanted, &solution, scale, error);
+  status = find_gains(lungs, wanted, &solution, gains, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -236,8 +257,8 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
     goto cleanup;
   }
   supine_tissue_rest(lungs, wanted->model.prepared.model.share, rest.vertices);
-  for (size_t i = 0; i < solution.vertex_count; ++i) {
-    solution.catch_[i] *= scale[lungs->lung_count == 2 && i >= lungs->lung_begin[1]];
+  for (size_t i = 0; i < 3 * solution.vertex_count; ++i) {
+    solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
   supine_physics_solution_apply(&solution, &rest, 1.0, deformed.vertices);
   supine_mesh_save_options save = {.rest = rest.vertices};
@@ -247,11 +268,8 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   }
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
-    (void)printf("%s: gravity %.4g,%.4g,%.4g, scale %.6g", wanted->path, g[0], g[1], g[2],
-                 scale[0]);
-    if (lungs->lung_count == 2 && scale[1] != scale[0]) {
-      (void)printf(" and %.6g", scale[1]);
-    }
+    (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
+    print_gains(lungs, gains);
     (void)printf(", largest displacement %.3f mm", supine_physics_solution_largest(&solution));
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",

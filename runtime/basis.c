@@ -82,10 +82,11 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   if (format == NULL || strcmp(format, "supine-basis") != 0) {
     return refuse(c, "a safetensors file, but not a Supine basis: make one with supine precompute");
   }
-  if (version == NULL || (strcmp(version, "1") != 0 && strcmp(version, "2") != 0)) {
-    return refuse(c, "basis version %.16s; this program reads versions 1 and 2",
+  if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
+    return refuse(c, "basis version %.16s; this program reads versions 1 to 3",
                   version == NULL ? "unknown" : version);
   }
+  info->volume_axes = version[0] == '3' ? 3 : 1;
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
     return refuse(c, "its kind is neither scalar nor vector");
   }
@@ -255,7 +256,9 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
   const size_t k = info->mode_count;
-  const size_t shape[] = {g, k, k, k};
+  const size_t axes = info->volume_axes;
+  const size_t together[] = {g, k, k, k};
+  const size_t by_axis[] = {g, axes, k, k};
   static const char *const names[] = {"volume_linear", "volume_quadratic", "volume_cubic"};
   const double **const forms[] = {&info->volume_linear, &info->volume_quadratic,
                                   &info->volume_cubic};
@@ -268,12 +271,13 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   }
   size_t count = g;
   for (size_t i = 0; i < 3; ++i) {
-    *forms[i] = want_shape(c, names[i], SUPINE_F64, i + 2, shape);
+    const bool axis = axes == 3 && i < 2;
+    *forms[i] = want_shape(c, names[i], SUPINE_F64, i + 2 + axis, axis ? by_axis : together);
     if (*forms[i] == NULL) {
       return SUPINE_ERROR_FORMAT;
     }
     count *= k;
-    if (!finite_doubles(*forms[i], count)) {
+    if (!finite_doubles(*forms[i], axis ? axes * count : count)) {
       return refuse(c, "%s is not finite, or 2^30 and more", names[i]);
     }
   }
@@ -341,6 +345,7 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
   const char *upright = supine_safetensors_metadata(c->file, "full_upright_gain");
   const char *route = supine_safetensors_metadata(c->file, "route");
+  const char *bend = supine_safetensors_metadata(c->file, "bend");
   double by_lung[SUPINE_LUNGS_MAX] = {0};
   const size_t count = volume != NULL && strchr(volume, ',') != NULL ? basis->info.lung_count : 1;
   if (volume != NULL && !read_numbers(volume, count, by_lung)) {
@@ -355,6 +360,9 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   }
   if (upright != NULL && !read_numbers(upright, 1, &basis->upright_gain)) {
     return refuse(c, "full_upright_gain is no number: %.16s", upright);
+  }
+  if (bend != NULL && (!read_numbers(bend, 3, basis->info.bend) || !basis->rest_by_lung)) {
+    return refuse(c, "bend is not three numbers, or volumes at rest are not by lung: %.48s", bend);
   }
   basis->info.is_fields = route != NULL && strcmp(route, "fields") == 0;
   basis->info.has_full = basis->info.has_rest || (scanned != NULL && strcmp(scanned, "full") == 0);
@@ -383,7 +391,8 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
 /* Normals are optional: the modes and their weights, or neither. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  const size_t terms = (info->mode_count + 1) * (info->mode_count + 2) / 2;
+  const size_t axes = info->volume_axes;
+  const size_t terms = supine_basis_normal_terms(basis);
   if (supine_safetensors_find(c->file, "normals") == NULL &&
       supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
@@ -399,13 +408,14 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
                   SUPINE_NORMAL_MODES_MAX);
   }
   info->normals = normals->data;
-  info->normal_weights =
-      want_shape(c, "normal_weights", SUPINE_F64, 3, (size_t[]){info->lung_count, count, terms});
+  info->normal_weights = want_shape(c, "normal_weights", SUPINE_F64, axes == 3 ? 4 : 3,
+                                    axes == 3 ? (size_t[]){info->lung_count, count, 3, terms}
+                                              : (size_t[]){info->lung_count, count, terms});
   if (info->normal_weights == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
   info->normal_count = count;
-  return finite_doubles(info->normal_weights, info->lung_count * count * terms)
+  return finite_doubles(info->normal_weights, info->lung_count * count * axes * terms)
              ? SUPINE_OK
              : refuse(c, "normal_weights is not finite");
 }

@@ -61,6 +61,18 @@ supine_status supine_basis_pack_normals(supine_basis *basis);
 uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
                                   size_t word);
 
+/** Monomials of the gains and K weights in one component of a normal, along axis c:
+ *
+ *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)      a, b: the gains of the next two axes,
+ * cyclically
+ *
+ * Where all gains are equal (files of versions 1 and 2), b w_k is a w_k and one component serves
+ * all. */
+static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
+  const size_t k = basis->info.mode_count;
+  return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
+}
+
 /** Zeroed memory for tiles, aligned to lines, in huge pages where it fills some. */
 unsigned char *supine_tiles_allocate(size_t bytes);
 

@@ -57,36 +57,56 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   return SUPINE_OK;
 }
 
-static void lung_weights(const supine_basis *basis, size_t lung, const double *weights,
-                         double scale, double *v) {
+/* sum over k <= l of form_kl w_k w_l, whose rows are shorter and shorter. */
+static double triangle(size_t count, const double *form, const double *w) {
+  double sum = 0;
+  for (size_t k = 0; k < count; ++k) {
+    double row = 0;
+    for (size_t l = k; l < count; ++l) {
+      row += *form++ * w[l];
+    }
+    sum += row * w[k];
+  }
+  return sum;
+}
+
+static void lung_weights(const supine_basis *basis, size_t lung, const supine_pose *pose,
+                         double *v) {
   const size_t modes = basis->info.mode_count;
   const size_t count = basis->info.normal_count;
-  const double *form = basis->info.normal_weights + lung * count * (modes + 1) * (modes + 2) / 2;
+  const size_t axes = basis->info.volume_axes;
+  const size_t sides = axes == 3 ? 2 : 1;
+  const size_t terms = supine_basis_normal_terms(basis);
+  const double *gain = pose->gains[lung];
+  const double *form = basis->info.normal_weights + lung * count * axes * terms;
   for (size_t j = 0; j < count; ++j) {
-    double sum = 0;
-    for (size_t k = 0; k <= modes; ++k) { /* q_k sum over l >= k of V_kl q_l */
-      double row = 0;
-      for (size_t l = k; l <= modes; ++l) {
-        row += *form++ * (l == 0 ? 1 : scale * weights[l - 1]);
+    v[j] = 0;
+    for (size_t axis = 0; axis < axes; ++axis) {
+      v[j] += *form++;
+      for (size_t side = 1; side <= sides; ++side) {
+        double sum = 0;
+        for (size_t k = 0; k < modes; ++k) {
+          sum += *form++ * pose->weights[k];
+        }
+        v[j] += gain[(axis + side) % 3] * sum;
       }
-      sum += row * (k == 0 ? 1 : scale * weights[k - 1]);
+      v[j] += gain[(axis + 1) % 3] * gain[(axis + 2) % 3] * triangle(modes, form, pose->weights);
+      form += modes * (modes + 1) / 2;
     }
-    v[j] = sum;
   }
 }
 
 void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
                                  double *normal_weights) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    lung_weights(basis, lung, pose->weights, pose->gains[lung][0],
-                 normal_weights + lung * basis->info.normal_count);
+    lung_weights(basis, lung, pose, normal_weights + lung * basis->info.normal_count);
   }
 }
 
 /* What the kernels multiply by, of one lung. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
-  lung_weights(basis, lung, pose->weights, pose->gains[lung][0], v);
+  lung_weights(basis, lung, pose, v);
   for (size_t j = 0; j < basis->info.normal_count; ++j) {
     folded[j] = (float)(normal_unit() * v[j]);
   }

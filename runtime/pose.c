@@ -10,17 +10,14 @@
 
 static const double unknown_rest_breath = 500; /* mL above a scan of which nothing is known */
 
-/* Contract a lung's volume forms with the weights: V - F = form . (x, y, z, yz, xz, xy, xyz) of the
- * gains. A file whose forms are not by axis has them for equal gains: their cubic then stands in
- * the places of x, yz and xyz. */
 static void contract(const supine_basis *basis, size_t lung, const double *weights,
                      supine_volume_form *form) {
   const size_t k = basis->info.mode_count;
-  double cubic[3] = {0, 0, 0};
-  supine_volume_add(k, basis->info.volume_linear + lung * k,
-                    basis->info.volume_quadratic + lung * k * k,
-                    basis->info.volume_cubic + lung * k * k * k, weights, cubic);
-  *form = (supine_volume_form){{cubic[0], 0, 0, cubic[1], 0, 0, cubic[2]}};
+  const size_t axes = basis->info.volume_axes;
+  *form = (supine_volume_form){{0}};
+  supine_volume_contract(k, axes, basis->info.volume_linear + lung * axes * k,
+                         basis->info.volume_quadratic + lung * axes * k * k,
+                         basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
 /* mL beyond the reference surface that each lung holds at rest, where the file has that by lung. */
@@ -116,34 +113,27 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-static void fill(supine_pose *pose, size_t lung, double gain) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    pose->gains[lung][axis] = gain;
-  }
-}
-
 /* Gains of one lung that holds `ml` beyond the reference. */
-static supine_status lung_gains(const volumes *v, size_t lung, double ml, supine_pose *pose,
-                                supine_error *error) {
-  double scale = 0;
-  const supine_status status = supine_volume_form_scale(&v->form[lung], ml, &scale, error);
-  fill(pose, lung, scale);
-  return status;
+static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
+                                supine_pose *pose, supine_error *error) {
+  return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
+                                  pose->gains[lung], error);
 }
 
 /* Gains where all lungs share one scale. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
+  static const double straight[3] = {0, 0, 0};
   supine_volume_form sum = {{0}};
-  double scale = 0;
   for (size_t lung = 0; lung < v->lungs; ++lung) {
     for (size_t i = 0; i < 7; ++i) {
       sum.of[i] += v->form[lung].of[i];
     }
   }
-  const supine_status status = supine_volume_form_scale(&sum, total, &scale, error);
+  double gains[3] = {0, 0, 0};
+  const supine_status status = supine_volume_form_gains(&sum, straight, 0, total, gains, error);
   for (size_t lung = 0; lung < v->lungs; ++lung) {
-    fill(pose, lung, scale);
+    memcpy(pose->gains[lung], gains, sizeof gains);
   }
   return status;
 }
@@ -157,7 +147,7 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   supine_status status = SUPINE_OK;
   share_out(basis, v, total, lung_ml);
   for (size_t lung = 0; lung < v->lungs && status == SUPINE_OK; ++lung) {
-    status = lung_gains(v, lung, lung_ml[lung], pose, error);
+    status = lung_gains(basis, v, lung, lung_ml[lung], pose, error);
   }
   return status;
 }
@@ -197,7 +187,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
       }
       ml = supine_volume_form_at(&v->form[lung], together.gains[lung]) + volume->ml;
     }
-    const supine_status status = lung_gains(v, lung, ml, pose, error);
+    const supine_status status = lung_gains(basis, v, lung, ml, pose, error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -262,7 +252,9 @@ supine_status supine_basis_pose(const supine_basis *basis, const supine_state *s
 
 void supine_pose_fill(supine_pose *pose, double gain) {
   for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-    fill(pose, lung, gain);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      pose->gains[lung][axis] = gain;
+    }
   }
 }
 

@@ -1,27 +1,36 @@
 /* SPDX-License-Identifier: MIT */
-/* Volume against breath scale, a cubic, and its inverse. */
+/* Volume against gains, and its inverse. */
 #include <math.h>
 #include <stdbool.h>
 
 #include <supine/volume.h>
 
-void supine_volume_add(size_t count, const double *linear, const double *quadratic,
-                       const double *third, const double *weights, double cubic[3]) {
-  const double *w = weights;
+static double dot(size_t count, const double *a, const double *b) {
+  double sum = 0;
   for (size_t i = 0; i < count; ++i) {
-    double square = 0;
-    double cube = 0;
-    for (size_t j = 0; j < count; ++j) {
-      double row = 0;
-      for (size_t m = 0; m < count; ++m) {
-        row += third[(i * count + j) * count + m] * w[m];
-      }
-      square += quadratic[i * count + j] * w[j];
-      cube += row * w[j];
-    }
-    cubic[0] += linear[i] * w[i];
-    cubic[1] += square * w[i];
-    cubic[2] += cube * w[i];
+    sum += a[i] * b[i];
+  }
+  return sum;
+}
+
+/* w' form w, form [K, K]. */
+static double square(size_t count, const double *form, const double *w) {
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += w[i] * dot(count, form + i * count, w);
+  }
+  return sum;
+}
+
+void supine_volume_contract(size_t count, size_t axes, const double *linear,
+                            const double *quadratic, const double *third, const double *weights,
+                            supine_volume_form *form) {
+  for (size_t axis = 0; axis < axes; ++axis) {
+    form->of[axis] += dot(count, linear + axis * count, weights);
+    form->of[3 + axis] += square(count, quadratic + axis * count * count, weights);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    form->of[6] += weights[i] * square(count, third + i * count * count, weights);
   }
 }
 
@@ -126,9 +135,73 @@ double supine_volume_form_at(const supine_volume_form *form, const double gains[
          x * y * z * f[6];
 }
 
-supine_status supine_volume_form_scale(const supine_volume_form *form, double volume, double *scale,
-                                       supine_error *error) {
+void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
+                              double cubic[3]) {
   const double *f = form->of;
-  const double cubic[3] = {f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]};
-  return supine_volume_scale(cubic, volume, scale, error);
+  const double *a = ratio;
+  cubic[0] = a[0] * f[0] + a[1] * f[1] + a[2] * f[2];
+  cubic[1] = a[1] * a[2] * f[3] + a[0] * a[2] * f[4] + a[0] * a[1] * f[5];
+  cubic[2] = a[0] * a[1] * a[2] * f[6];
+}
+
+void supine_volume_bend(const double bend[3], double sigma, double ratio[3]) {
+  const double e = sigma <= 1 ? (sigma * sigma * sigma - sigma) / 2 : 1 - 1 / sigma;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    ratio[axis] = sigma + 2 * bend[axis] * e;
+  }
+}
+
+/* Gains and volume at sigma on the path through `scale` at rest. */
+static double volume_on_path(const supine_volume_form *form, const double bend[3], double scale,
+                             double sigma, double gains[3]) {
+  supine_volume_bend(bend, sigma, gains);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    gains[axis] *= scale;
+  }
+  return supine_volume_form_at(form, gains);
+}
+
+/* Steps along the path until the volume is passed, then halves the last step. */
+static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
+                                 double rest, double volume, double gains[3], supine_error *error) {
+  const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;
+  const double side = volume > 0 ? 1 : -1;
+  double near = 0;
+  double far = 0;
+  double held = 0;
+  while (side * held < side * volume) {
+    const double before = held;
+    near = far;
+    far += step;
+    held = volume_on_path(form, bend, scale, far, gains);
+    if (!(side * held > side * before)) {
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "a volume of %g mL is out of reach: the surface folds beyond %g mL",
+                              volume, before);
+    }
+  }
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = 0.5 * (near + far);
+    held = volume_on_path(form, bend, scale, middle, gains);
+    *(side * held < side * volume ? &near : &far) = middle;
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_volume_form_gains(const supine_volume_form *form, const double bend[3],
+                                       double rest, double volume, double gains[3],
+                                       supine_error *error) {
+  static const double even[3] = {1, 1, 1};
+  const bool straight = (bend[0] == 0 && bend[1] == 0 && bend[2] == 0) || volume == rest;
+  double cubic[3];
+  double scale = 0;
+  supine_volume_form_along(form, even, cubic);
+  const supine_status status = supine_volume_scale(cubic, straight ? volume : rest, &scale, error);
+  if (status == SUPINE_OK && !straight) {
+    return follow_path(form, bend, scale, rest, volume, gains, error);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    gains[axis] = scale;
+  }
+  return status;
 }

@@ -38,8 +38,16 @@ static inline void posed_cubic(const supine_basis *basis, size_t lung, const dou
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t k = info->mode_count;
-  supine_volume_add(k, info->volume_linear + lung * k, info->volume_quadratic + lung * k * k,
-                    info->volume_cubic + lung * k * k * k, weights, cubic);
+  const size_t axes = info->volume_axes;
+  supine_volume_form form = {{0.0}};
+  double part[3];
+  supine_volume_contract(k, axes, info->volume_linear + lung * axes * k,
+                         info->volume_quadratic + lung * axes * k * k,
+                         info->volume_cubic + lung * k * k * k, weights, &form);
+  supine_volume_form_along(&form, (const double[3]){1.0, 1.0, 1.0}, part);
+  for (size_t i = 0; i < 3; ++i) {
+    cubic[i] += part[i];
+  }
 }
 
 static inline double posed_lung_volume(const supine_basis *basis, size_t lung,
@@ -89,7 +97,6 @@ static inline supine_status posed_rest(const supine_basis *basis, const double g
                                        double *beyond) {
   return posed_volume(basis, gravity, (supine_volume){SUPINE_VOLUME_REST, 0.0}, beyond);
 }
-
 
 /* What the scan held beyond the reference, mL. */
 static inline double posed_scan(const supine_basis *basis) {

@@ -147,9 +147,9 @@ static void test_page_carries_the_basis(void **state) {
   check_motion(page, &s);
   check_corners(page, "triangles", s.triangles, 3 * s.info->triangle_count);
   check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
-  check_tensor(page, "linear", s.linear, 2 * 6 * sizeof(double));
-  check_tensor(page, "quadratic", s.quadratic, 2 * 36 * sizeof(double));
-  check_tensor(page, "cubic", s.cubic, 2 * 216 * sizeof(double));
+  check_tensor(page, "linear", s.info->volume_linear, 2 * 6 * sizeof(double));
+  check_tensor(page, "quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));
+  check_tensor(page, "cubic", s.info->volume_cubic, 2 * 216 * sizeof(double));
   assert_null(strstr(page, "{{"));
   assert_null(strstr(page, "src="));
   assert_null(strstr(page, "@import"));

@@ -63,21 +63,17 @@ static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, flo
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double gravity[3];
-  double weights[SUPINE_MODES_MAX];
-  double scales[SUPINE_LUNGS_MAX];
+  supine_pose pose;
   double rest = 0.0;
   double sum = 0.0;
   supine_error error = {0};
   random_direction(seed, gravity);
-  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
   assert_int_equal(posed_rest(basis, gravity, &rest), SUPINE_OK);
   assert_true(rest < 0.0);
-  assert_int_equal(posed_scale(basis, weights, rest * helper_random(seed), &scales[0], &error),
-                   SUPINE_OK);
-  for (size_t lung = 1; lung < info->lung_count; ++lung) {
-    scales[lung] = scales[0];
-  }
-  assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), xyz, lit), SUPINE_OK);
+  const supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]},
+                              .volume = {SUPINE_VOLUME_REST, -rest * helper_random(seed)}};
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, &error), SUPINE_OK);
+  assert_int_equal(supine_deform_lit(basis, &pose, xyz, lit), SUPINE_OK);
   supine_normals(basis, xyz, exact);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     double square = 0.0;

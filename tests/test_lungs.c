@@ -294,7 +294,7 @@ static void test_phantom_keeps_its_shape(void **state) {
 
 /* Volume gained by one lung of a pair, by measuring the deformed surface itself. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
-                     size_t count, const double *weights, double scale) {
+                     size_t count, const double *weights, const double gains[3]) {
   const size_t n = lungs->mesh.vertex_count;
   double *moved = malloc(3 * n * sizeof *moved);
   for (size_t i = 0; i < n; ++i) {
@@ -303,7 +303,7 @@ static double gained(const supine_lungs *lungs, size_t lung, const double *d, co
       f += columns[i * count + k] * weights[k];
     }
     for (size_t k = 0; k < 3; ++k) {
-      moved[3 * i + k] = lungs->mesh.vertices[3 * i + k] + scale * f * d[3 * i + k];
+      moved[3 * i + k] = lungs->mesh.vertices[3 * i + k] + gains[k] * f * d[3 * i + k];
     }
   }
   const size_t first = lungs->triangle_begin[lung];
@@ -358,23 +358,28 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   static const double scales[] = {-3.0, -1.3, 0.4, 2.1, 3.8};
   for (size_t k = 0; k < sizeof scales / sizeof *scales; ++k) {
     const double s = scales[k];
+    const double even[3] = {s, s, s};
     double direct = 0.0;
     double mixed_direct = 0.0;
     for (size_t lung = 0; lung < 2; ++lung) {
-      direct += gained(&lungs, lung, d, columns, COLUMNS, weights, s);
-      mixed_direct += gained(&lungs, lung, d, mixed_columns, MIXED, weights, s);
+      direct += gained(&lungs, lung, d, columns, COLUMNS, weights, even);
+      mixed_direct += gained(&lungs, lung, d, mixed_columns, MIXED, weights, even);
     }
     assert_close(s * (cubic[0] + s * (cubic[1] + s * cubic[2])), direct, 1e-9 * 1e3);
     assert_close(s * (mixed_cubic[0] + s * (mixed_cubic[1] + s * mixed_cubic[2])), mixed_direct,
                  1e-9 * 1e3);
   }
-  /* lung by lung, from its own forms */
-  supine_volume_forms right = {1, COLUMNS, forms.linear + COLUMNS,
-                               forms.quadratic + COLUMNS * COLUMNS,
-                               forms.cubic + COLUMNS * COLUMNS * COLUMNS};
-  supine_physics_volume_forms_contract(&right, weights, cubic);
-  assert_close(2.0 * (cubic[0] + 2.0 * (cubic[1] + 2.0 * cubic[2])),
-               gained(&lungs, 1, d, columns, COLUMNS, weights, 2.0), 1e-9 * 1e3);
+  /* lung by lung, each axis with a gain of its own */
+  static const double gains[3] = {2.0, -0.7, 1.3};
+  for (size_t lung = 0; lung < 2; ++lung) {
+    supine_volume_form form;
+    supine_physics_volume_forms_contract_lung(&forms, lung, weights, &form);
+    assert_close(supine_volume_form_at(&form, gains),
+                 gained(&lungs, lung, d, columns, COLUMNS, weights, gains), 1e-9 * 1e3);
+    supine_physics_volume_forms_contract_lung(&mixed, lung, weights, &form);
+    assert_close(supine_volume_form_at(&form, gains),
+                 gained(&lungs, lung, d, mixed_columns, MIXED, weights, gains), 1e-9 * 1e3);
+  }
   supine_physics_volume_forms_free(&forms);
   supine_physics_volume_forms_free(&mixed);
   supine_lungs_free(&lungs);

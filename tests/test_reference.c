@@ -55,17 +55,20 @@ static supine_lungs scan_of(supine_lungs *full, const supine_model *model, const
   supine_mesh moved = full->mesh;
   supine_lungs scan = {0};
   double ml[2];
-  double scale[2];
+  double rest[2];
+  double gains[2][3];
   assert_int_equal(supine_physics_solve(full, model, g, &solution, NULL), SUPINE_OK);
   supine_reference_share_out(&reference, g, volume, ml);
+  (void)supine_reference_rest(&reference, g, rest);
   for (size_t lung = 0; lung < full->lung_count; ++lung) {
-    assert_int_equal(supine_volume_scale(solution.lung_cubic[lung],
-                                         ml[lung] - reference.full_volume[lung], &scale[lung],
-                                         NULL),
+    assert_int_equal(supine_volume_form_gains(&solution.form[lung], model->bend,
+                                              rest[lung] - reference.full_volume[lung],
+                                              ml[lung] - reference.full_volume[lung], gains[lung],
+                                              NULL),
                      SUPINE_OK);
   }
-  for (size_t i = 0; i < solution.vertex_count; ++i) {
-    solution.catch_[i] *= scale[i >= full->lung_begin[1]];
+  for (size_t i = 0; i < 3 * solution.vertex_count; ++i) {
+    solution.directions[i] *= gains[i >= 3 * full->lung_begin[1]][i % 3];
   }
   moved.vertices = malloc(3 * moved.vertex_count * sizeof(double));
   supine_physics_solution_apply(&solution, &full->mesh, 1.0, moved.vertices);

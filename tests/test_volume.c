@@ -184,6 +184,85 @@ static void test_pose_open_surface_says_so(void **unused) {
   fixture_destroy(f);
 }
 
+/* A lung whose volume is a product of its axes' lengths, of 3000 mL when full: at gains of -1 each
+ * axis is a fifth to a third shorter. */
+static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
+                                             3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
+                                             3000 * 0.2 * 0.25 * 0.3}};
+static const double box_bend[3] = {0, -0.45, 0.45};
+
+static double box_volume(const double *gains) {
+  return 3000 * ((1 + 0.2 * gains[0]) * (1 + 0.25 * gains[1]) * (1 + 0.3 * gains[2]) - 1);
+}
+
+static void test_volume_form_gains_every_volume_met_on_the_path(void **state) {
+  (void)state;
+  const double rest = box_volume((double[]){-1, -1, -1});
+  double last[3] = {1, 1, 1};
+  for (double part = -0.3; part < 1.5; part += 0.1) {
+    double gains[3];
+    assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, part * rest, gains, NULL),
+                     SUPINE_OK);
+    assert_true(fabs(box_volume(gains) - part * rest) <= 1e-9);
+    /* y less z, both less x, is bend times the same: what the axes share is on one path. */
+    assert_true(fabs(gains[1] + gains[2] - 2 * gains[0]) <= 1e-12);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      assert_true(gains[axis] < last[axis]);
+      last[axis] = gains[axis];
+    }
+  }
+}
+
+static void test_volume_form_gains_at_rest_equal_on_all_axes(void **state) {
+  (void)state;
+  const double rest = box_volume((double[]){-1, -1, -1});
+  double gains[3];
+  assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, rest, gains, NULL),
+                   SUPINE_OK);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    assert_true(fabs(gains[axis] + 1) <= 1e-14);
+  }
+}
+
+/* Slopes along the path as published for it: rest 1, 0.1, 1.9; full 1, 1.45, 0.55. */
+static void test_volume_bend_slopes_as_stated(void **state) {
+  (void)state;
+  static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
+  for (size_t end = 0; end < 2; ++end) {
+    for (int side = -1; side <= 1; side += 2) { /* value and slope are continuous at rest */
+      double at[3];
+      double near[3];
+      supine_volume_bend(box_bend, (double)end, at);
+      supine_volume_bend(box_bend, (double)end + side * 1e-6, near);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        assert_true(at[axis] == (double)end);
+        assert_true(fabs((near[axis] - at[axis]) / (side * 1e-6) - stated[end][axis]) <= 1e-5);
+      }
+    }
+  }
+}
+
+static void test_volume_form_gains_straight_path_one_scale(void **state) {
+  (void)state;
+  static const double straight[3] = {0, 0, 0};
+  double gains[3];
+  assert_int_equal(supine_volume_form_gains(&box_form, straight, 0, -900, gains, NULL), SUPINE_OK);
+  assert_true(gains[0] == gains[1] && gains[1] == gains[2]);
+  assert_true(fabs(box_volume(gains) + 900) <= 1e-9);
+}
+
+static void test_volume_form_gains_out_of_reach_refused(void **state) {
+  (void)state;
+  const double rest = box_volume((double[]){-1, -1, -1});
+  double gains[3];
+  supine_error error = {0};
+  assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, -3100, gains, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  assert_non_null(strstr(error.message, "-3100 mL is out of reach"));
+  assert_int_equal(supine_volume_form_gains(&box_form, box_bend, 0, -10, gains, &error),
+                   SUPINE_ERROR_NUMERICAL);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_lung_volume_scalar_equals_surface),
@@ -192,6 +271,11 @@ int main(void) {
       cmocka_unit_test(test_scale_cubics_branch_of_rest_only),
       cmocka_unit_test(test_scale_not_finite_volume_refused),
       cmocka_unit_test(test_pose_open_surface_says_so),
+      cmocka_unit_test(test_volume_form_gains_every_volume_met_on_the_path),
+      cmocka_unit_test(test_volume_form_gains_at_rest_equal_on_all_axes),
+      cmocka_unit_test(test_volume_bend_slopes_as_stated),
+      cmocka_unit_test(test_volume_form_gains_straight_path_one_scale),
+      cmocka_unit_test(test_volume_form_gains_out_of_reach_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -285,8 +285,8 @@ static void take_back_rigid(embedding *e, size_t begin, size_t end) {
 
 /* Metadata of the surface that do not hold for what is inside. */
 static bool dropped(const char *key) {
-  static const char *const keys[] = {
-      "kind", "made_by", "checksum", "version", "turned_over_percent", "mode_count"};
+  static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
+                                     "mode_count"};
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     if (strcmp(key, keys[i]) == 0) {
       return true;
@@ -298,7 +298,7 @@ static bool dropped(const char *key) {
 /* The surface's metadata, then those of the content. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
-  enum { OWN = 6 };
+  enum { OWN = 5 };
   size_t given = 0;
   const supine_metadata *from = supine_basis_all_metadata(e->shells->basis, &given);
   supine_metadata *metadata = malloc((given + OWN) * sizeof *metadata);
@@ -314,7 +314,6 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   char modes[24];
   (void)snprintf(modes, sizeof modes, "%zu", e->columns / 3);
   const supine_inside_content *content = e->content;
-  metadata[count++] = (supine_metadata){"version", "2"};
   metadata[count++] = (supine_metadata){"kind", "vector"};
   metadata[count++] = (supine_metadata){"mode_count", modes};
   metadata[count++] = (supine_metadata){"content", content->part_count == 0      ? "grid"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Area vectors of triangles whose corners are linear in the weights. */
+/* Area vectors of triangles whose corners are linear in the weights and gains. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,52 +8,64 @@
 
 enum { SIDES = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Two sides of a triangle: of the rest surface first, then by how much each mode changes them. */
+/* Two sides of a triangle, by axis: of the reference surface first, then by how much each mode
+ * changes them. */
 typedef struct sides {
-  double a[SIDES][3];
-  double b[SIDES][3];
+  double a[3][SIDES];
+  double b[3][SIDES];
 } sides;
 
-void supine_normals_monomials(size_t modes, const double *weights, double scale, double *phi) {
-  size_t at = 0;
-  for (size_t k = 0; k <= modes; ++k) {
-    const double first = k == 0 ? 1.0 : scale * weights[k - 1];
-    for (size_t l = k; l <= modes; ++l) {
-      phi[at++] = first * (l == 0 ? 1.0 : scale * weights[l - 1]);
+/* Where the product of columns k and l is, of the axes a and b. Column 0 is the reference. */
+static size_t term_of(size_t modes, size_t k, size_t l) {
+  const size_t low = (k < l ? k : l) - 1;
+  const size_t high = (k < l ? l : k) - 1;
+  return k == 0 && l == 0 ? 0
+         : l == 0         ? k
+         : k == 0         ? modes + l
+                          : 1 + 2 * modes + low * modes - low * (low + 1) / 2 + high;
+}
+
+void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
+                              double *phi) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double a = gains[(axis + 1) % 3];
+    const double b = gains[(axis + 2) % 3];
+    *phi++ = 1.0;
+    for (size_t k = 0; k < modes; ++k) {
+      phi[k] = a * weights[k];
+      phi[modes + k] = b * weights[k];
+    }
+    phi += 2 * modes;
+    for (size_t k = 0; k < modes; ++k) {
+      for (size_t l = k; l < modes; ++l) {
+        *phi++ = a * b * weights[k] * weights[l];
+      }
     }
   }
 }
 
-/* Rest position and displacements of a vertex. */
-static void read_vertex(const supine_normals_surface *s, size_t i, double out[SIDES][3]) {
+/* Reference position and displacements of a vertex along one axis. */
+static void read_vertex(const supine_normals_surface *s, size_t i, size_t axis, double *out) {
   const size_t modes = s->mode_count;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    out[0][axis] = (double)s->vertices[3 * i + axis];
-    for (size_t k = 0; k < modes; ++k) {
-      out[k + 1][axis] = s->directions == NULL ? (double)s->coefficients[(3 * i + axis) * modes + k]
-                                               : (double)s->coefficients[i * modes + k] *
-                                                     (double)s->directions[3 * i + axis];
-    }
+  const float *c = s->coefficients + (s->directions == NULL ? (3 * i + axis) * modes : i * modes);
+  const double d = s->directions == NULL ? 1.0 : (double)s->directions[3 * i + axis];
+  out[0] = (double)s->vertices[3 * i + axis];
+  for (size_t k = 0; k < modes; ++k) {
+    out[k + 1] = (double)c[k] * d;
   }
 }
 
 static void read_sides(const supine_normals_surface *s, const uint32_t *corner, sides *out) {
-  double origin[SIDES][3];
-  read_vertex(s, corner[0], origin);
-  read_vertex(s, corner[1], out->a);
-  read_vertex(s, corner[2], out->b);
-  for (size_t k = 0; k <= s->mode_count; ++k) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      out->a[k][axis] -= origin[k][axis];
-      out->b[k][axis] -= origin[k][axis];
+  double origin[SIDES];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    read_vertex(s, corner[0], axis, origin);
+    read_vertex(s, corner[1], axis, out->a[axis]);
+    read_vertex(s, corner[2], axis, out->b[axis]);
+    for (size_t k = 0; k <= s->mode_count; ++k) {
+      out->a[axis][k] -= origin[k];
+      out->b[axis][k] -= origin[k];
     }
   }
-}
-
-static void add_cross(const double *a, const double *b, double sum[3]) {
-  sum[0] += a[1] * b[2] - a[2] * b[1];
-  sum[1] += a[2] * b[0] - a[0] * b[2];
-  sum[2] += a[0] * b[1] - a[1] * b[0];
 }
 
 static bool in_lung(const supine_normals_surface *s, size_t lung, uint32_t vertex) {
@@ -62,16 +74,13 @@ static bool in_lung(const supine_normals_surface *s, size_t lung, uint32_t verte
 
 /* A triangle's terms, added to those of a corner, [3, terms]. */
 static void add_terms(const sides *t, size_t modes, size_t terms, double *row) {
-  size_t at = 0;
-  for (size_t k = 0; k <= modes; ++k) {
-    for (size_t l = k; l <= modes; ++l, ++at) {
-      double n[3] = {0, 0, 0};
-      add_cross(t->a[k], t->b[l], n);
-      if (l != k) {
-        add_cross(t->a[l], t->b[k], n);
-      }
-      for (size_t axis = 0; axis < 3; ++axis) {
-        row[axis * terms + at] += n[axis];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const size_t y = (axis + 1) % 3;
+    const size_t z = (axis + 2) % 3;
+    for (size_t k = 0; k <= modes; ++k) {
+      for (size_t l = 0; l <= modes; ++l) {
+        row[axis * terms + term_of(modes, k, l)] +=
+            t->a[y][k] * t->b[z][l] - t->b[y][k] * t->a[z][l];
       }
     }
   }
@@ -139,13 +148,14 @@ void supine_normals_rows_free(supine_normals_rows *rows) {
 
 void supine_normals_mix(const supine_normals_surface *surface, size_t lung, const double *mix,
                         float *plane) {
-  const size_t sides_count = surface->mode_count + 1;
-  double full[SIDES][SIDES];
-  size_t at = 0;
-  for (size_t k = 0; k < sides_count; ++k) {
-    for (size_t l = k; l < sides_count; ++l, ++at) {
-      full[k][l] = mix[at];
-      full[l][k] = mix[at];
+  const size_t modes = surface->mode_count;
+  const size_t terms = supine_normals_terms(modes);
+  double full[3][SIDES][SIDES];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t k = 0; k <= modes; ++k) {
+      for (size_t l = 0; l <= modes; ++l) {
+        full[axis][k][l] = mix[axis * terms + term_of(modes, k, l)];
+      }
     }
   }
   for (size_t t = 0; t < surface->triangle_count; ++t) {
@@ -156,14 +166,18 @@ void supine_normals_mix(const supine_normals_surface *surface, size_t lung, cons
     sides both;
     double n[3] = {0, 0, 0};
     read_sides(surface, corner, &both);
-    for (size_t k = 0; k < sides_count; ++k) {
-      double other[3] = {0, 0, 0};
-      for (size_t l = 0; l < sides_count; ++l) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-          other[axis] += full[k][l] * both.b[l][axis];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const size_t y = (axis + 1) % 3;
+      const size_t z = (axis + 2) % 3;
+      for (size_t k = 0; k <= modes; ++k) {
+        double a = 0.0;
+        double b = 0.0;
+        for (size_t l = 0; l <= modes; ++l) {
+          a += full[axis][k][l] * both.a[z][l];
+          b += full[axis][k][l] * both.b[z][l];
         }
+        n[axis] += both.a[y][k] * b - both.b[y][k] * a;
       }
-      add_cross(both.a[k], other, n);
     }
     for (size_t v = 0; v < 3; ++v) {
       for (size_t axis = 0; axis < 3; ++axis) {

@@ -14,8 +14,7 @@
 
 /* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
  * errors change in the second digit. */
-enum { ROWS = 4096, STATES = 192, HELD_OUT = 128, STEP = 3 };
-enum { TERMS_MAX = (SUPINE_NORMALS_FIELD_MAX + 1) * (SUPINE_NORMALS_FIELD_MAX + 2) / 2 };
+enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 
 /* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
  * little differently. */
@@ -25,18 +24,19 @@ static const double degrees = 57.29577951308232;
 
 /* One lung's modes before they are rounded. */
 typedef struct fit {
-  double *mix;     /* [MOST, terms] T: n_j = sum of T_j,kl A_kl */
-  double *weights; /* [MOST, terms] V */
+  double *mix;     /* [MOST, 3, terms] T: n_jc = T_jc . A_c */
+  double *weights; /* [MOST, 3, terms] V */
 } fit;
 
-/* gram [terms, terms] = A^T A. */
+/* gram [3, terms, terms] = A_c^T A_c of each component. */
 static void find_gram(const supine_normals_rows *rows, size_t terms, double *gram) {
-  memset(gram, 0, terms * terms * sizeof *gram);
+  memset(gram, 0, 3 * terms * terms * sizeof *gram);
   for (size_t r = 0; r < 3 * rows->count; ++r) {
     const double *row = rows->terms + r * terms;
+    double *to = gram + r % 3 * terms * terms;
     for (size_t a = 0; a < terms; ++a) {
       for (size_t b = 0; b < terms; ++b) {
-        gram[a * terms + b] += row[a] * row[b];
+        to[a * terms + b] += row[a] * row[b];
       }
     }
   }
@@ -50,37 +50,38 @@ static double dot(const double *a, const double *b, size_t count) {
   return sum;
 }
 
-/* The states' products P^T G P, each state scaled to length 1 in G; `image` [S, terms] is G P. */
-static void find_products(const double *gram, size_t terms, const supine_normals_states *states,
+/* The products P^T G P of states phi [S, 3, terms], each scaled to length 1 in G; `image`
+ * [S, 3, terms] is G P. */
+static void find_products(const double *gram, size_t terms, size_t s, const double *phi,
                           double *unit, double *image, double *product) {
-  const size_t s = states->count;
-  for (size_t i = 0; i < s; ++i) {
-    const double *phi = states->phi + i * terms;
-    for (size_t a = 0; a < terms; ++a) {
-      image[i * terms + a] = dot(gram + a * terms, phi, terms);
+  const size_t all = 3 * terms;
+  for (size_t i = 0; i < s; ++i, phi += all) {
+    for (size_t a = 0; a < all; ++a) {
+      image[i * all + a] = dot(gram + a * terms, phi + a / terms * terms, terms);
     }
-    const double square = dot(phi, image + i * terms, terms);
+    const double square = dot(phi, image + i * all, all);
     const double length = square > 0.0 ? sqrt(square) : 1.0;
-    for (size_t a = 0; a < terms; ++a) {
-      unit[i * terms + a] = phi[a] / length;
-      image[i * terms + a] /= length;
+    for (size_t a = 0; a < all; ++a) {
+      unit[i * all + a] = phi[a] / length;
+      image[i * all + a] /= length;
     }
   }
   for (size_t i = 0; i < s; ++i) {
     for (size_t j = 0; j < s; ++j) {
-      product[i * s + j] = dot(unit + i * terms, image + j * terms, terms);
+      product[i * s + j] = dot(unit + i * all, image + j * all, all);
     }
   }
 }
 
-/* The SVD of the states' normals by their products: modes orthonormal over the rows. */
-static supine_status find_fit(const supine_normals_rows *rows, size_t terms,
-                              const supine_normals_states *states, size_t count, fit *made) {
-  const size_t s = states->count;
+/* The SVD of the normals in states phi [S, 3, terms] by their products: modes orthonormal over the
+ * rows. */
+static supine_status find_fit(const supine_normals_rows *rows, size_t terms, size_t s,
+                              const double *phi, size_t count, fit *made) {
+  const size_t all = 3 * terms;
   supine_status status = SUPINE_ERROR_MEMORY;
-  double *gram = malloc(terms * terms * sizeof *gram);
-  double *unit = malloc(s * terms * sizeof *unit);
-  double *image = malloc(s * terms * sizeof *image);
+  double *gram = malloc(all * terms * sizeof *gram);
+  double *unit = malloc(s * all * sizeof *unit);
+  double *image = malloc(s * all * sizeof *image);
   double *product = malloc(s * s * sizeof *product);
   double *vectors = malloc(count * s * sizeof *vectors);
   double values[STATES]; /* the routine wants room for all */
@@ -88,20 +89,20 @@ static supine_status find_fit(const supine_normals_rows *rows, size_t terms,
     goto cleanup;
   }
   find_gram(rows, terms, gram);
-  find_products(gram, terms, states, unit, image, product);
+  find_products(gram, terms, s, phi, unit, image, product);
   status = supine_projection_leading_eigenpairs(s, product, count, values, vectors);
   for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
     /* What rounding alone leaves is no mode. */
     const double length = values[j] > 1e-14 * values[0] ? 1.0 / sqrt(values[j]) : 0.0;
-    for (size_t a = 0; a < terms; ++a) {
+    for (size_t a = 0; a < all; ++a) {
       double mix = 0.0;
       double weight = 0.0;
       for (size_t i = 0; i < s; ++i) {
-        mix += vectors[j * s + i] * unit[i * terms + a];
-        weight += vectors[j * s + i] * image[i * terms + a];
+        mix += vectors[j * s + i] * unit[i * all + a];
+        weight += vectors[j * s + i] * image[i * all + a];
       }
-      made->mix[j * terms + a] = length * mix;
-      made->weights[j * terms + a] = length * weight; /* T^T G */
+      made->mix[j * all + a] = length * mix;
+      made->weights[j * all + a] = length * weight; /* T^T G */
     }
   }
 cleanup:
@@ -142,7 +143,7 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Exact normals of a row in every state by axis. States stand side by side in `across` [terms,
+/* Exact normals of a row in every state by axis. States stand side by side in `across` [3, terms,
  * HELD_OUT], for vector units; each sum is in the order of dot. */
 SUPINE_CLONES static void find_exact(const double *row, size_t terms, const double *across,
                                      double (*exact)[HELD_OUT]) {
@@ -150,41 +151,45 @@ SUPINE_CLONES static void find_exact(const double *row, size_t terms, const doub
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t a = 0; a < terms; ++a) {
       for (size_t i = 0; i < HELD_OUT; ++i) {
-        exact[axis][i] += row[axis * terms + a] * across[a * HELD_OUT + i];
+        exact[axis][i] += row[axis * terms + a] * across[(axis * terms + a) * HELD_OUT + i];
       }
     }
   }
 }
 
-/* Angles off of each row in each held-out state, added at `angles`; returns how many. `modes` are
- * those that the file will hold, `weights` theirs. */
+/* Angles off of each row of a lung in each held-out state, added at `angles`; returns how many.
+ * `made` holds what the file will; `across` [3, terms, HELD_OUT] is overwritten. */
 static size_t measure(const supine_normals_rows *rows, size_t terms,
-                      const supine_normals_states *states, size_t count, const int16_t *modes,
-                      const double *weights, double *angles) {
+                      const supine_normals_states *states, size_t lung,
+                      const supine_normals_modes *made, double *across, double *angles) {
+  const size_t all = 3 * terms;
+  const size_t count = made->count;
+  const double *phi = states->phi + lung * states->room * all;
+  const double *weights = made->weights + lung * count * all;
   size_t found = 0;
   double v[HELD_OUT][SUPINE_NORMALS_MOST];
-  double across[TERMS_MAX * HELD_OUT] = {0.0};
-  for (size_t i = 0; i < states->count; ++i) {
-    for (size_t a = 0; a < terms; ++a) {
-      across[a * HELD_OUT + i] = states->phi[i * terms + a];
+  memset(across, 0, all * HELD_OUT * sizeof *across);
+  for (size_t i = 0; i < states->count; ++i, phi += all) {
+    for (size_t a = 0; a < all; ++a) {
+      across[a * HELD_OUT + i] = phi[a];
     }
     for (size_t j = 0; j < count; ++j) {
-      v[i][j] = dot(weights + j * terms, states->phi + i * terms, terms);
+      v[i][j] = dot(weights + j * all, phi, all);
     }
   }
   for (size_t r = 0; r < rows->count; ++r) {
     double packed[3][SUPINE_NORMALS_MOST];
     for (size_t axis = 0; axis < 3; ++axis) {
-      pack(modes + (3 * (size_t)rows->vertex[r] + axis) * count, count, packed[axis]);
+      pack(made->modes + (3 * (size_t)rows->vertex[r] + axis) * count, count, packed[axis]);
     }
     double exact[3][HELD_OUT];
     find_exact(rows->terms + 3 * r * terms, terms, across, exact);
     for (size_t i = 0; i < states->count; ++i) {
-      double made[3];
+      double normal[3];
       for (size_t axis = 0; axis < 3; ++axis) {
-        made[axis] = dot(v[i], packed[axis], count);
+        normal[axis] = dot(v[i], packed[axis], count);
       }
-      angles[found++] = angle_between((double[]){exact[0][i], exact[1][i], exact[2][i]}, made);
+      angles[found++] = angle_between((double[]){exact[0][i], exact[1][i], exact[2][i]}, normal);
     }
   }
   return found;
@@ -207,7 +212,7 @@ static void planes_range(void *context, size_t begin, size_t end, size_t thread)
   for (size_t i = begin; i < end; ++i) {
     const size_t j = i / s->lung_count;
     const size_t lung = i % s->lung_count;
-    supine_normals_mix(s, lung, work->fits[lung].mix + (work->first + j) * work->terms,
+    supine_normals_mix(s, lung, work->fits[lung].mix + 3 * (work->first + j) * work->terms,
                        work->planes + 3 * s->vertex_count * j);
   }
 }
@@ -230,8 +235,8 @@ static void round_modes(const planes_work *work, const float *rest, supine_norma
         const double value = rest[i / 3] > 0 ? (double)plane[i] / (double)rest[i / 3] : 0.0;
         made->modes[i * count + j] = (int16_t)lrint(value / unit);
       }
-      for (size_t a = 0; a < work->terms; ++a) {
-        made->weights[(lung * count + j) * work->terms + a] *= unit;
+      for (size_t a = 0; a < 3 * work->terms; ++a) {
+        made->weights[3 * (lung * count + j) * work->terms + a] *= unit;
       }
     }
   }
@@ -240,13 +245,13 @@ static void round_modes(const planes_work *work, const float *rest, supine_norma
 /* Lengths of the normals at rest, [N]. */
 static supine_status find_rest(const supine_normals_surface *s, size_t terms, float *rest) {
   float *plane = calloc(3 * s->vertex_count + 1, sizeof *plane);
-  double *one = calloc(terms, sizeof *one);
+  double *one = calloc(3 * terms, sizeof *one);
   if (plane == NULL || one == NULL) {
     free(plane);
     free(one);
     return SUPINE_ERROR_MEMORY;
   }
-  one[0] = 1.0;
+  one[0] = one[terms] = one[2 * terms] = 1.0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
     supine_normals_mix(s, lung, one, plane);
   }
@@ -263,12 +268,12 @@ static supine_status find_rest(const supine_normals_surface *s, size_t terms, fl
 static supine_status add_modes(planes_work *work, size_t count, const float *rest,
                                supine_normals_modes *made) {
   const supine_normals_surface *s = work->surface;
-  const size_t terms = work->terms;
+  const size_t all = 3 * work->terms;
   const size_t old = made->count;
   const size_t rows = 3 * s->vertex_count;
   int16_t *modes = realloc(made->modes, rows * count * sizeof *modes);
   made->modes = modes != NULL ? modes : made->modes;
-  double *weights = realloc(made->weights, s->lung_count * count * terms * sizeof *weights);
+  double *weights = realloc(made->weights, s->lung_count * count * all * sizeof *weights);
   made->weights = weights != NULL ? weights : made->weights;
   work->planes = calloc(rows * (count - old), sizeof *work->planes);
   if (modes == NULL || weights == NULL || work->planes == NULL) {
@@ -279,10 +284,9 @@ static supine_status add_modes(planes_work *work, size_t count, const float *res
     memmove(modes + i * count, modes + i * old, old * sizeof *modes);
   }
   for (size_t lung = s->lung_count; lung-- > 0;) {
-    double *to = weights + lung * count * terms;
-    memmove(to, weights + lung * old * terms, old * terms * sizeof *to);
-    memcpy(to + old * terms, work->fits[lung].weights + old * terms,
-           (count - old) * terms * sizeof *to);
+    double *to = weights + lung * count * all;
+    memmove(to, weights + lung * old * all, old * all * sizeof *to);
+    memcpy(to + old * all, work->fits[lung].weights + old * all, (count - old) * all * sizeof *to);
   }
   work->first = old;
   made->count = count;
@@ -303,8 +307,11 @@ static supine_status measure_all(const supine_normals_surface *s,
   const size_t terms = supine_normals_terms(s->mode_count);
   supine_status status = SUPINE_OK;
   double *angles = malloc(s->lung_count * (2 * ROWS + 1) * (states->count + 1) * sizeof *angles);
+  double *across = malloc(3 * terms * HELD_OUT * sizeof *across);
   size_t found = 0;
-  if (angles == NULL) {
+  if (angles == NULL || across == NULL) {
+    free(angles);
+    free(across);
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
@@ -312,8 +319,7 @@ static supine_status measure_all(const supine_normals_surface *s,
     const size_t stride = stride_of(s, lung);
     status = supine_normals_rows_create(s, lung, stride / 2, stride, &rows);
     if (status == SUPINE_OK) {
-      found += measure(&rows, terms, states, made->count, made->modes,
-                       made->weights + lung * made->count * terms, angles + found);
+      found += measure(&rows, terms, states, lung, made, across, angles + found);
       supine_normals_rows_free(&rows);
     }
   }
@@ -327,6 +333,7 @@ static supine_status measure_all(const supine_normals_surface *s,
     made->p999 = angles[(size_t)(0.999 * (double)(found - 1))];
   }
   free(angles);
+  free(across);
   return status;
 }
 
@@ -337,13 +344,14 @@ static supine_status find_fits(const supine_normals_surface *s, const supine_nor
   supine_status status = SUPINE_OK;
   for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
     supine_normals_rows rows = {0};
-    fits[lung].mix = calloc(count * terms, sizeof *fits[lung].mix);
-    fits[lung].weights = calloc(count * terms, sizeof *fits[lung].weights);
+    fits[lung].mix = calloc(3 * count * terms, sizeof *fits[lung].mix);
+    fits[lung].weights = calloc(3 * count * terms, sizeof *fits[lung].weights);
     status = fits[lung].mix == NULL || fits[lung].weights == NULL
                  ? SUPINE_ERROR_MEMORY
                  : supine_normals_rows_create(s, lung, 0, stride_of(s, lung), &rows);
     if (status == SUPINE_OK) {
-      status = find_fit(&rows, terms, states, count, &fits[lung]);
+      status = find_fit(&rows, terms, states->count, states->phi + 3 * lung * states->room * terms,
+                        count, &fits[lung]);
     }
     supine_normals_rows_free(&rows);
   }
@@ -370,7 +378,7 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
     goto cleanup;
   }
   size_t most = SUPINE_NORMALS_MOST < states.count ? SUPINE_NORMALS_MOST : states.count;
-  most = terms < most ? terms : most;
+  most = 3 * terms < most ? 3 * terms : most;
   rest = malloc(surface->vertex_count * sizeof *rest);
   status = rest == NULL ? SUPINE_ERROR_MEMORY : find_rest(surface, terms, rest);
   if (status == SUPINE_OK) {

@@ -2,14 +2,15 @@
 /** @file
  * Normals of every deformed surface as a few functions of posture and volume.
  *
- * The triangles' area vectors around a vertex sum to a quadratic polynomial of q = scale x weights,
+ * The triangles' area vectors around a vertex sum to a polynomial of the weights w and the lung's
+ * gains. Its component along axis c, with a and b the gains of the next two axes (cyclically), is
  *
- *     N_i(q) = sum over 0 <= k <= l <= K of A_i,kl q_k q_l        q_0 = 1
+ *     N_ic = A_ic . phi_c        phi_c = (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * so that over all postures and volumes it lies in a space of at most (K + 1)(K + 2) / 2
- * dimensions, and nearly in far fewer. For each lung the Q best are found,
+ * so that over all postures and volumes it lies in a space of few dimensions. For each lung the Q
+ * best are found,
  *
- *     N_i(q) ~ |N_i(0)| sum over j of n_ij v_j(q)        v_j(q) = sum over kl of V_j,kl q_k q_l
+ *     N_i ~ |N_i(0)| sum over j of n_ij v_j        v_j = sum over c of V_jc . phi_c
  *
  * best for angles: vertices count alike whatever their area, and so do postures and volumes. */
 #ifndef SUPINE_NORMALS_H
@@ -30,17 +31,18 @@ typedef struct supine_normals_surface {
   const float *directions;   /**< [N, 3]; NULL: a vector field */
   const float *coefficients; /**< [N, K] or [N, 3, K] */
   const double *modes;       /**< [K, (band + 1)^2] */
-  const double *linear;      /**< [G, K] the volume's forms; NULL: an open surface; likewise: */
-  const double *quadratic;   /**< [G, K, K] */
+  const double *linear;      /**< [G, 3, K] the volume's forms; NULL: an open surface; likewise: */
+  const double *quadratic;   /**< [G, 3, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
-  const double *resting;     /**< [9] or NULL, see supine_basis_resting_volume */
+  const double *resting;     /**< [G, 9] mL beyond the surface at rest, harmonics; or NULL */
+  double bend[3];            /**< see supine_volume_bend */
 } supine_normals_surface;
 
 /** Normals in few numbers. */
 typedef struct supine_normals_modes {
   size_t count;    /**< Q; 0: none were made */
   int16_t *modes;  /**< [N, 3, Q] n, in units that `weights` have taken up */
-  double *weights; /**< [G, Q, (K + 1)(K + 2) / 2] V; columns 00, 01, ... 0K, 11, 12, ... KK */
+  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
   double range[2]; /**< mL that it was made for, over postures: from their resting volume, where
                       one is known, to that of the file's surface; scales, on an open surface */
   double mean;     /**< degrees off, over vertices, postures and volumes that took no part */

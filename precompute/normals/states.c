@@ -58,53 +58,86 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* The scale at a share, 0 to 1, of the range of a posture. */
-static bool scale_of(const supine_normals_surface *s, const double *y, const double *w,
-                     double whole, double share, double *scale, double *amount) {
+/* The form of each lung's volume. */
+static void find_forms(const supine_normals_surface *s, const double *w, supine_volume_form *form) {
+  const size_t k = s->mode_count;
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    form[lung] = (supine_volume_form){{0}};
+    supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
+                           s->cubic + lung * k * k * k, w, &form[lung]);
+  }
+}
+
+/* Gains of each lung at a share, 0 to 1, of its way from rest to the file's surface. */
+static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
+                            double share, double (*gains)[3], double *amount) {
+  supine_volume_form form[SUPINE_LUNGS_MAX];
+  find_forms(s, w, form);
+  *amount = 0.0;
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    double rest = 0.0;
+    for (size_t i = 0; i < 9; ++i) {
+      rest += s->resting[9 * lung + i] * y[i];
+    }
+    *amount += (1.0 - share) * rest;
+    if (supine_volume_form_gains(&form[lung], s->bend, rest, (1.0 - share) * rest, gains[lung],
+                                 NULL) != SUPINE_OK) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* The one gain of all lungs at a share, 0 to 1, of the range of a posture. */
+static bool common_gain(const supine_normals_surface *s, const double *w, double whole,
+                        double share, double (*gains)[3], double *amount) {
+  static const double even[3] = {1.0, 1.0, 1.0};
+  double scale = 0.0;
+  bool reached = true;
   if (s->linear == NULL) {
     const double size = largest(s, w);
     *amount = lowest_mm + share * (highest_mm - lowest_mm);
-    *scale = size > 0.0 ? *amount / size : 0.0;
-    return size > 0.0;
-  }
-  double low = lowest_share * whole;
-  double high = highest_share * whole;
-  if (s->resting != NULL) {
-    low = 0.0;
-    high = 0.0;
-    for (size_t i = 0; i < 9; ++i) {
-      low += s->resting[i] * y[i];
+    scale = size > 0.0 ? *amount / size : 0.0;
+    reached = size > 0.0;
+  } else {
+    supine_volume_form form[SUPINE_LUNGS_MAX];
+    double cubic[3];
+    find_forms(s, w, form);
+    for (size_t lung = 1; lung < s->lung_count; ++lung) {
+      for (size_t i = 0; i < 7; ++i) {
+        form[0].of[i] += form[lung].of[i];
+      }
     }
+    supine_volume_form_along(&form[0], even, cubic);
+    *amount = (lowest_share + share * (highest_share - lowest_share)) * whole;
+    reached = supine_volume_scale(cubic, *amount, &scale, NULL) == SUPINE_OK;
   }
-  double cubic[3] = {0.0, 0.0, 0.0};
-  const size_t k = s->mode_count;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    supine_volume_add(k, s->linear + lung * k, s->quadratic + lung * k * k,
-                      s->cubic + lung * k * k * k, w, cubic);
+  for (size_t i = 0; i < 3 * s->lung_count; ++i) {
+    gains[i / 3][i % 3] = scale;
   }
-  *amount = low + share * (high - low);
-  return supine_volume_scale(cubic, *amount, scale, NULL) == SUPINE_OK;
+  return reached;
 }
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
   static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1: apart from the angle */
-  const size_t terms = supine_normals_terms(surface->mode_count);
+  const size_t terms = 3 * supine_normals_terms(surface->mode_count);
   const size_t harmonics = supine_sh_count(surface->band);
   const double whole = surface->linear == NULL ? 0.0 : enclosed(surface);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
   double low[9];
   double w[SUPINE_MODES_MAX];
-  *states = (supine_normals_states){.range = {INFINITY, -INFINITY}};
-  states->phi = malloc(count * terms * sizeof *states->phi);
+  *states = (supine_normals_states){.room = count, .range = {INFINITY, -INFINITY}};
+  states->phi = malloc(surface->lung_count * count * terms * sizeof *states->phi);
   if (states->phi == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t i = 0; i < count; ++i) {
     const double at = (double)i + shift;
+    const double share = fmod(at * volume_share, 1.0);
     double g[3];
     supine_spiral(at, (double)count, 0.0, g);
-    double scale = 0.0;
+    double gains[SUPINE_LUNGS_MAX][3];
     double amount = 0.0;
     (void)supine_sh_evaluate(surface->band, g, y);
     (void)supine_sh_evaluate(2, g, low);
@@ -114,8 +147,12 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
         w[k] += surface->modes[k * harmonics + h] * y[h];
       }
     }
-    if (scale_of(surface, low, w, whole, fmod(at * volume_share, 1.0), &scale, &amount)) {
-      supine_normals_monomials(surface->mode_count, w, scale, states->phi + states->count * terms);
+    if (surface->resting != NULL ? gains_from_rest(surface, low, w, share, gains, &amount)
+                                 : common_gain(surface, w, whole, share, gains, &amount)) {
+      for (size_t lung = 0; lung < surface->lung_count; ++lung) {
+        supine_normals_monomials(surface->mode_count, w, gains[lung],
+                                 states->phi + (lung * count + states->count) * terms);
+      }
       states->range[0] = fmin(states->range[0], amount);
       states->range[1] = fmax(states->range[1], amount);
       ++states->count;

@@ -5,10 +5,11 @@
 
 #include "precompute/normals/normals.h"
 
-/* Postures and volumes, as monomials of scale x weights. */
+/* Postures and volumes, as monomials of weights and gains. */
 typedef struct supine_normals_states {
   size_t count; /* S, of those that are reached */
-  double *phi;  /* [S, terms] */
+  size_t room;
+  double *phi; /* [G, room, 3, terms] */
   double range[2];
 } supine_normals_states;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* From a scan up to full inflation: Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of
- * p -> scan - s F(g; p) d(p). Of the last steps' residuals r that combination is taken which leaves
- * least, and the same combination of their images is where the next step begins. */
+ * p_j -> scan_j - A_j F(g; p) d_j(p). Of the last steps' residuals r that combination is taken
+ * which leaves least, and the same combination of their images is where the next step begins. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,36 +64,90 @@ static supine_status check_folds(const ascent *a, double gain, supine_error *err
                                 100.0 * share, 100.0 * folded_share, folded * gain, gain);
 }
 
-/* The field of the lungs so far, laid on the scan, each lung with the scale at which it holds its
+/* Find the gains of one lung's scan, A = s (sigma + 2 bend e(sigma)), with the field's form on the
+ * scan: at -A the lung holds `lacks` more, its reference volume, and at s - A, at rest, `to_rest`
+ * more. s follows from the former at any sigma; sigma by secants from the latter. */
+static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
+                                     bool at_rest, double lacks, double to_rest, double gains[3],
+                                     supine_error *error) {
+  enum { STEPS = 50 };
+  static const double met = 1e-9; /* mL */
+  const bool straight = at_rest || (bend[0] == 0.0 && bend[1] == 0.0 && bend[2] == 0.0);
+  double sigma = straight ? 1.0 : lacks / (lacks - to_rest);
+  double last_sigma = 0.0;
+  double last = 0.0;
+  for (int i = 0; i < STEPS; ++i) {
+    double ratio[3];
+    double cubic[3];
+    double scale = 0.0;
+    supine_volume_bend(bend, sigma, ratio);
+    supine_volume_form_along(form, ratio, cubic);
+    const supine_status status = supine_volume_scale(cubic, lacks, &scale, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    double beyond[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      gains[axis] = -scale * ratio[axis];
+      beyond[axis] = -scale - gains[axis];
+    }
+    const double off = supine_volume_form_at(form, beyond) - to_rest;
+    if (straight || fabs(off) <= met) {
+      return SUPINE_OK;
+    }
+    const double next = i == 0 ? 1.01 * sigma : sigma - off * (sigma - last_sigma) / (off - last);
+    last_sigma = sigma;
+    last = off;
+    sigma = next;
+  }
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "no path from full inflation through the scan to rest was found");
+}
+
+supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
+                                          const double *directions, const double *amounts,
+                                          supine_reference *reference, supine_error *error) {
+  const supine_state *state = &reference->scan.state;
+  const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
+  const double one = 1.0;
+  supine_volume_forms forms = {0};
+  supine_status status =
+      supine_physics_volume_forms_create(scan, NULL, directions, amounts, 1, &forms, error);
+  for (size_t lung = 0; lung < scan->lung_count && status == SUPINE_OK; ++lung) {
+    const double beyond = reference->scan_volume[lung];
+    supine_volume_form form;
+    supine_physics_volume_forms_contract_lung(&forms, lung, &one, &form);
+    status = find_lung_gains(&form, bend, at_rest, -beyond,
+                             reference->scan_rest[lung] - reference->full_volume[lung] - beyond,
+                             reference->scan_gains[lung], error);
+  }
+  supine_physics_volume_forms_free(&forms);
+  return status;
+}
+
+/* The field of the lungs so far, laid on the scan, each lung with the gains at which it holds its
  * reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution field = {0};
-  supine_volume_forms forms = {0};
   a->rms = 0.0;
   ++a->found->solves;
   supine_mesh_box(&a->lungs.mesh, a->lungs.minimum, a->lungs.maximum);
   supine_status status =
       supine_physics_solve(&a->lungs, &a->model, a->found->scan.state.gravity, &field, error);
   if (status == SUPINE_OK) {
-    status = supine_physics_volume_forms_create(&a->scan, NULL, field.directions, field.catch_, 1,
-                                                &forms, error);
+    status = supine_reference_find_gains(&a->scan, a->model.bend, field.directions, field.catch_,
+                                         a->found, error);
   }
   for (size_t lung = 0; lung < a->scan.lung_count && status == SUPINE_OK; ++lung) {
-    const double one = 1.0;
-    double cubic[3];
-    double scale = 0.0;
-    supine_physics_volume_forms_contract_lung(&forms, lung, &one, cubic);
-    status = supine_volume_scale(cubic, -a->found->scan_volume[lung], &scale, error);
-    a->found->scan_scale[lung] = -scale;
-    for (size_t i = 3 * a->scan.lung_begin[lung];
-         status == SUPINE_OK && i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
-      a->image[i] = a->scan.mesh.vertices[i] + scale * field.catch_[i / 3] * field.directions[i];
+    const double *gains = a->found->scan_gains[lung];
+    for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
+      a->image[i] =
+          a->scan.mesh.vertices[i] - gains[i % 3] * field.catch_[i / 3] * field.directions[i];
       const double residual = a->image[i] - a->lungs.mesh.vertices[i];
       a->rms += residual * residual;
     }
   }
   a->rms = sqrt(a->rms / (double)(a->size / 3));
-  supine_physics_volume_forms_free(&forms);
   supine_physics_solution_free(&field);
   return status;
 }

@@ -1,13 +1,25 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The fixed point p = scan - s F(g; p) d(p), by Anderson's acceleration. */
+/* The fixed point p_j = scan_j - A_j F(g; p) d_j(p), by Anderson's acceleration. */
 #ifndef SUPINE_INFLATE_H
 #define SUPINE_INFLATE_H
 
 #include "precompute/physics/reference.h"
 
 /* Take lungs as scanned to their reference volumes, in place. `found` brings the scan and the
- * volumes, and gets scales, solves and the largest move. Statuses as supine_reference_find. */
+ * volumes, and gets gains, solves and the largest move. Statuses as supine_reference_find. */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *found, supine_error *error);
+
+/* Find the gains of the scan, where the field counts from the reference surface but is laid on the
+ * scan: the volumes of full inflation, of rest and of the scan are then all met.
+ * @param scan        lungs with the scan's vertices
+ * @param directions  [N, 3] d, mm
+ * @param amounts     [N] F along the scan's gravity
+ * @param reference   its volumes; scan_gains are written
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way
+ * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_OPEN_SURFACE */
+supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
+                                          const double *directions, const double *amounts,
+                                          supine_reference *reference, supine_error *error);
 
 #endif

@@ -4,10 +4,11 @@
 
 #define LIST(...)                                                                                  \
   { __VA_ARGS__ }
-#define MODEL(id, name, base_, gain_, box_, constants, reach_, pair_, what)                        \
+#define MODEL(id, name, base_, gain_, box_, constants, bend_, reach_, pair_, what)                 \
   {.law = SUPINE_LAW_##id,                                                                         \
    .force = {.base = base_, .gain = gain_, .box = LIST box_, .pair = pair_},                       \
    .direction = {.c = LIST constants},                                                             \
+   .bend = LIST bend_,                                                                             \
    .reach = reach_,                                                                                \
    .share = {1.0, 1.0}},
 #define NAME(id, name, ...) name,

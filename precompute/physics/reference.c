@@ -42,7 +42,7 @@ static double line(double rest, double full, double t) {
 double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml) {
   double sum = 0.0;
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    ml[lung] = (reference->full_volume[lung] - reference->anchored[lung]) *
+    ml[lung] = reference->full_volume[lung] *
                supine_reference_resting_share(&reference->resting, reference->side[lung], g);
     sum += ml[lung];
   }
@@ -141,12 +141,13 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     apart = apart || found.scan_volume[lung] != 0.0;
   }
-  if (status == SUPINE_OK && apart) {
-    status = supine_reference_inflate(lungs, model, &found, error);
-  }
   if (status == SUPINE_OK) {
     status = supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
                                              found.full_volume, error);
+  }
+  if (status == SUPINE_OK && apart) {
+    (void)supine_reference_rest(&found, scan->state.gravity, found.scan_rest);
+    status = supine_reference_inflate(lungs, model, &found, error);
   }
   found.known = status == SUPINE_OK;
   if (found.known) {

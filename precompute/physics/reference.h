@@ -6,11 +6,12 @@
  * are the emptiest (Milic-Emili 1966; Glazier 1967 found alveoli of one size at 30 cmH2O). So the
  * field counts from there, down to rest and beyond:
  *
- *     x_i(g, s) = p_i + s F_i(g) d_i       p: the full surface; s <= 0 below it, from the volume
+ *     x_ij(g) = p_ij + A_j F_i(g) d_ij     p: the full surface; A: gains of each lung, from its
+ *                                          volume (supine_volume_form_gains)
  *
  * A scan is one such state of unknown p. Its F and d are those of p, so that p is a fixed point,
  *
- *     p = scan - s F(g_scan; p) d(p),      s of each lung from the volume that the scan lacks
+ *     p_j = scan_j - A_j F(g_scan; p) d_j(p)       A from the volume that the scan lacks
  *
  * and lungs of one person come out alike whatever state they were scanned in. */
 #ifndef SUPINE_REFERENCE_H
@@ -46,12 +47,11 @@ typedef struct supine_reference {
   size_t lung_count;
   int side[2];           /**< +1 left, -1 right */
   double full_volume[2]; /**< F, of the reference surface */
-  double anchored[2];    /**< part of F that came with meeting the scan by a compressed field: rest
-                            is a share of F without it */
   double scan_volume[2]; /**< of the scan beyond F: negative below full inflation */
-  double scan_scale[2];  /**< s of the scan */
-  size_t solves;         /**< of the fixed point */
-  double moved;          /**< largest distance from the scan to the reference surface, mm */
+  double scan_rest[2];   /**< at rest in the scan's posture, where the scan is not the reference */
+  double scan_gains[2][3]; /**< A of the scan */
+  size_t solves;           /**< of the fixed point */
+  double moved;            /**< largest distance from the scan to the reference surface, mm */
 } supine_reference;
 
 /** Take lungs as scanned to the reference, in place. An open surface has no volumes: it must be

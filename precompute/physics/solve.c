@@ -59,7 +59,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
       goto cleanup;
     }
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      supine_physics_volume_forms_contract_lung(&forms, lung, &one, made.lung_cubic[lung]);
+      supine_physics_volume_forms_contract_lung(&forms, lung, &one, &made.form[lung]);
     }
     supine_physics_volume_forms_contract(&forms, &one, made.cubic);
   }

@@ -4,6 +4,8 @@
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
+#include <supine/volume.h>
+
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 
@@ -14,7 +16,7 @@ typedef struct supine_solution {
   double *directions; /**< [N, 3] d, mm */
   bool has_volume;    /**< the surface is closed, and cubic is set */
   double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
-  double lung_cubic[2][3]; /**< of each lung */
+  supine_volume_form form[2]; /**< of each lung, of three gains */
   supine_solve_report report;
 } supine_solution;
 

@@ -2,13 +2,13 @@
 /** @file
  * Volume of a deformed lung without a pass over its vertices.
  *
- * With u_i = s (sum over k of w_k c_ik) d_i, the volume that a closed surface gains is
- *
- *     V(s) - V(0) = s sum_k L_k w_k + s^2 sum_kl Q_kl w_k w_l + s^3 sum_klm T_klm w_k w_l w_m
- *
- * The forms are computed for any set of columns c, once, and follow them through any linear mix. */
+ * With u_ij = A_j (sum over k of w_k c_ik) d_ij, the volume that a closed surface gains is a
+ * polynomial of the gains A and the weights w (supine/volume.h). Its forms are computed for any set
+ * of columns c, once, and follow them through any linear mix. */
 #ifndef SUPINE_VOLUME_FORMS_H
 #define SUPINE_VOLUME_FORMS_H
+
+#include <supine/volume.h>
 
 #include "precompute/lungs/lungs.h"
 
@@ -19,8 +19,8 @@ enum { SUPINE_MODES_MADE_MAX = 64 };
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
-  double *linear;    /**< [G, K] */
-  double *quadratic; /**< [G, K, K] symmetric */
+  double *linear;    /**< [G, 3, K] */
+  double *quadratic; /**< [G, 3, K, K] symmetric in K, K */
   double *cubic;     /**< [G, K, K, K] symmetric */
 } supine_volume_forms;
 
@@ -38,7 +38,7 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
-/** The same for vector fields, u_i = s sum over k of w_k c_ik with c_ik of three components.
+/** The same for vector fields, u_ij = A_j sum over k of w_k c_ikj.
  * @param columns  [N, 3, count] */
 supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
                                                         const double *columns, size_t count,
@@ -50,12 +50,13 @@ supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lung
 supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
                                               size_t count, supine_volume_forms *mixed);
 
-/** Coefficients of s, s^2 and s^3 for weights [K], summed over the lungs: into cubic [3], mL. */
+/** The form of one lung for weights [K], mL. */
+void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
+                                               const double *weights, supine_volume_form *form);
+
+/** Coefficients of s, s^2 and s^3 where all gains are s, summed over the lungs: into cubic [3], mL.
+ */
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
-
-/** The same of one lung. */
-void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
-                                               const double *weights, double cubic[3]);
 
 #endif

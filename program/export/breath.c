@@ -2,6 +2,7 @@
 /* How deep a breath is: by volume where the surface is closed, by displacement where it is open. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <supine/volume.h>
 
@@ -41,22 +42,46 @@ supine_status supine_export_breath_set(const export_source *source, double volum
   return SUPINE_OK;
 }
 
-/* One gain for all lungs, at which they hold together what they hold in the pose. */
-static supine_status share_one_gain(const export_source *source, supine_pose *pose,
-                                    supine_error *error) {
-  const size_t k = source->info->mode_count;
+/* mL beyond the reference that all lungs hold in a state; the pose has the state's weights. */
+static supine_status held_in(const export_source *source, const supine_state *state,
+                             supine_pose *pose, double *beyond, supine_error *error) {
   double held[SUPINE_LUNGS_MAX];
-  double cubic[3] = {0};
-  double beyond = 0;
-  double gain = 0;
-  supine_basis_volumes(source->basis, pose, held);
-  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
-    beyond += held[lung] - source->info->reference_volume[lung];
-    supine_volume_add(k, source->linear + lung * k, source->quadratic + lung * k * k,
-                      source->cubic + lung * k * k * k, pose->weights, cubic);
+  const supine_status status = supine_basis_pose(source->basis, state, pose, error);
+  *beyond = 0;
+  for (size_t lung = 0; status == SUPINE_OK && lung < source->info->lung_count; ++lung) {
+    supine_basis_volumes(source->basis, pose, held);
+    *beyond += held[lung] - source->info->reference_volume[lung];
   }
-  const supine_status status = supine_volume_scale(cubic, beyond, &gain, error);
-  supine_pose_fill(pose, gain);
+  return status;
+}
+
+/* The same gains for all lungs, at which they hold together what they do in the state. */
+static supine_status find_common_gains(const export_source *source, const supine_state *state,
+                                       supine_pose *pose, supine_error *error) {
+  const supine_basis_info *info = source->info;
+  const size_t k = info->mode_count;
+  const size_t axes = info->volume_axes;
+  supine_state resting = *state;
+  supine_volume_form form = {{0}};
+  double rest = 0;
+  double beyond = 0;
+  resting.volume.ml = 0;
+  supine_status status = held_in(source, &resting, pose, &rest, error);
+  if (status == SUPINE_OK) {
+    status = held_in(source, state, pose, &beyond, error);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_volume_contract(k, axes, info->volume_linear + lung * axes * k,
+                           info->volume_quadratic + lung * axes * k * k,
+                           info->volume_cubic + lung * k * k * k, pose->weights, &form);
+  }
+  status = supine_volume_form_gains(&form, info->bend, rest, beyond, pose->gains[0], error);
+  for (size_t lung = 1; lung < info->lung_count; ++lung) {
+    memcpy(pose->gains[lung], pose->gains[0], sizeof pose->gains[0]);
+  }
   return status;
 }
 
@@ -70,9 +95,6 @@ supine_status supine_export_breath_pose(const export_source *source, const expor
   const supine_volume_kind from = source->info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
   const supine_state state = {.gravity = {g[0], g[1], g[2]},
                               .volume = {from, fraction * breath->volume}};
-  const supine_status status = supine_basis_pose(source->basis, &state, pose, error);
-  if (status != SUPINE_OK || source->resting_rows < 2) {
-    return status;
-  }
-  return share_one_gain(source, pose, error);
+  return source->resting_rows < 2 ? supine_basis_pose(source->basis, &state, pose, error)
+                                  : find_common_gains(source, &state, pose, error);
 }

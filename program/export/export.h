@@ -20,12 +20,10 @@ typedef struct export_source {
   const float *direction;    /**< [N, 3]; NULL where the kind is vector */
   const float *coefficients; /**< [N, K] or [N, 3, K] */
   const double *modes;       /**< [K, (L+1)^2] */
-  const double *linear;      /**< [G, K], mL; NULL where the surface is open; likewise: */
-  const double *quadratic;   /**< [G, K, K] */
-  const double *cubic;       /**< [G, K, K, K] */
   const double *resting;     /**< [resting_rows, EXPORT_RESTING_TERMS], mL at rest beyond the
                                 reference surface; where info->has_rest */
   size_t resting_rows;       /**< G, or 1 for all lungs together */
+  bool bent;                 /**< gains differ between axes */
 } export_source;
 
 /** Opens a basis file.
@@ -36,8 +34,9 @@ supine_status supine_export_source_open(const char *path, export_source *source,
 /** Releases it; a zeroed one is legal. */
 void supine_export_source_close(export_source *source);
 
-/** Displacement u_k of vertex `vertex` for a weight of 1 in mode `mode`, mm. */
-void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
+/** Displacement of vertex `vertex` for a weight of 1 in field `field`, mm: of mode `field`, or from
+ * K on of mode `field` - K with each axis times its bend. */
+void supine_export_field(const export_source *source, size_t vertex, size_t field, double u[3]);
 
 /** How deep a breath is. */
 typedef struct export_breath {
@@ -54,7 +53,7 @@ supine_status supine_export_breath_set(const export_source *source, double volum
                                        export_breath *breath, supine_error *error);
 
 /** The pose at a fraction of the breath (0 rest, or the scan where no rest is known; 1 all of it),
- * with one gain for all lungs, as morph targets have it.
+ * with the same gains for all lungs, as morph targets have it.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
 supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
                                         const double g[3], double fraction, supine_pose *pose,
@@ -93,11 +92,12 @@ typedef struct export_glb_report {
  *     weight_k   = (s sum over lm of modes[k, lm] Y_lm(g) - offset_k) / unit_k
  *
  * with modes, offset, unit and the volume forms that give s in the mesh's `extras`, and vertices
- * in the basis' order. Each lung is a primitive of its own material, named for it. Targets hold
- * normals as well: the linear change with the weights that fits the surface's own best, over
- * breaths up to `breath` in all postures. What is inside is a mesh of the same targets, each part a
- * primitive of a material of its name; points are balls of 4 mm. The node turns and scales
- * millimetres LPS to glTF's metres, y up.
+ * in the basis' order. Where gains differ between axes, A_j = s + t bend_j, there are K targets
+ * more for the bend, whose weights have t in the place of s. Each lung is a primitive of its own
+ * material, named for it. Targets hold normals as well: the linear change with the weights that
+ * fits the surface's own best, over breaths up to `breath` in all postures. What is inside is a
+ * mesh of the same targets, each part a primitive of a material of its name; points are balls of 4
+ * mm. The node turns and scales millimetres LPS to glTF's metres, y up.
  * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */

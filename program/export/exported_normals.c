@@ -22,7 +22,7 @@
 
 #include "program/export/targets.h"
 
-enum { POSES = 96, PARTS = 5 };
+enum { POSES = EXPORT_POSES, PARTS = 5 };
 static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
 
 /* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
@@ -52,7 +52,7 @@ static supine_status find_turn(size_t count, const export_pose *pose, double *tu
   static const double at_rest = 10.0;
   double *a = malloc(POSES * count * sizeof *a);
   double right[POSES];
-  double s[SUPINE_MODES_MAX];
+  double s[EXPORT_TARGETS_MAX];
   lapack_int rank = 0;
   supine_status status = SUPINE_ERROR_MEMORY;
   if (a != NULL) {
@@ -123,7 +123,7 @@ supine_status supine_export_targets_normals(const export_source *source,
   float *xyz = malloc(3 * n * sizeof *xyz);
   float *normals = malloc(3 * n * sizeof *normals);
   double *a = malloc(POSES * targets->count * sizeof *a);
-  double turn[SUPINE_MODES_MAX];
+  double turn[EXPORT_TARGETS_MAX];
   if (pose == NULL || xyz == NULL || normals == NULL || a == NULL) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;

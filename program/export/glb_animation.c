@@ -32,18 +32,14 @@ static void rotation_at(double roll, float q[4]) {
 static supine_status make_frame(const export_source *source, const export_glb_options *options,
                                 const export_targets *targets, double seconds, float *row,
                                 supine_error *error) {
-  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
-  double weights[SUPINE_MODES_MAX];
+  export_pose pose;
   const double roll = roll_at(seconds);
   const double g[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
-  supine_pose pose = {.gains = {{0}}};
   const supine_status status =
-      supine_export_breath_pose(source, &options->breath, g, fraction, &pose, error);
-  (void)supine_sh_evaluate(source->info->band, g, y);
-  supine_export_targets_weights(targets, source->terms, y, pose.gains[0][0], weights);
+      supine_export_targets_at(source, &options->breath, targets, g, fraction, &pose, error);
   for (size_t j = 0; j < targets->count; ++j) {
-    row[j] = (float)weights[j];
+    row[j] = (float)pose.weights[j];
   }
   return status;
 }

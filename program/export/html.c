@@ -112,6 +112,16 @@ static void write_triangles(FILE *file, const char *name, const export_source *s
   (void)fputs("</script>\n", file);
 }
 
+/* A tensor of doubles as the basis has it. */
+static void write_all(FILE *file, const char *name, const export_source *s, const char *of) {
+  const supine_tensor *tensor = supine_basis_tensor(s->basis, of);
+  size_t bytes = sizeof(double);
+  for (size_t i = 0; i < tensor->rank; ++i) {
+    bytes *= tensor->shape[i];
+  }
+  write_tensor(file, name, tensor->data, bytes);
+}
+
 /* The normals' words, some vertices after the other: 12 bytes of each word and vertex, so that
  * base64 has no remainder between. */
 static void write_normals(FILE *file, const export_source *s) {
@@ -119,7 +129,6 @@ static void write_normals(FILE *file, const export_source *s) {
   uint32_t words[AT_ONCE * (SUPINE_NORMAL_MODES_MAX + 2)];
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->normal_count;
-  const size_t terms = (s->info->mode_count + 1) * (s->info->mode_count + 2) / 2;
   (void)fputs("<script type=\"text/plain\" id=\"tensor-normals\">", file);
   for (size_t i = 0; i < n; i += AT_ONCE) {
     const size_t end = i + AT_ONCE < n ? i + AT_ONCE : n;
@@ -127,8 +136,7 @@ static void write_normals(FILE *file, const export_source *s) {
     supine_export_base64_write(words, (end - i) * ((modes + 2) / 3) * 3 * sizeof *words, file);
   }
   (void)fputs("</script>\n", file);
-  write_tensor(file, "normal-weights", s->info->normal_weights,
-               s->info->lung_count * modes * terms * sizeof(double));
+  write_all(file, "normal-weights", s, "normal_weights");
 }
 
 /* Each map's 256 colours as hexadecimal digits. */
@@ -243,7 +251,7 @@ static json_t *describe(const page *p) {
   const export_breath *breath = &p->shown->breath;
   return json_pack(
       "{s:I, s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, "
-      "s:f}",
+      "s:f, s:I, s:o}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
       (json_int_t)info->band, "lungBegin", lung_begins(info), "hasVolume", (int)info->has_volume,
@@ -252,7 +260,8 @@ static json_t *describe(const page *p) {
       metadata, "title", title != NULL ? title : json_string("lungs"), "units",
       numbers(p->unit, info->mode_count), "inside", describe_inside(p), "from", describe_from(p),
       "references", numbers(info->reference_volume, info->lung_count), "scanVolume",
-      scan_volume(p->source));
+      scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
+      numbers(info->bend, 3));
 }
 
 /* {{tensors}} */
@@ -264,7 +273,6 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   }
   const size_t n = s->info->vertex_count;
   const size_t k = s->info->mode_count;
-  const size_t g = s->info->lung_count;
   write_tensor(file, "vertices", s->vertices, 3 * n * sizeof *s->vertices);
   write_counts(file, "direction", p, 3 * n, direction_at);
   write_counts(file, "coefficients", p, n * k, coefficient_at);
@@ -274,13 +282,12 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
     write_normals(file, s);
   }
   if (s->info->has_rest) {
-    write_tensor(file, "resting", s->resting,
-                 s->resting_rows * EXPORT_RESTING_TERMS * sizeof *s->resting);
+    write_all(file, "resting", s, "resting_volume");
   }
   if (s->info->has_volume) {
-    write_tensor(file, "linear", s->linear, g * k * sizeof *s->linear);
-    write_tensor(file, "quadratic", s->quadratic, g * k * k * sizeof *s->quadratic);
-    write_tensor(file, "cubic", s->cubic, g * k * k * k * sizeof *s->cubic);
+    write_all(file, "linear", s, "volume_linear");
+    write_all(file, "quadratic", s, "volume_quadratic");
+    write_all(file, "cubic", s, "volume_cubic");
   }
   if (p->shown->inside != NULL) {
     const export_source *inside = p->shown->inside;

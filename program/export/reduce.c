@@ -65,7 +65,7 @@ typedef struct matrices {
 static bool reduce(const export_source *source, matrices *m, export_targets *targets) {
   const size_t modes = source->info->mode_count;
   const int k = (int)modes;
-  const int count = (int)targets->count;
+  const int count = (int)targets->mixes;
   const int terms = (int)source->terms;
   gram(source, m->gram);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, k, k, terms, 1, source->modes, terms,
@@ -106,7 +106,7 @@ supine_status supine_export_targets_reduce(const export_source *source, size_t l
   if (m == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  targets->count = limit < k ? limit : k;
+  targets->mixes = limit < k ? limit : k;
   targets->mixed = true;
   const bool found = reduce(source, m, targets);
   free(m);

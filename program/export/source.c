@@ -19,13 +19,13 @@ supine_status supine_export_source_open(const char *path, export_source *source,
   made.direction = made.info->direction;
   made.coefficients = made.info->coefficients;
   made.modes = made.info->modes;
-  made.linear = made.info->volume_linear;
-  made.quadratic = made.info->volume_quadratic;
-  made.cubic = made.info->volume_cubic;
   const supine_tensor *resting = supine_basis_tensor(made.basis, "resting_volume");
   if (made.info->has_rest) {
     made.resting = resting->data;
     made.resting_rows = resting->rank == 2 ? resting->shape[0] : 1;
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    made.bent = made.bent || made.info->bend[axis] != 0;
   }
   *source = made;
   return SUPINE_OK;
@@ -36,11 +36,13 @@ void supine_export_source_close(export_source *source) {
   *source = (export_source){0};
 }
 
-void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]) {
+void supine_export_field(const export_source *source, size_t vertex, size_t field, double u[3]) {
   const size_t k = source->info->mode_count;
+  const size_t mode = field % k;
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = source->info->vector ? (double)source->coefficients[(3 * vertex + axis) * k + mode]
                                    : (double)source->coefficients[vertex * k + mode] *
                                          (double)source->direction[3 * vertex + axis];
+    u[axis] *= field < k ? 1 : source->info->bend[axis];
   }
 }

@@ -16,8 +16,8 @@ static bool allocate(const export_source *source, export_targets *targets) {
   const size_t k = source->info->mode_count;
   targets->mix = calloc(k * k, sizeof *targets->mix);
   targets->modes = calloc(k * source->terms, sizeof *targets->modes);
-  targets->offset = calloc(k, sizeof *targets->offset);
-  targets->unit = calloc(k, sizeof *targets->unit);
+  targets->offset = calloc(2 * k, sizeof *targets->offset);
+  targets->unit = calloc(2 * k, sizeof *targets->unit);
   return targets->mix != NULL && targets->modes != NULL && targets->offset != NULL &&
          targets->unit != NULL;
 }
@@ -32,35 +32,46 @@ void supine_export_targets_free(export_targets *targets) {
 
 static void keep_modes(const export_source *source, export_targets *targets) {
   const size_t k = source->info->mode_count;
-  targets->count = k;
+  targets->mixes = k;
   for (size_t i = 0; i < k; ++i) {
     targets->mix[i * k + i] = 1;
   }
   memcpy(targets->modes, source->modes, k * source->terms * sizeof *targets->modes);
 }
 
-void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
-                                   double scale, double *weights) {
-  for (size_t j = 0; j < targets->count; ++j) {
-    double sum = 0;
-    for (size_t t = 0; t < terms; ++t) {
-      sum += targets->modes[j * terms + t] * y[t];
-    }
-    weights[j] = (scale * sum - targets->offset[j]) / targets->unit[j];
+/* The gains as s + t bend, of the axes that bend least and most. */
+static void split_gains(const double bend[3], const double gains[3], double *s, double *t) {
+  size_t low = 0;
+  size_t high = 0;
+  for (size_t axis = 1; axis < 3; ++axis) {
+    low = bend[axis] < bend[low] ? axis : low;
+    high = bend[axis] > bend[high] ? axis : high;
   }
+  *t = low == high ? 0 : (gains[high] - gains[low]) / (bend[high] - bend[low]);
+  *s = gains[low] - *t * bend[low];
 }
 
 supine_status supine_export_targets_at(const export_source *source, const export_breath *breath,
                                        const export_targets *targets, const double g[3],
                                        double fraction, export_pose *pose, supine_error *error) {
+  const size_t terms = source->terms;
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
+  double gain[2];
   const supine_status status =
       supine_export_breath_pose(source, breath, g, fraction, &pose->basis, error);
   if (status != SUPINE_OK) {
     supine_pose_fill(&pose->basis, 0);
   }
   (void)supine_sh_evaluate(source->info->band, g, y);
-  supine_export_targets_weights(targets, source->terms, y, pose->basis.gains[0][0], pose->weights);
+  split_gains(source->info->bend, pose->basis.gains[0], &gain[0], &gain[1]);
+  for (size_t j = 0; j < targets->count; ++j) {
+    const double *mode = targets->modes + j % targets->mixes * terms;
+    double sum = 0;
+    for (size_t t = 0; t < terms; ++t) {
+      sum += mode[t] * y[t];
+    }
+    pose->weights[j] = (gain[j / targets->mixes] * sum - targets->offset[j]) / targets->unit[j];
+  }
   return status;
 }
 
@@ -103,21 +114,31 @@ static void fit_ranges(const double *low, const double *high, bool shift, export
   }
 }
 
+/* sum += factor * mix[:, j] . u */
+static void add_mix(const export_source *source, const export_targets *targets, size_t j,
+                    double factor, size_t vertex, double sum[3]) {
+  const size_t k = source->info->mode_count;
+  const size_t mix = j % targets->mixes;
+  const size_t first = targets->mixed ? 0 : mix;
+  const size_t last = targets->mixed ? k : mix + 1;
+  for (size_t a = first; a < last; ++a) {
+    const double amount = factor * targets->mix[a * targets->mixes + mix];
+    double u[3];
+    supine_export_field(source, vertex, j < targets->mixes ? a : k + a, u);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      sum[axis] += amount * u[axis];
+    }
+  }
+}
+
 /* Largest component of each target, mm. */
 static void find_sizes(const export_source *source, const export_targets *targets, double *size) {
-  const size_t k = source->info->mode_count;
   for (size_t i = 0; i < source->info->vertex_count; ++i) {
-    double u[SUPINE_MODES_MAX][3];
-    for (size_t a = 0; a < k; ++a) {
-      supine_export_field(source, i, a, u[a]);
-    }
     for (size_t j = 0; j < targets->count; ++j) {
+      double sum[3] = {0, 0, 0};
+      add_mix(source, targets, j, targets->unit[j], i, sum);
       for (size_t axis = 0; axis < 3; ++axis) {
-        double sum = 0;
-        for (size_t a = 0; a < k; ++a) {
-          sum += targets->mix[a * targets->count + j] * u[a][axis];
-        }
-        size[j] = fmax(size[j], fabs(targets->unit[j] * sum));
+        size[j] = fmax(size[j], fabs(sum[axis]));
       }
     }
   }
@@ -126,7 +147,7 @@ static void find_sizes(const export_source *source, const export_targets *target
 /* One count for all targets: the largest fills it, the smaller get a larger unit to fill it too, so
  * that each loses half a count of its own size at most. */
 static void fit_counts(const export_source *source, export_targets *targets) {
-  double size[SUPINE_MODES_MAX] = {0};
+  double size[EXPORT_TARGETS_MAX] = {0};
   double largest = 0;
   find_sizes(source, targets, size);
   for (size_t j = 0; j < targets->count; ++j) {
@@ -141,19 +162,22 @@ static void fit_counts(const export_source *source, export_targets *targets) {
 supine_status supine_export_targets_choose(const export_source *source,
                                            const export_glb_options *options,
                                            export_targets *targets, supine_error *error) {
-  double low[SUPINE_MODES_MAX] = {0};
-  double high[SUPINE_MODES_MAX] = {0};
+  double low[EXPORT_TARGETS_MAX] = {0};
+  double high[EXPORT_TARGETS_MAX] = {0};
   export_targets made = {.count_mm = 1};
   supine_status status = SUPINE_OK;
   if (!allocate(source, &made)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
   }
-  if (options->eight && source->info->mode_count > EIGHT) {
-    status = supine_export_targets_reduce(source, EIGHT, &made, error);
+  const size_t k = source->info->mode_count;
+  const size_t halves = source->bent && 2 * k <= EXPORT_POSES ? 2 : 1;
+  if (options->eight && halves * k > EIGHT) {
+    status = supine_export_targets_reduce(source, EIGHT / halves, &made, error);
   } else {
     keep_modes(source, &made);
   }
+  made.count = halves * made.mixes;
   for (size_t j = 0; j < made.count; ++j) {
     made.unit[j] = 1;
   }
@@ -170,22 +194,6 @@ cleanup:
   }
   *targets = made;
   return status;
-}
-
-/* xyz += factor * mix[:, j] . u, from mm to stored units. */
-static void add_mix(const export_source *source, const export_targets *targets, size_t j,
-                    double factor, size_t vertex, double sum[3]) {
-  const size_t k = source->info->mode_count;
-  const size_t first = targets->mixed ? 0 : j;
-  const size_t last = targets->mixed ? k : j + 1;
-  for (size_t a = first; a < last; ++a) {
-    const double amount = factor * targets->mix[a * targets->count + j];
-    double u[3];
-    supine_export_field(source, vertex, a, u);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      sum[axis] += amount * u[axis];
-    }
-  }
 }
 
 void supine_export_targets_fill(const export_source *source, const export_targets *targets,

@@ -9,14 +9,18 @@
 /** J targets, each a mix of the basis' K modes:
  *
  *     target_j = unit_j sum over k of mix[k, j] u_k          base = rest + sum of offset_j mix u
- *     weight_j = (s sum over lm of modes[j, lm] Y_lm(g) - offset_j) / unit_j */
+ *     weight_j = (s sum over lm of modes[j, lm] Y_lm(g) - offset_j) / unit_j
+ *
+ * Where gains differ between axes, A = s + t bend, J as many follow of the bend's fields with the
+ * same mix and modes and t in the place of s. */
 typedef struct export_targets {
-  size_t count;
+  size_t count;        /**< J, or 2 J */
+  size_t mixes;        /**< J */
   bool mixed;          /**< false: mix is the identity */
   double *mix;         /**< [K, J] */
   double *modes;       /**< [J, (L+1)^2] */
-  double *offset;      /**< [J] */
-  double *unit;        /**< [J] */
+  double *offset;      /**< [count] */
+  double *unit;        /**< [count] */
   double loss_percent; /**< see export_glb_report */
   double count_mm;     /**< what one stored unit of length is, mm: 1, or a count's when quantised */
 } export_targets;
@@ -30,14 +34,14 @@ supine_status supine_export_targets_choose(const export_source *source,
 /** Releases them; a zeroed one is legal. */
 void supine_export_targets_free(export_targets *targets);
 
-/** Weights [J] at breath scale `scale` from the basis' Y [(L+1)^2]. */
-void supine_export_targets_weights(const export_targets *targets, size_t terms, const double *y,
-                                   double scale, double *weights);
+/** Most targets; and the poses that normals are fitted to, more than which the bend's targets may
+ * not make it. */
+enum { EXPORT_TARGETS_MAX = SUPINE_MODES_MAX, EXPORT_POSES = 96 };
 
 /** The lungs at a fraction of the breath. */
 typedef struct export_pose {
-  supine_pose basis;                /**< the basis' */
-  double weights[SUPINE_MODES_MAX]; /**< the targets' */
+  supine_pose basis;                  /**< the basis' */
+  double weights[EXPORT_TARGETS_MAX]; /**< the targets' */
 } export_pose;
 
 /** @retval SUPINE_ERROR_NUMERICAL  the surface folds before: the pose is the reference surface */
@@ -45,8 +49,8 @@ supine_status supine_export_targets_at(const export_source *source, const export
                                        const export_targets *targets, const double g[3],
                                        double fraction, export_pose *pose, supine_error *error);
 
-/** Normals of the base [N, 3], unit length, and what each weight adds to them, [J, N, 3], before
- * they are made unit again: the least-squares fit to the surface's own over postures and the
+/** Normals of the base [N, 3], unit length, and what each weight adds to them, [count, N, 3],
+ * before they are made unit again: the least-squares fit to the surface's own over postures and the
  * breath.
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source,

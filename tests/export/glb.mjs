@@ -35,33 +35,47 @@ async function open(path) {
   return { gltf, meshes, mesh: meshes[0] };
 }
 
-/** Root of volume(s) = mL that grows out of 0, from the forms in the extras. */
-function breathScale(volume, v, mL) {
+/** What all lungs gain at v, f . (x, y, z, yz, xz, xy, xyz) of the gains, from the forms in the extras. */
+function volumeForm(volume, v, lungs) {
   const k = v.length;
-  const c = [0, 0, 0];
-  for (let j = 0; j < volume.linear.length / k; ++j) {
+  const axes = volume.linear.length / k / lungs;
+  const form = new Float64Array(7);
+  for (let row = 0; row < lungs * axes; ++row) {
     for (let a = 0; a < k; ++a) {
-      c[0] += volume.linear[j * k + a] * v[a];
-      for (let b = 0; b < k; ++b) {
-        const ab = (j * k + a) * k + b;
-        c[1] += volume.quadratic[ab] * v[a] * v[b];
-        for (let d = 0; d < k; ++d) c[2] += volume.cubic[ab * k + d] * v[a] * v[b] * v[d];
-      }
+      form[row % axes] += volume.linear[row * k + a] * v[a];
+      for (let b = 0; b < k; ++b) form[3 + (row % axes)] += volume.quadratic[(row * k + a) * k + b] * v[a] * v[b];
     }
   }
-  let s = mL / c[0];
-  for (let i = 0; i < 50; ++i) {
-    s -= (s * (c[0] + s * (c[1] + s * c[2])) - mL) / (c[0] + s * (2 * c[1] + 3 * s * c[2]));
-  }
-  return s;
+  volume.cubic.forEach((c, i) => { form[6] += c * v[Math.floor(i / k / k) % k] * v[Math.floor(i / k) % k] * v[i % k]; });
+  return form;
 }
 
-/** Weights for a gravity and a volume, as extras.supine.weights says. */
+const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
+
+/** The root of an ascending or descending function near `from`, by secants. */
+function root(f, from) {
+  let [a, b] = [0.9 * from, from];
+  for (let i = 0; i < 50 && f(b) !== f(a); ++i) [a, b] = [b, b - (f(b) * (b - a)) / (f(b) - f(a))];
+  return b;
+}
+
+/** Weights for a gravity and mL beyond the vertices as they are, as extras.supine.weights says. */
 function weightsFor(extras, gravity, mL) {
   const y = harmonics(extras.band, gravity);
   const v = extras.modes.map((row) => row.reduce((sum, m, i) => sum + m * y[i], 0));
-  const s = breathScale(extras.volume, v, mL);
-  return { s, weights: v.map((x, k) => (s * x - extras.offset[k]) / extras.unit[k]) };
+  const form = volumeForm(extras.volume, v, extras.lungBegin.length - 1);
+  const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
+  let [s, t] = [even(mL), 0];
+  if (extras.bend.some((c) => c !== 0)) {
+    const y2 = harmonics(2, gravity);
+    const rest = extras.restingVolume.harmonics.reduce((sum, h, i) => sum + h * y2[i], 0);
+    const r = even(rest);
+    const bent = (q) => 2 * r * (q <= 1 ? (q ** 3 - q) / 2 : 1 - 1 / q);
+    const q = root((at) => formAt(form, extras.bend.map((c) => r * at + c * bent(at))) - mL, mL / rest);
+    [s, t] = [r * q, bent(q)];
+  }
+  const all = extras.offset.length > v.length ? [...v.map((x) => s * x), ...v.map((x) => t * x)] : v.map((x) => s * x);
+  return { s, weights: all.map((x, k) => (x - extras.offset[k]) / extras.unit[k]) };
 }
 
 /** Positions as three.js morphs them, in the patient's axes and millimetres. */

@@ -22,7 +22,7 @@ function told(posture, from) {
   supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', from, '-o', moved);
   const [columns, row] = readFileSync(moved, 'utf8').trim().split('\n').slice(-2).map((line) => line.split(','));
   const largest = /largest displacement ([\d.]+) mm from (.*?),/.exec(supine('deform', basis, '--posture', posture, '--volume', 'rest', '--from', from, '-o', vtp));
-  return { pair: pair.moved_mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml };
+  return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml };
 }
 
 /** What the page shows of it. */

@@ -143,26 +143,26 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** Coefficients c of the mL that lung `lung` gains at scale s: c[0] s + c[1] s^2 + c[2] s^3. */
-function lungCubic(basis, lung, w) {
+/** What lung `lung` gains at weights w, mL, as a polynomial of its three gains:
+ * f . (x, y, z, yz, xz, xy, xyz). Files whose gains are equal have one axis. */
+function lungForm(basis, lung, w) {
   const k = basis.modes;
-  const c = [0, 0, 0];
-  for (let a = 0; a < k; ++a) {
-    let square = 0;
-    let cube = 0;
-    for (let b = 0; b < k; ++b) {
-      const ab = (lung * k + a) * k + b;
-      let row = 0;
-      for (let m = 0; m < k; ++m) row += basis.cubic[ab * k + m] * w[m];
-      square += basis.quadratic[ab] * w[b];
-      cube += row * w[b];
-    }
-    c[0] += basis.linear[lung * k + a] * w[a];
-    c[1] += square * w[a];
-    c[2] += cube * w[a];
+  const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
+  const square = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += w[i] * dot(tensor, at + i * k); return sum; };
+  const form = new Float64Array(7);
+  for (let axis = 0; axis < basis.volumeAxes; ++axis) {
+    const row = lung * basis.volumeAxes + axis;
+    form[axis] = dot(basis.linear, row * k);
+    form[3 + axis] = square(basis.quadratic, row * k * k);
   }
-  return c;
+  for (let i = 0; i < k; ++i) form[6] += w[i] * square(basis.cubic, (lung * k + i) * k * k);
+  return form;
 }
+
+const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
+
+/** Coefficients c of the mL gained where all gains are s: c[0] s + c[1] s^2 + c[2] s^3. */
+const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
@@ -206,6 +206,37 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
+/** The path of the gains from full inflation (sigma 0) to rest (1), relative to those at rest. */
+function pathAt(bend, sigma) {
+  const e = sigma <= 1 ? (sigma ** 3 - sigma) / 2 : 1 - 1 / sigma;
+  return bend.map((c) => sigma + 2 * c * e);
+}
+
+/** The three gains at which a lung of this form holds `volume` beyond the basis' surface, on the path
+ * through `rest`; NaN where the surface would fold before. */
+function gainsForVolume(form, bend, rest, volume) {
+  const straight = bend.every((c) => c === 0) || volume === rest;
+  const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
+  const at = (sigma) => pathAt(bend, sigma).map((ratio) => scale * ratio);
+  if (straight || !Number.isFinite(scale)) return [scale, scale, scale];
+  const side = Math.sign(volume);
+  const step = volume / rest > 0 ? 1 / 16 : -1 / 16;
+  let [near, far, held] = [0, 0, 0];
+  while (side * held < side * volume) {
+    const before = held;
+    near = far;
+    far += step;
+    held = formAt(form, at(far));
+    if (!(side * held > side * before)) return [NaN, NaN, NaN];
+  }
+  for (let halving = 0; halving < 60; ++halving) {
+    const middle = (near + far) / 2;
+    if (side * formAt(form, at(middle)) < side * volume) near = middle;
+    else far = middle;
+  }
+  return at(near);
+}
+
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
 /** What the lungs hold in a posture, mL beyond the basis' surface: at rest and at full inflation, by
@@ -231,15 +262,13 @@ function shareOut({ references }, { rest, full }, total) {
   return references.map((ml, lung) => (total >= resting ? rest[lung] + part * (full[lung] - rest[lung]) : (ml + rest[lung]) * shrunk - ml));
 }
 
-/** The gain of each lung, x, y and z of them alike, at which the lungs hold `total` mL beyond the
- * basis' surface together. */
-function gainsFor(basis, cubics, volumes, total) {
-  if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => scaleForVolume(cubics[lung], ml));
-  const scale = scaleForVolume([0, 1, 2].map((i) => sumOf(cubics.map((c) => c[i]))), total);
-  return cubics.map(() => scale);
+/** The gains of each lung, [x, y, z], at which the lungs hold `total` mL beyond the basis' surface
+ * together. */
+function gainsFor(basis, forms, volumes, total) {
+  if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => gainsForVolume(forms[lung], basis.bend, volumes.rest[lung], ml));
+  const gains = gainsForVolume(forms[0].map((_, i) => sumOf(forms.map((f) => f[i]))), [0, 0, 0], 0, total);
+  return forms.map(() => gains);
 }
-
-const spread = (gains) => Float64Array.from(gains.flatMap((gain) => [gain, gain, gain]));
 
 /** Everything about one moment: the modes' weights, three gains of each lung, and the mL that each
  * lung holds (`held`), gas and tissue. `depth` is mL above rest where the surface is closed, else mm of
@@ -247,31 +276,40 @@ const spread = (gains) => Float64Array.from(gains.flatMap((gain) => [gain, gain,
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   if (!basis.hasVolume) {
-    const gains = spread(Array(basis.lungs).fill((depth / basis.breathLargest) * basis.breathScale));
+    const gains = new Float64Array(3 * basis.lungs).fill((depth / basis.breathLargest) * basis.breathScale);
     return { gravity, weights, gains, held: null, folds: false };
   }
-  const cubics = basis.references.map((_, lung) => lungCubic(basis, lung, weights));
+  const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
   const volumes = volumesFor(basis, gravity);
-  const gains = gainsFor(basis, cubics, volumes, sumOf(volumes.rest) + depth);
-  const held = gains.map((gain, lung) => basis.references[lung] + cubicAt(cubics[lung], gain));
-  return { gravity, weights, gains: spread(gains), held, folds: !gains.every(Number.isFinite) };
+  const gains = gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);
+  const held = gains.map((gain, lung) => basis.references[lung] + formAt(forms[lung], gain));
+  return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
 /** What supine.glsl multiplies by: the weights, three gains of each lung, and the weights of the normal's
- * modes, quadratic in gain times weights, three to a word: modes j, j + words and j + 2 words. */
+ * modes, three to a word: modes j, j + words and j + 2 words. Of the normal's component along an axis
+ * the monomials are 1, a w_k, b w_k, a b w_k w_l, with the gains a, b of the next two axes; files whose
+ * gains are equal have one component for all, without b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
   const turns = new Float32Array(3 * words * lungs);
   weights.set(moment.weights);
   for (let lung = 0, at = 0; lung < lungs; ++lung) {
-    const q = [1, ...moment.weights.map((w) => w * moment.gains[3 * lung])];
+    const gain = (axis) => moment.gains[3 * lung + (axis % 3)];
+    const w = moment.weights;
     for (let j = 0; j < normalModes; ++j) {
       let sum = 0;
-      for (let a = 0; a <= k; ++a) {
-        let row = 0;
-        for (let b = a; b <= k; ++b) row += basis.turns[at++] * q[b];
-        sum += row * q[a];
+      for (let axis = 0; axis < basis.volumeAxes; ++axis) {
+        sum += basis.turns[at++];
+        for (let side = 1; side <= (basis.volumeAxes === 3 ? 2 : 1); ++side) {
+          for (let a = 0; a < k; ++a) sum += basis.turns[at++] * gain(axis + side) * w[a];
+        }
+        for (let a = 0; a < k; ++a) {
+          let row = 0;
+          for (let b = a; b < k; ++b) row += basis.turns[at++] * w[b];
+          sum += row * w[a] * gain(axis + 1) * gain(axis + 2);
+        }
       }
       turns[3 * (lung * words + (j % words)) + Math.floor(j / words)] = sum;
     }

@@ -7,7 +7,7 @@ const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
 /** mL that each lung holds. */
-const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + cubicAt(lungCubic(basis, lung, weights), gains[3 * lung]));
+const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
 /** Each vertex' part of the surface: a third of the triangles around it. */
 function areasOf({ rest, corners, vertices }) {

@@ -96,9 +96,10 @@ typedef struct supine_basis_info {
   const float *direction;         /**< [N, 3] d_i, mm; NULL where the kind is vector */
   const float *coefficients;      /**< [N, K] c_ik, or [N, 3, K], mm, where the kind is vector */
   const double *modes;            /**< [K, (L+1)^2] */
-  const double *volume_linear;    /**< [G, K] the volumes' forms, mL, see supine_volume_add;
-                                       these three NULL where has_volume is false */
-  const double *volume_quadratic; /**< [G, K, K] */
+  const double *volume_linear;    /**< [G, A, K] the volumes' forms, mL, see
+                                       supine_volume_contract; A: volume_axes; these three NULL
+                                       where has_volume is false */
+  const double *volume_quadratic; /**< [G, A, K, K] */
   const double *volume_cubic;     /**< [G, K, K, K] */
   /** What an evaluation reads, bytes_per_vertex for each vertex in whole runs of 16 vertices: for
    * measuring what its traffic costs. What it means changes between versions. */
@@ -106,12 +107,16 @@ typedef struct supine_basis_info {
   /** Q, modes of the normals (supine_deform_lit); 0 where the file has none. */
   size_t normal_count;
   const int16_t *normals;         /**< [N, 3, Q] n */
-  const double *normal_weights;   /**< [G, Q, (K + 1)(K + 2) / 2] V */
+  const double *normal_weights;   /**< [G, Q, 3, T] V, T = 1 + 2 K + K (K + 1) / 2; in files of
+                                       versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2] */
   const double *reference_volume; /**< [G] mL that each lung of the reference surface holds, gas and
                                        tissue; 0 where has_volume is false */
   bool has_rest;                  /**< the volume at rest is known in every posture */
   bool has_full;                  /**< the reference surface is full inflation */
   bool is_fields; /**< made from another simulator's fields: gain 1 gives them back */
+  size_t
+      volume_axes; /**< A: 3; 1 in files of versions 1 and 2, whose gains are equal on all axes */
+  double bend[3];  /**< of the path between full inflation and rest, see supine_volume_bend */
 } supine_basis_info;
 
 /** Weights and gains of one state. */
@@ -166,8 +171,9 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  *
  * A total volume is shared out among the lungs: each fills on the straight line between its rest
  * and its full volume [MilicEmili1966], all at the same part of the way; below rest all shrink in
- * proportion. Files of versions 1 and 2 have one gain for all lungs instead. Volumes are met
- * exactly, without a pass over the vertices.
+ * proportion. Its gains lie on a path from full inflation through rest (supine_volume_bend). Files
+ * of versions 1 and 2 have one gain for all lungs and axes instead. Volumes are met exactly,
+ * without a pass over the vertices.
  *
  * SUPINE_VOLUME_DEFAULT is rest where it is known; the fields as given (gain 1) where the basis was
  * made from fields; else 500 mL above the scan.
@@ -246,13 +252,13 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  * supine_deform. */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Weights v [G, Q] of the normals' modes, a quadratic form in q = gain x weights, for each lung
- * (of the gains, which are equal, the first):
+/** Weights v [G, Q] of the normals' modes for each lung, from the three components c of a normal,
+ * which are quadratic in the weights w and the gains a, b of the two axes after c (cyclically):
  *
- *     v_j = sum over 0 <= k <= l <= K of V_j,kl q_k q_l        q_0 = 1, k l = 00, 01, ... 0K, 11,
- * ...
+ *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * Cost: G Q K^2 / 2 multiplications, once a frame. */
+ * In files of versions 1 and 2, whose gains are equal: V_j . (1, a w_k, a^2 w_k w_l).
+ * Cost: 1.5 G Q K^2 multiplications, once a frame. */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
                                             double *normal_weights);
 

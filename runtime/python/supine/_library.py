@@ -112,7 +112,7 @@ class Info(ctypes.Structure):
                 ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
                 ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
                 ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
-                ("has_full", c_bool), ("is_fields", c_bool)]
+                ("has_full", c_bool), ("is_fields", c_bool), ("volume_axes", c_size_t), ("bend", c_double * 3)]
 
 
 class Tensor(ctypes.Structure):
