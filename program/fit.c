@@ -155,27 +155,17 @@ static void print_paper_law(const supine_patient *patient,
                             const supine_patient_fit_report *report) {
   double c[SUPINE_PATIENT_CONSTANTS];
   supine_patient_constants(patient, c);
-  (void)printf(
-      "the paper's law, force 1 at the box's centre (95 %% intervals, block bootstrap):\n");
+  (void)printf("the paper's law, force 1 at the box's centre (95 %% intervals):\n");
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
-    const bool bounded = k >= 6 ? report->at_bound[k - 3] : k % 2 == 1 && report->at_bound[k / 2];
-    (void)printf("  c%zu %8.3f   %8.3f to %8.3f%s\n", k + 1, c[k], report->low[k], report->high[k],
-                 bounded ? "   at the bound of its range" : "");
+    const double half = 1.96 * report->error[k];
+    (void)printf("  c%zu %8.3f   %8.3f to %8.3f\n", k + 1, c[k], c[k] - half, c[k] + half);
   }
-  (void)printf("six starts: %zu of %d end within 1 %% of the best; the fields differ by up to %.2g "
-               "mm\n",
-               report->starts_agreeing, SUPINE_PATIENT_STARTS, report->start_apart);
 }
 
-static void print_surface(const supine_patient_surface_report *surface, supine_patient_law law,
-                          bool landmarks) {
+static void print_surface(const supine_patient_surface_report *surface, bool landmarks) {
   (void)printf("surface: %zu vertices, %.0f %% of them matched; to the emptier surface, along its "
-               "normals,\n  %.2f mm RMS before, %.2f mm in the end",
+               "normals,\n  %.2f mm RMS before, %.2f mm in the end\n",
                surface->vertices, 100.0 * surface->matched, surface->before, surface->after);
-  if (law == SUPINE_PATIENT_PAPER) {
-    (void)printf("; six starts end within %.2g mm of each other", surface->point_apart);
-  }
-  (void)putchar('\n');
   if (!landmarks) {
     (void)puts("a small distance between surfaces does not prove the motion of what is in them:\n"
                "  surfaces 5 mm apart have had points 14 mm off. Landmarks tell: --landmarks");
@@ -729,7 +719,7 @@ static int run(void *chosen, const supine_arguments *given) {
     free(text);
   } else {
     if (wanted->state_path != NULL) {
-      print_surface(&found.surface, record.patient.law, wanted->landmarks.path != NULL);
+      print_surface(&found.surface, wanted->landmarks.path != NULL);
     }
     print_text(&record, &found.report, wanted);
     if (wanted->state_path != NULL) {

@@ -298,13 +298,12 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
   const supine_lungs *lungs = &options->made_from.lungs;
   supine_model_choice *choice = &options->choice;
   size_t state = 0;
-  const supine_status status = supine_patient_check_place(record, lungs, &state, error);
+  supine_status status = supine_patient_check_place(record, lungs, &state, error);
   if (status != SUPINE_OK) {
     return status;
   }
   choice->own = "the patient's own";
   choice->model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_patient_model(record, &choice->model);
   supine_patient_resting(record, &choice->resting);
   if (!choice->has_scan) {
     const double volume = lungs->topology.closed ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
@@ -321,15 +320,17 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
                         "otherwise",
                         state == 0 ? "fuller" : "emptier");
   }
-  if (!supine_patient_is_uneven(record)) {
-    return SUPINE_OK;
+  if (supine_patient_is_uneven(record)) {
+    *stiffness = malloc(lungs->mesh.vertex_count * sizeof **stiffness);
+    if (*stiffness == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              lungs->mesh.vertex_count);
+    }
   }
-  *stiffness = malloc(lungs->mesh.vertex_count * sizeof **stiffness);
   choice->stiffness = *stiffness;
-  return *stiffness == NULL
-             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                                lungs->mesh.vertex_count)
-             : supine_patient_set_stiffness(record, lungs, *stiffness, error);
+  status = supine_patient_field_find(record, lungs, state, *stiffness, &options->field, error);
+  supine_patient_model(&options->field, &choice->model);
+  return status;
 }
 
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
@@ -365,6 +366,7 @@ int supine_command_model_load(supine_model_options *options, const char *command
 }
 
 void supine_command_model_options_free(supine_model_options *options) {
+  supine_patient_field_free(&options->field);
   supine_precompute_source_free(&options->made_from);
   supine_precompute_prepared_free(&options->prepared);
 }

@@ -19,6 +19,7 @@ typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* a person's own law, the caller's; NULL: none */
+  supine_patient_field field;           /* of it */
   supine_source made_from;              /* what loading found: the lungs and how they came */
   supine_prepared prepared;             /* the model of them */
   char assumed[800];                    /* what was assumed, in a sentence */

@@ -11,6 +11,7 @@
 
 #include "precompute/patient/expand.h"
 
+#include "precompute/patient/krige.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
@@ -20,8 +21,7 @@ enum {
   ROUNDS = 3, /* of finding nearest points anew */
   TURNS = 30, /* of the regions and the law, at most */
   HELD_TURNS = 8,
-  FOLDS = 5,
-  LAW_STEPS = 50
+  FOLDS = 5
 };
 
 /* What is believed before: neighbouring regions differ by so much, and any from 1. */
@@ -34,7 +34,6 @@ static const double near_by = 1.7;    /* of the least distance between centres: 
 static const double least = 0.02;     /* a of any region */
 static const double worth = 0.95;     /* of the held-out RMS: what leaves more is not kept */
 static const double settled = 1e-3;   /* of any a, in a turn */
-static const double tolerance = 1e-6; /* of the law */
 static const double residual = 1e-6;  /* of solves */
 
 /* The regions' values, and a law to go with them. */
@@ -47,6 +46,7 @@ typedef struct estimate {
 typedef struct study {
   supine_patient_matching *m;
   const supine_patient_expand_task *task;
+  supine_patient_krige_options prior;
   supine_patient_stiffness regions; /* where they are */
   size_t count;                     /* of both lungs */
   size_t row_count;
@@ -151,8 +151,7 @@ static supine_status fit_rows(const study *s, supine_patient_row *rows, bool wit
   for (size_t turn = 0; turn < turns && status == SUPINE_OK && change > settled; ++turn) {
     const estimate before = *e;
     set_forces(s, e, rows);
-    status = supine_patient_power_fit(rows, s->row_count, s->task->moved, e->power.powers,
-                                      LAW_STEPS, tolerance, &e->power, error);
+    status = supine_patient_law_fit(&s->prior, rows, s->row_count, &e->power, error);
     if (status == SUPINE_OK && with && !solve_regions(s, rows, space, e)) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                 "the surfaces do not determine the expandability");
@@ -413,7 +412,7 @@ static void note_range(const study *s, double *e, supine_patient_expand_report *
 }
 
 /* Leaves matching, law and stiffness as they were found to be worth it. */
-static supine_status finish(study *s, const estimate *e, supine_patient_power *power,
+static supine_status finish(study *s, const estimate *e, supine_patient *patient,
                             supine_patient_stiffness *stiffness,
                             supine_patient_expand_report *report, supine_error *error) {
   const size_t n = s->m->rest->mesh.vertex_count;
@@ -429,7 +428,7 @@ static supine_status finish(study *s, const estimate *e, supine_patient_power *p
   }
   supine_patient_stiffness_of(&s->regions, s->m->rest, space);
   *stiffness = report->kept ? s->regions : (supine_patient_stiffness){0};
-  *power = e->power;
+  supine_patient_take(&e->power, patient);
   match_anew(s, e);
   const supine_status status =
       supine_patient_matching_solve(s->m, report->kept ? space : NULL, error);
@@ -442,11 +441,15 @@ static supine_status finish(study *s, const estimate *e, supine_patient_power *p
 
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_expand_task *task,
-                                    supine_patient_power *power,
+                                    supine_patient *patient,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
   supine_patient_matching *m = matching;
-  estimate found[2] = {{.power = *power}, {.power = *power}}; /* without and with */
+  supine_patient_power law;
+  memcpy(law.powers, patient->powers, sizeof law.powers);
+  memcpy(law.linear, patient->lengths, sizeof patient->lengths);
+  memcpy(law.linear + 3, patient->motion, sizeof patient->motion);
+  estimate found[2] = {{.power = law}, {.power = law}}; /* without and with */
   study *s = calloc(1, sizeof *s);
   *report = (supine_patient_expand_report){.tried = true, .softest = 1.0, .stiffest = 1.0};
   *stiffness = (supine_patient_stiffness){0};
@@ -454,6 +457,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for regions");
   }
   *s = (study){.m = m, .task = task, .row_count = m->count + m->landmark_rows_count};
+  s->prior = supine_patient_krige_prior(SUPINE_PATIENT_PAPER, &law, task->moved);
   supine_patient_stiffness_spread(m->rest, &s->regions);
   s->count = s->regions.count[0] + s->regions.count[1];
   s->response = malloc((s->row_count * s->count + 1) * sizeof *s->response);
@@ -475,7 +479,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   }
   if (status == SUPINE_OK) {
     report->kept = report->held_out[1] < worth * report->held_out[0];
-    status = finish(s, &found[report->kept], power, stiffness, report, error);
+    status = finish(s, &found[report->kept], patient, stiffness, report, error);
   }
   free(s->response);
   free(s);

@@ -10,7 +10,7 @@
  *     least over a of  sum of w (along_i sum of a_k F_ik - target_i)^2 + roughness + (a_k - 1)^2
  *
  * which is linear least squares, and the law's directions and the motion between the scans
- * (supine_patient_power_fit), until the one no longer changes the other. What the surfaces do not
+ * (supine_patient_law_fit), until the one no longer changes the other. What the surfaces do not
  * tell of a region, its neighbours do: the diagonal of the resolution matrix says how much.
  *
  * All of it counts only where blocks of 40 mm that it has not seen come nearer than with even
@@ -47,12 +47,12 @@ typedef struct supine_patient_expand_report {
 
 /** Finds the expandability, and keeps it where held-out blocks improve: the matching then stands at
  * rows of the law with it, else at those without.
- * @param power      the law without; with, where it was kept
+ * @param patient    the law without; with, where it was kept
  * @param stiffness  counts 0 where it was not kept
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_expand_task *task,
-                                    supine_patient_power *power,
+                                    supine_patient *patient,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 

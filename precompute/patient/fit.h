@@ -36,18 +36,13 @@ typedef struct supine_patient_fit_report {
       expected; /**< mm RMS, expected of held-out points (of a component, where one is measured) */
   double explained;        /**< share of the squared displacement, held out */
   double explained_fitted; /**< the same, of what was fitted */
-  /* Of the paper's law alone: */
-  double starts[SUPINE_PATIENT_STARTS]; /**< what each start left, mm RMS */
-  double start_apart;     /**< largest distance between two starts' fields, mm, over the
-                               points */
-  size_t starts_agreeing; /**< within 1 % of the best */
-  bool at_bound[SUPINE_PATIENT_POWERS];
-  double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 by block bootstrap */
-  double low[SUPINE_PATIENT_CONSTANTS];   /**< its 2.5th and 97.5th percentiles */
-  double high[SUPINE_PATIENT_CONSTANTS];
+  double expected_point; /**< mm RMS, expected of the fitted points in all three directions */
+  double moved;          /**< their mean displacement, mm */
+  double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;
 
-/** The deep law in the form of nine constants, for gravity along a unit vector. */
+/** The deep law in the form of nine constants, for gravity along a unit vector (all 0:
+ * supine). */
 supine_patient_power supine_patient_deep(const double gravity[3]);
 
 /** Fit a law and its correction to rows, and hold blocks of 40 mm out.

@@ -206,25 +206,6 @@ static supine_status solve_heights(const problem *p, const state *s, const doubl
   return status;
 }
 
-/* The fitted displacement of a vertex, whose row has what forces come to there. */
-static void displace(const supine_patient_record *record, const supine_patient_row *row,
-                     const double vertex[3], double u[3]) {
-  const supine_patient *patient = &record->patient;
-  double r[3];
-  if (!record->from_surface) {
-    supine_patient_displacement(patient, vertex, row->place.side, u);
-    return;
-  }
-  const double *c = patient->powers + 3;
-  const double force =
-      row->force[0] + c[0] * row->force[1] + c[1] * row->force[2] + c[2] * row->force[3];
-  supine_patient_direction(patient, &row->place, u);
-  supine_patient_correct(patient, &row->place, r);
-  for (size_t k = 0; k < 3; ++k) {
-    u[k] = force * u[k] + r[k];
-  }
-}
-
 /* The vertices that take part, with what forces come to there. */
 static supine_status take_surface(const problem *p, state *s, const supine_lungs *rest,
                                   double reach, supine_error *error) {
@@ -261,7 +242,12 @@ static supine_status take_surface(const problem *p, state *s, const supine_lungs
     }
     to->parts[4] = caught[2 * v];
     to->parts[5] = caught[2 * v + 1];
-    displace(record, &s->matching.rows[i], rest->mesh.vertices + 3 * v, to->u);
+    if (record->from_surface) {
+      supine_patient_row_displacement(&record->patient, &s->matching.rows[i], to->u);
+    } else { /* the landmarks' box, not the surface's */
+      supine_patient_displacement(&record->patient, rest->mesh.vertices + 3 * v,
+                                  s->matching.rows[i].place.side, to->u);
+    }
   }
   free(stiffness);
   free(caught);

@@ -12,27 +12,43 @@
 #include "runtime/kriging.h"
 #include "sh/base/vec3.h"
 
-enum { LANDMARKS_MAX = 300 };
+enum {
+  TERMS = SUPINE_PATIENT_TERMS,
+  LAW = SUPINE_PATIENT_CONSTANTS, /* the first terms; motion follows */
+  SCALE = TERMS - 1,
+  WIDTH = TERMS + 1,              /* of the design: the terms, and what is left of the value */
+  STEPS = 60
+};
 
-static const double scale_prior = 0.3;
-static const double shift_prior = 100.0; /* mm */
-static const double turn_prior = 0.3;    /* rad */
+static const double scale_spread = 0.3; /* of a law whose shape is kept */
+static const double settled = 1e-10;     /* relative, of the squares in a step */
+static const double damping_most = 1e10; /* of a step: no step helps any more */
 
 struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
+  supine_patient_krige_options options; /* with the sill and the noise in use */
   supine_patient_power law;
-  supine_patient_krige_options options;
-  double noise;                  /* factor on the rows' */
-  double sill;                   /* factor on the covariance of g */
   supine_patient_centre *centre; /* [count] of each row, without weight */
-  double *factor;                /* [count, count] of the covariance (Cholesky) */
+  double *factor;                /* [count, count] of the covariance (Cholesky); without g unused */
+  double *design;                /* [count, WIDTH] whitened */
   double *weight;                /* [count] */
-  double *along;                 /* [count] law's displacement along each row's axis, mm */
+  double normal[TERMS * TERMS];  /* of the terms, factored (Cholesky) */
+  double right[TERMS];
+  double squares; /* left, whitened, with the prior's */
 };
 
-double supine_patient_krige_size(double scale, const double u[3]) {
-  return fabs(scale) * supine_length(u);
+supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
+                                                        const supine_patient_power *mean,
+                                                        supine_patient_moved moved) {
+  static const double spread[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
+  supine_patient_krige_options options = {.mean = *mean,
+                                          .shape_kept = law == SUPINE_PATIENT_DEEP,
+                                          .moved = moved,
+                                          .sill = -1.0,
+                                          .noise = -1.0};
+  memcpy(options.spread, spread[law], sizeof options.spread);
+  return options;
 }
 
 double supine_patient_krige_covariance(const supine_patient_centre *a,
@@ -49,133 +65,239 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   supine_patient_centre centre = {.side = row->place.side};
   double u[3];
   supine_patient_power_displacement(law, row, u);
-  centre.size = supine_patient_krige_size(1.0, u);
+  centre.size = supine_length(u);
   memcpy(centre.at, row->place.arm, sizeof centre.at); /* from the box's centre: distances alone */
   return centre;
 }
 
-static double along_of(const supine_patient_power *law, const supine_patient_row *row) {
-  double u[3];
-  supine_patient_power_displacement(law, row, u);
-  return supine_dot(row->axis, u);
+/* --- the terms ------------------------------------------------------------------------------- */
+
+/* Standard deviation of a term: 0 known, INFINITY free. */
+static double spread_of(const supine_patient_krige_options *options, size_t term) {
+  static const size_t motion[] = {0, 3, 6};
+  const double unit = term < 3 ? fabs(options->mean.linear[term]) : 1.0;
+  const bool kept = options->shape_kept && options->sill >= 1.0;
+  return term == SCALE                         ? (kept ? scale_spread : 0.0)
+         : term < LAW                          ? (kept ? 0.0 : options->spread[term / 3] * unit)
+         : term - LAW < motion[options->moved] ? INFINITY
+                                               : 0.0;
 }
 
-static double scale_variance(const supine_patient_krige *k) {
-  return k->options.scale_known ? 0.0 : scale_prior * scale_prior;
+/* A term's distance from its mean. */
+static double offset_of(const supine_patient_krige *k, size_t term) {
+  const supine_patient_power *law = &k->law;
+  const supine_patient_power *mean = &k->options.mean;
+  return term == SCALE ? law->linear[0] / mean->linear[0] - 1.0
+         : term < 3   ? law->linear[term] - mean->linear[term]
+         : term < 6 ? log(law->powers[term - 3] / mean->powers[term - 3])
+                    : law->powers[term - 3] - mean->powers[term - 3];
 }
 
-/* The covariance of two rows, with what the scale and the motion add. */
-static double covary(const supine_patient_krige *k, const supine_patient_row *a,
-                     const supine_patient_centre *at, double along, size_t b) {
-  const supine_patient_row *row = &k->rows[b];
-  const double same = supine_dot(a->axis, row->axis);
-  double sum = k->sill * same * supine_patient_krige_covariance(at, &k->centre[b]) +
-               scale_variance(k) * along * k->along[b];
-  if (k->options.moved != SUPINE_PATIENT_STILL) {
-    sum += shift_prior * shift_prior * same;
+static supine_patient_power moved_by(const supine_patient_power *law, const double step[TERMS]) {
+  supine_patient_power moved = *law;
+  for (size_t a = 0; a < 3; ++a) {
+    moved.linear[a] += step[a] + step[SCALE] * law->linear[a];
+    moved.powers[a] = fmin(supine_patient_exponent_most,
+                           fmax(supine_patient_exponent_least, law->powers[a] * exp(step[3 + a])));
+    moved.powers[3 + a] = fmin(supine_patient_slope_most,
+                               fmax(-supine_patient_slope_most, law->powers[3 + a] + step[6 + a]));
+    moved.linear[3 + a] += step[9 + a];
+    moved.linear[6 + a] += step[12 + a];
   }
-  if (k->options.moved == SUPINE_PATIENT_RIGID) {
-    double turn[2][3];
-    supine_cross(a->place.arm, a->axis, turn[0]);
-    supine_cross(row->place.arm, row->axis, turn[1]);
-    sum += turn_prior * turn_prior * supine_dot(turn[0], turn[1]);
-  }
-  return sum;
+  return moved;
 }
 
-/* The covariance of all rows, without noise, into the lower triangle. */
-static void fill(const supine_patient_krige *k, double *matrix) {
-  for (size_t i = 0; i < k->count; ++i) {
+/* --- the rows -------------------------------------------------------------------------------- */
+
+static double noise_of(const supine_patient_krige *k, const supine_patient_row *row) {
+  return k->options.noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
+}
+
+/* Factor the covariance of the rows, noise and g of the law's sizes.
+ * @return the logarithm of half its determinant; NAN where it is not positive definite */
+static double factor(supine_patient_krige *k) {
+  const size_t n = k->count;
+  double logarithm = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    k->centre[i] = centre_of(&k->law, &k->rows[i]);
+    logarithm += k->options.sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
+  }
+  if (k->options.sill <= 0.0) {
+    return logarithm;
+  }
+  for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
-      matrix[i * k->count + j] = covary(k, &k->rows[i], &k->centre[i], k->along[i], j);
+      k->factor[i * n + j] = k->options.sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
+                             supine_patient_krige_covariance(&k->centre[i], &k->centre[j]);
+    }
+    k->factor[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
+  }
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', (lapack_int)n, k->factor, (lapack_int)n) != 0) {
+    return NAN;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    logarithm += log(k->factor[i * n + i]);
+  }
+  return logarithm;
+}
+
+/* The normal equations of the terms at the law, and the squares that it leaves. */
+static void look(supine_patient_krige *k) {
+  const int n = (int)k->count;
+  for (size_t i = 0; i < k->count; ++i) {
+    double *row = k->design + WIDTH * i;
+    row[TERMS] = -supine_patient_power_design(&k->law, &k->rows[i], row);
+    if (k->options.sill <= 0.0) {
+      cblas_dscal(WIDTH, 1.0 / noise_of(k, &k->rows[i]), row, 1);
+    }
+  }
+  if (k->options.sill > 0.0) {
+    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, WIDTH, 1.0,
+                k->factor, n, k->design, WIDTH);
+  }
+  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, TERMS, n, 1.0, k->design, WIDTH, 0.0,
+              k->normal, TERMS);
+  cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, 1.0, k->design, WIDTH, k->design + TERMS, WIDTH,
+              0.0, k->right, 1);
+  k->squares = cblas_ddot(n, k->design + TERMS, WIDTH, k->design + TERMS, WIDTH);
+  for (size_t t = 0; t < TERMS; ++t) {
+    const double spread = spread_of(&k->options, t);
+    if (spread == 0.0) { /* known: the row of 1 */
+      k->right[t] = 0.0;
+      for (size_t s = 0; s < TERMS; ++s) {
+        k->normal[s < t ? t * TERMS + s : s * TERMS + t] = s == t ? 1.0 : 0.0;
+      }
+    } else if (isfinite(spread)) {
+      k->normal[t * TERMS + t] += pow(spread, -2.0);
+      k->right[t] -= offset_of(k, t) * pow(spread, -2.0);
+      k->squares += pow(offset_of(k, t) / spread, 2.0);
     }
   }
 }
 
-/* Factor the covariance under so much noise, and solve for the weights.
- * @return the log likelihood, without its constant; -INFINITY where the matrix is not positive */
-static double solve(supine_patient_krige *k, const double *matrix, double noise) {
-  const size_t n = k->count;
-  const lapack_int size = (lapack_int)n;
-  double likelihood = 0.0;
-  memcpy(k->factor, matrix, n * n * sizeof *matrix);
-  for (size_t i = 0; i < n; ++i) {
-    const supine_patient_row *row = &k->rows[i];
-    /* A row of no weight has noise without end. */
-    k->factor[i * n + i] += pow(noise * row->noise, 2.0) / fmin(1.0, fmax(1e-12, row->weight));
-    k->weight[i] = -supine_patient_power_residual(&k->law, row);
-    likelihood += k->weight[i];
+/* A damped step; false where it cannot be solved for. */
+static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS]) {
+  double matrix[TERMS * TERMS];
+  memcpy(matrix, k->normal, sizeof matrix);
+  memcpy(step, k->right, TERMS * sizeof *step);
+  for (size_t t = 0; t < TERMS; ++t) {
+    matrix[t * TERMS + t] *= 1.0 + damping;
   }
-  if (!isfinite(likelihood) || LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', size, k->factor, size) != 0) {
-    return -INFINITY;
-  }
-  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, (int)n, k->factor, (int)n,
-              k->weight, 1);
-  likelihood = -0.5 * cblas_ddot((int)n, k->weight, 1, k->weight, 1);
-  for (size_t i = 0; i < n; ++i) {
-    likelihood -= log(k->factor[i * n + i]);
-  }
-  cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, (int)n, k->factor, (int)n,
-              k->weight, 1);
-  return likelihood;
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', TERMS, 1, matrix, TERMS, step, TERMS) == 0;
 }
 
-/* Take the noise that makes the rows most likely; of a law that was fitted in full as well the
- * share of g's covariance, or none. */
-static supine_status choose_noise(supine_patient_krige *k, supine_error *error) {
-  static const double factors[] = {0.25, 0.5, 1.5, 2.0, 1.0};
-  static const double sills[] = {0.0, 0.01, 0.1, 1.0};
-  enum { FACTORS = sizeof factors / sizeof *factors, SILLS = sizeof sills / sizeof *sills };
-  double *matrix = malloc(k->count * k->count * sizeof *matrix);
-  double best[2] = {1.0, 1.0}; /* noise, sill */
-  double most = -INFINITY;
-  if (matrix == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", k->count);
+/* Take the law to where it leaves least. */
+static supine_status descend(supine_patient_krige *k, supine_error *error) {
+  double damping = 0.0;
+  look(k);
+  for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
+    const supine_patient_power before = k->law;
+    const double squares = k->squares;
+    double step[TERMS];
+    if (!isfinite(squares) || !find_step(k, damping, step)) {
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the points do not determine the law: they may lie in one plane");
+    }
+    k->law = moved_by(&before, step);
+    look(k);
+    if (k->squares <= squares && squares - k->squares <= settled * squares) {
+      break;
+    }
+    const bool nearer = k->squares < squares;
+    damping = nearer ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
+    if (!nearer) {
+      k->law = before;
+      look(k);
+    }
   }
-  for (size_t g = k->options.scale_known ? 0 : SILLS - 1; g < SILLS; ++g) {
-    k->sill = sills[g];
-    fill(k, matrix);
-    for (size_t f = k->options.noise_known ? FACTORS - 1 : 0; f < FACTORS; ++f) {
-      const double likelihood = solve(k, matrix, factors[f]);
+  return SUPINE_OK;
+}
+
+/* The restricted log likelihood of the rows under a sill and a noise, without its constant. */
+static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
+  const supine_patient_power before = k->law;
+  k->options.sill = sill;
+  k->options.noise = noise;
+  double likelihood = -factor(k);
+  if (!isfinite(likelihood) || descend(k, NULL) != SUPINE_OK ||
+      LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) != 0) {
+    likelihood = -INFINITY;
+  }
+  for (size_t t = 0; t < TERMS; ++t) {
+    const double spread = spread_of(&k->options, t);
+    likelihood -= log(k->normal[t * TERMS + t]);
+    likelihood -= spread > 0.0 && isfinite(spread) ? log(spread) : 0.0;
+  }
+  k->law = before;
+  return likelihood - 0.5 * k->squares;
+}
+
+/* Take the sill, then the noise, that make the rows most likely. */
+static void choose(supine_patient_krige *k) {
+  static const double sills[] = {1.0, 0.03, 0.003, 0.0};
+  static const double noises[] = {1.0, 0.5, 0.25, 1.5, 2.0};
+  static const size_t choices[2] = {sizeof sills / sizeof *sills, sizeof noises / sizeof *noises};
+  const supine_patient_krige_options given = k->options;
+  double best[2] = {given.sill < 0.0 ? sills[0] : given.sill,
+                    given.noise < 0.0 ? noises[0] : given.noise};
+  for (int which = 0; which < 2; ++which) {
+    double most = -INFINITY;
+    for (size_t i = 0; i < choices[which] && (which == 0 ? given.sill : given.noise) < 0.0; ++i) {
+      const double tried[2] = {which == 0 ? sills[i] : best[0], which == 1 ? noises[i] : best[1]};
+      const double likelihood = likelihood_of(k, tried[0], tried[1]);
       if (likelihood > most) {
         most = likelihood;
-        best[0] = factors[f];
-        best[1] = k->sill;
+        best[which] = tried[which];
       }
     }
   }
-  k->noise = best[0];
-  k->sill = best[1];
-  fill(k, matrix);
-  most = solve(k, matrix, k->noise);
-  free(matrix);
-  return isfinite(most) ? SUPINE_OK
-                        : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                           "the points' covariance is not positive definite");
+  k->options.sill = best[0];
+  k->options.noise = best[1];
 }
 
-supine_status supine_patient_krige_create(const supine_patient_power *law,
+/* The law, then the correction of what it leaves, in sizes of that law. */
+static supine_status fit(supine_patient_krige *k, supine_error *error) {
+  const int n = (int)k->count;
+  choose(k);
+  supine_status status = isnan(factor(k)) ? SUPINE_ERROR_NUMERICAL : descend(k, error);
+  if (status == SUPINE_OK && isnan(factor(k))) {
+    status = SUPINE_ERROR_NUMERICAL;
+  }
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status,
+                            "the points do not determine the law: they may lie in one plane, or "
+                            "not be numbers");
+  }
+  look(k);
+  cblas_dcopy(n, k->design + TERMS, WIDTH, k->weight, 1);
+  if (k->options.sill > 0.0) {
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
+  }
+  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) == 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the points do not determine the law: they may lie in one plane");
+}
+
+supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
                                           const supine_patient_row *rows, size_t count,
-                                          const supine_patient_krige_options *options,
                                           supine_patient_krige **krige, supine_error *error) {
   supine_patient_krige *k = calloc(1, sizeof *k);
+  supine_status status = SUPINE_ERROR_MEMORY;
   if (k != NULL) {
-    *k = (supine_patient_krige){.rows = rows, .count = count, .law = *law, .options = *options};
+    *k = (supine_patient_krige){
+        .rows = rows, .count = count, .options = *options, .law = options->mean};
     k->centre = malloc(count * sizeof *k->centre);
-    k->factor = malloc(count * count * sizeof *k->factor);
+    k->factor = options->sill != 0.0 ? malloc(count * count * sizeof *k->factor) : NULL;
+    k->design = malloc(WIDTH * count * sizeof *k->design);
     k->weight = malloc(count * sizeof *k->weight);
-    k->along = malloc(count * sizeof *k->along);
   }
-  if (k == NULL || k->centre == NULL || k->factor == NULL || k->weight == NULL ||
-      k->along == NULL) {
-    supine_patient_krige_destroy(k);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
+  if (k == NULL || k->centre == NULL || (k->factor == NULL && options->sill != 0.0) ||
+      k->design == NULL || k->weight == NULL) {
+    (void)supine_error_set(error, status, "no memory for %zu rows", count);
+  } else {
+    status = fit(k, error);
   }
-  for (size_t i = 0; i < count; ++i) {
-    k->centre[i] = centre_of(law, &rows[i]);
-    k->along[i] = along_of(law, &rows[i]);
-  }
-  const supine_status status = choose_noise(k, error);
   if (status != SUPINE_OK) {
     supine_patient_krige_destroy(k);
     return status;
@@ -188,40 +310,80 @@ void supine_patient_krige_destroy(supine_patient_krige *krige) {
   if (krige != NULL) {
     free(krige->centre);
     free(krige->factor);
+    free(krige->design);
     free(krige->weight);
-    free(krige->along);
     free(krige);
   }
 }
 
+const supine_patient_power *supine_patient_krige_law(const supine_patient_krige *krige) {
+  return &krige->law;
+}
+
+double supine_patient_krige_sill(const supine_patient_krige *krige) {
+  return krige->options.sill;
+}
+
 double supine_patient_krige_noise(const supine_patient_krige *krige) {
-  return krige->noise;
+  return krige->options.noise;
+}
+
+supine_status supine_patient_law_fit(const supine_patient_krige_options *options,
+                                     const supine_patient_row *rows, size_t count,
+                                     supine_patient_power *law, supine_error *error) {
+  supine_patient_krige_options alone = *options;
+  supine_patient_krige *krige = NULL;
+  alone.sill = 0.0;
+  alone.noise = 1.0;
+  const supine_status status = supine_patient_krige_create(&alone, rows, count, &krige, error);
+  if (status == SUPINE_OK) {
+    *law = krige->law;
+  }
+  supine_patient_krige_destroy(krige);
+  return status;
+}
+
+/* Solve the factored normal matrix's triangle, so that x . x is a variance. */
+static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
+  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, TERMS, k->normal, TERMS, x, 1);
+  return cblas_ddot(TERMS, x, 1, x, 1);
+}
+
+void supine_patient_krige_errors(const supine_patient_krige *krige,
+                                 double error[SUPINE_PATIENT_CONSTANTS]) {
+  for (size_t t = 0; t < LAW; ++t) {
+    const bool exponent = t >= 3 && t < 6;
+    const size_t c = t < 3 ? 2 * t : exponent ? 2 * (t - 3) + 1 : t;
+    double x[TERMS] = {0.0};
+    x[t] = exponent ? krige->law.powers[t - 3] : 1.0;
+    error[c] = spread_of(&krige->options, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
+  }
 }
 
 double supine_patient_krige_predict(const supine_patient_krige *krige,
                                     const supine_patient_row *row, double *variance,
                                     double *scratch) {
   const supine_patient_krige *k = krige;
-  const supine_patient_centre at = centre_of(&k->law, row);
-  const double along = along_of(&k->law, row);
-  double value = supine_patient_power_residual(&k->law, row) + row->value;
   const int n = (int)k->count;
-  for (size_t i = 0; i < k->count; ++i) {
-    scratch[i] = covary(k, row, &at, along, i);
-    value += scratch[i] * k->weight[i];
-  }
-  if (variance != NULL) {
-    double turn[3];
-    supine_cross(row->place.arm, row->axis, turn);
-    *variance =
-        k->sill * supine_patient_krige_covariance(&at, &at) + scale_variance(k) * along * along;
-    *variance += k->options.moved != SUPINE_PATIENT_STILL ? shift_prior * shift_prior : 0.0;
-    *variance += k->options.moved == SUPINE_PATIENT_RIGID
-                     ? turn_prior * turn_prior * supine_dot(turn, turn)
-                     : 0.0;
+  double x[WIDTH];
+  double value = supine_patient_power_design(&k->law, row, x) + row->value;
+  *variance = 0.0;
+  if (k->options.sill > 0.0) {
+    const supine_patient_centre at = centre_of(&k->law, row);
+    for (size_t i = 0; i < k->count; ++i) {
+      scratch[i] = k->options.sill * supine_dot(row->axis, k->rows[i].axis) *
+                   supine_patient_krige_covariance(&at, &k->centre[i]);
+    }
+    value += cblas_ddot(n, scratch, 1, k->weight, 1);
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, scratch, 1);
-    *variance = fmax(0.0, *variance - cblas_ddot(n, scratch, 1, scratch, 1));
+    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, WIDTH, scratch, 1, 1.0, x, 1);
+    *variance = k->options.sill * supine_patient_krige_covariance(&at, &at) -
+                cblas_ddot(n, scratch, 1, scratch, 1);
   }
+  for (size_t t = 0; t < TERMS; ++t) {
+    x[t] = spread_of(&k->options, t) > 0.0 ? x[t] : 0.0;
+  }
+  *variance = fmax(0.0, *variance) + variance_of(k, x);
   return value;
 }
 
@@ -239,61 +401,15 @@ static void add_centre(const supine_patient_krige *k, size_t i, supine_patient *
     c->centre[c->count++] = centre;
   }
   for (size_t a = 0; a < 3; ++a) {
-    c->centre[c->count - 1].weight[a] += k->sill * k->weight[i] * k->rows[i].axis[a];
+    c->centre[c->count - 1].weight[a] += k->options.sill * k->weight[i] * k->rows[i].axis[a];
   }
 }
 
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient) {
-  const supine_patient_krige *k = krige;
-  double scale = 1.0;
-  double motion[6] = {0.0};
-  patient->correction = (supine_patient_correction){.count = 0};
-  for (size_t i = 0; i < k->count; ++i) {
-    const supine_patient_row *row = &k->rows[i];
-    double turn[3];
-    supine_cross(row->place.arm, row->axis, turn);
-    scale += scale_variance(k) * k->along[i] * k->weight[i];
-    for (size_t a = 0; a < 3; ++a) {
-      motion[a] += shift_prior * shift_prior * row->axis[a] * k->weight[i];
-      motion[3 + a] += turn_prior * turn_prior * turn[a] * k->weight[i];
-    }
-    if (k->sill > 0.0) {
-      add_centre(k, i, patient);
+  supine_patient_take(&krige->law, patient);
+  for (size_t i = 0; i < krige->count && krige->options.sill > 0.0; ++i) {
+    if (krige->rows[i].weight > 0.0) {
+      add_centre(krige, i, patient);
     }
   }
-  patient->correction.scale = 1.0 / scale;
-  memcpy(patient->powers, k->law.powers, sizeof patient->powers);
-  for (size_t a = 0; a < 3; ++a) {
-    patient->lengths[a] = scale * k->law.linear[a];
-  }
-  for (size_t a = 0; a < 6; ++a) {
-    const bool free = k->options.moved == SUPINE_PATIENT_RIGID ||
-                      (k->options.moved == SUPINE_PATIENT_TRANSLATION && a < 3);
-    patient->motion[a] = k->law.linear[3 + a] + (free ? motion[a] : 0.0);
-  }
-}
-
-size_t supine_patient_krige_thin(const supine_patient_row *rows, size_t single, size_t triples,
-                                 supine_patient_row *thinned) {
-  const size_t landmarks = triples < LANDMARKS_MAX ? triples : LANDMARKS_MAX;
-  const size_t room = SUPINE_PATIENT_CENTRES_MAX - landmarks;
-  size_t matched = 0;
-  size_t seen = 0;
-  size_t count = 0;
-  for (size_t i = 0; i < single; ++i) {
-    matched += rows[i].weight > 0.0;
-  }
-  for (size_t i = 0; i < single; ++i) {
-    if (rows[i].weight > 0.0) { /* every (matched / room)-th */
-      if (matched <= room || (seen * room) / matched != ((seen + 1) * room) / matched) {
-        thinned[count++] = rows[i];
-      }
-      ++seen;
-    }
-  }
-  for (size_t i = 0; i < landmarks; ++i) {
-    memcpy(thinned + count, rows + single + 3 * (i * triples / landmarks), 3 * sizeof *rows);
-    count += 3;
-  }
-  return count;
 }

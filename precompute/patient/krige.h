@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Kriging of what a law leaves of rows (rows.h), each row one component of one point:
+/* A law and the kriging of what it leaves, fitted to rows (rows.h) together:
  *
- *     value = axis . (u (1 + b) + motion + g) + noise      b ~ N(0, 0.3^2)
+ *     value = axis . (u(c) + motion + g) + noise
  *
- * The covariance of g is that of points that are located (runtime/kriging.h); rows let a surface
- * give the component along its normal alone. */
+ * The nine constants c have a normal prior about those of a known law: narrow where that law is to
+ * be kept, wide where it is to be found. They are the most likely ones (generalised least squares,
+ * Gauss-Newton with damping); g has the covariance of points that are located (runtime/kriging.h),
+ * or a share of it. */
 #ifndef SUPINE_PATIENT_KRIGE_H
 #define SUPINE_PATIENT_KRIGE_H
 
@@ -12,36 +14,43 @@
 
 typedef struct supine_patient_krige supine_patient_krige;
 
+/* What is known beforehand. */
 typedef struct supine_patient_krige_options {
+  supine_patient_power mean; /* of the constants, and where their search begins */
+  double spread[3]; /* standard deviations: of lengths, relative; of exponents' logarithms; of
+                       slopes; 0: known */
+  bool shape_kept;  /* where g has all of its covariance the law's size alone is found */
   supine_patient_moved moved; /* which motion is free */
-  bool scale_known; /* all of the law was fitted: b is 0, and g's covariance the share of it, or
-                       none, that makes the rows most likely */
-  bool noise_known; /* the rows' noise as it is; else that of 0.25 to 2 times it which makes the
-                       rows most likely */
+  double sill;  /* share of g's covariance, 0: no g; below 0: whichever makes the rows most likely */
+  double noise; /* factor on the rows' noise; below 0: the most likely */
 } supine_patient_krige_options;
 
-/* Compute the size |u| of the law's displacement, mm. */
-double supine_patient_krige_size(double scale, const double u[3]);
-
-/* Compute the covariance of one axis between two centres, mm^2. */
-double supine_patient_krige_covariance(const supine_patient_centre *a,
-                                       const supine_patient_centre *b);
+/* The options of a law whose size is known. Of `deep` the shape is kept, or, where the rows leave less
+ * to g than people's do, all constants within 30 %; of `paper` they are free. */
+supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
+                                                        const supine_patient_power *mean,
+                                                        supine_patient_moved moved);
 
 /* Fit rows; those of weight 0 do not count.
- * @param law    with the motion that it was fitted with
- * @param rows   [count], kept by the caller for as long as the fit
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status supine_patient_krige_create(const supine_patient_power *law,
+ * @param rows  [count], kept by the caller for as long as the fit
+ * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the law
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
                                           const supine_patient_row *rows, size_t count,
-                                          const supine_patient_krige_options *options,
                                           supine_patient_krige **krige, supine_error *error);
 void supine_patient_krige_destroy(supine_patient_krige *krige);
 
-/* The factor on the rows' noise. */
+/* The law, and its sill and noise as they were given or found. */
+const supine_patient_power *supine_patient_krige_law(const supine_patient_krige *krige);
+double supine_patient_krige_sill(const supine_patient_krige *krige);
 double supine_patient_krige_noise(const supine_patient_krige *krige);
 
+/* Compute the standard errors of c1 to c9. */
+void supine_patient_krige_errors(const supine_patient_krige *krige,
+                                 double error[SUPINE_PATIENT_CONSTANTS]);
+
 /* Predict a row's value, mm.
- * @param variance  optional: of the prediction without noise, mm^2
+ * @param variance  of the prediction without noise, mm^2
  * @param scratch   [rows of the fit] */
 double supine_patient_krige_predict(const supine_patient_krige *krige,
                                     const supine_patient_row *row, double *variance,
@@ -50,9 +59,13 @@ double supine_patient_krige_predict(const supine_patient_krige *krige,
 /* Move law, correction and motion into a patient, whose frame is there. */
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
 
-/* Select the rows that a correction is made of: every k-th of `single` rows, then of points with
- * three each, as many as a correction has centres. The number of rows. */
-size_t supine_patient_krige_thin(const supine_patient_row *rows, size_t single, size_t triples,
-                                 supine_patient_row *thinned);
+/* Compute the covariance of one axis between two centres, mm^2. */
+double supine_patient_krige_covariance(const supine_patient_centre *a,
+                                       const supine_patient_centre *b);
+
+/* Fit the law alone, without g. */
+supine_status supine_patient_law_fit(const supine_patient_krige_options *options,
+                                     const supine_patient_row *rows, size_t count,
+                                     supine_patient_power *law, supine_error *error);
 
 #endif

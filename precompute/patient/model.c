@@ -6,9 +6,12 @@
 
 #include "precompute/patient/patient_file.h"
 
+#include "precompute/physics/solve.h"
 #include "sh/base/parallel.h"
 
-enum { GRAIN = 64 };
+enum { GRAIN = 64, SETTLE_STEPS = 60 };
+
+static const double settled = 1e-4; /* mm in a step */
 
 /* Largest distance between the surface's box and the nearest state's, and ratio of their sizes.
  * Landmarks' boxes are guessed, so theirs may differ more. */
@@ -38,84 +41,144 @@ supine_force_law supine_patient_force(const supine_patient *patient, double gain
 
 typedef struct work {
   const supine_patient_record *record;
-  const supine_lungs *lungs;
-  double *directions;
-  bool by_box; /* positions are those of the fuller state, but for the box */
+  supine_lungs lungs;  /* in the fuller state, as far as that is found */
+  const double *scan;  /* [N, 3] */
+  const double *ratio; /* [N] what a force comes to, over (18) itself */
+  double *moved;       /* [N, 3] mm */
+  bool settle;         /* the scan is the emptier state: its vertices are taken to the fuller one */
 } work;
 
-static bool is_full(const supine_patient_record *record) {
-  return record->state[0].volume.kind == SUPINE_VOLUME_FULL && record->state[0].volume.ml == 0.0;
-}
-
-/* Where a vertex was in the fuller state. */
-static void find_point(const work *w, size_t vertex, double at[3]) {
-  const supine_patient_frame *frame = &w->record->patient.frame;
-  const supine_lungs *lungs = w->lungs;
-  for (size_t k = 0; k < 3; ++k) {
-    const double t = (lungs->mesh.vertices[3 * vertex + k] - lungs->minimum[k]) /
-                     (lungs->maximum[k] - lungs->minimum[k]);
-    at[k] = w->by_box ? frame->minimum[k] + t * (frame->maximum[k] - frame->minimum[k])
-                      : lungs->mesh.vertices[3 * vertex + k];
-  }
-}
-
-static void correct_range(void *context, size_t begin, size_t end, size_t thread) {
+/* The displacement of each vertex, and where it came from. */
+static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
   const supine_patient *patient = &w->record->patient;
   for (size_t i = begin; i < end; ++i) {
-    const size_t lung = i >= w->lungs->lung_begin[1] ? 1 : 0;
-    double at[3];
+    const size_t lung = i >= w->lungs.lung_begin[1] ? 1 : 0;
+    double *at = w->lungs.mesh.vertices + 3 * i;
+    double *u = w->moved + 3 * i;
     double r[3];
-    double u[3] = {0.0, 0.0, 0.0};
-    double *d = w->directions + 3 * i;
-    find_point(w, i, at);
-    supine_patient_place place = supine_patient_find(&patient->frame, at, w->lungs->side[lung]);
-    supine_patient_correct(patient, &place, r);
-    if (!w->record->from_surface) { /* the box was guessed: what the guess misses is added, too */
+    double motion[3];
+    for (int step = 0; step < (w->settle ? SETTLE_STEPS : 1); ++step) {
+      const supine_patient_place place =
+          supine_patient_find(&patient->frame, at, w->lungs.side[lung]);
+      double change = 0.0;
       supine_patient_law_displacement(patient, &place, u);
-      supine_lungs_box_coordinates(w->lungs, i, place.box);
-    }
-    const double force = fmax(force_least, supine_patient_force_at(patient, &place));
-    for (size_t k = 0; k < 3; ++k) {
-      d[k] = w->record->from_surface ? d[k] - r[k] / force : -(u[k] + r[k]) / force;
+      for (size_t k = 0; k < 3 && w->record->from_surface; ++k) {
+        u[k] *= w->ratio[i];
+      }
+      supine_patient_correct(patient, &place, u, r);
+      supine_patient_motion(patient, at, motion);
+      for (size_t k = 0; k < 3; ++k) {
+        u[k] += r[k];
+        if (w->settle) {
+          const double before = at[k];
+          at[k] = w->scan[3 * i + k] - u[k] - motion[k];
+          change += fabs(at[k] - before);
+        }
+      }
+      if (change < settled) {
+        break;
+      }
     }
   }
 }
 
-static void correct(const void *context, const supine_lungs *lungs, double *directions) {
-  const supine_patient_record *record = context;
-  work w = {record, lungs, directions, record->from_surface || !is_full(record)};
-  supine_parallel_for(lungs->mesh.vertex_count, GRAIN, 0, correct_range, &w);
+/* What the force of the fitted posture comes to at each vertex, over (18) itself. */
+static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
+                                supine_error *error) {
+  const supine_patient_record *record = w->record;
+  supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_solution solution = {0};
+  model.force = record->force;
+  model.reach = record->reach;
+  if (stiffness != NULL) {
+    supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
+    model.stiffness = stiffness;
+  }
+  const supine_status status =
+      supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
+  for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
+    supine_patient_place place;
+    supine_lungs_box_coordinates(&w->lungs, i, place.box);
+    ratio[i] = solution.catch_[i] /
+               fmax(force_least, supine_patient_force_at(&record->patient, &place));
+  }
+  supine_physics_solution_free(&solution);
+  return status;
 }
 
-void supine_patient_model(const supine_patient_record *record, supine_model *model) {
+supine_status supine_patient_field_find(const supine_patient_record *record,
+                                        const supine_lungs *lungs, size_t state,
+                                        double *stiffness, supine_patient_field *field,
+                                        supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  work w = {.record = record,
+            .lungs = *lungs,
+            .scan = lungs->mesh.vertices,
+            .moved = malloc(3 * n * sizeof(double)),
+            .settle = state == 1};
+  double *ratio = malloc(n * sizeof *ratio);
+  supine_status status = SUPINE_OK;
+  *field = (supine_patient_field){record, w.moved};
+  w.ratio = ratio;
+  w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
+  if (w.moved == NULL || ratio == NULL || w.lungs.mesh.vertices == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+    goto cleanup;
+  }
+  memcpy(w.lungs.mesh.vertices, w.scan, 3 * n * sizeof(double));
+  for (size_t i = 0; i < n; ++i) {
+    ratio[i] = 1.0;
+  }
+  for (int pass = 0; pass < (w.settle ? 3 : 2) && status == SUPINE_OK; ++pass) {
+    if (pass > 0 || w.settle) {
+      supine_parallel_for(n, GRAIN, 0, move_range, &w);
+      supine_mesh_box(&w.lungs.mesh, w.lungs.minimum, w.lungs.maximum);
+    }
+    status = pass < 2 ? find_ratio(&w, stiffness, ratio, error) : SUPINE_OK;
+  }
+  for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
+    w.moved[i] /= fmax(force_least, ratio[i / 3]);
+  }
+cleanup:
+  free(ratio);
+  free(w.lungs.mesh.vertices);
+  if (status != SUPINE_OK) {
+    supine_patient_field_free(field);
+  }
+  return status;
+}
+
+void supine_patient_field_free(supine_patient_field *field) {
+  free(field->moved);
+  *field = (supine_patient_field){0};
+}
+
+/* d = -u / f, f by the lungs' own box. */
+static void direct(const void *context, const supine_lungs *lungs, double *directions) {
+  const supine_patient_field *field = context;
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    supine_patient_place place;
+    supine_lungs_box_coordinates(lungs, i, place.box);
+    const double force =
+        fmax(force_least, supine_patient_force_at(&field->record->patient, &place));
+    for (size_t k = 0; k < 3; ++k) {
+      directions[3 * i + k] = -field->moved[3 * i + k] / force;
+    }
+  }
+}
+
+void supine_patient_model(const supine_patient_field *field, supine_model *model) {
+  const supine_patient_record *record = field->record;
   model->force = record->force;
   model->reach = record->reach;
   model->direction =
-      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .correct = correct, .context = record};
+      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .correct = direct, .context = field};
   for (size_t k = 0; k < 3; ++k) {
     model->direction.c[2 * k] = -record->patient.lengths[k];
     model->direction.c[2 * k + 1] = record->patient.powers[k];
   }
-}
-
-supine_status supine_patient_set_stiffness(const supine_patient_record *record,
-                                           const supine_lungs *lungs, double *stiffness,
-                                           supine_error *error) {
-  const size_t n = lungs->mesh.vertex_count;
-  const work w = {.record = record, .lungs = lungs, .by_box = true};
-  supine_lungs fuller = *lungs;
-  fuller.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (fuller.mesh.vertices == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    find_point(&w, i, fuller.mesh.vertices + 3 * i);
-  }
-  supine_patient_stiffness_of(&record->stiffness, &fuller, stiffness);
-  free(fuller.mesh.vertices);
-  return SUPINE_OK;
 }
 
 /* --- the scan -------------------------------------------------------------------------------- */
@@ -181,7 +244,9 @@ double supine_patient_below_full(const supine_patient_record *record) {
   const double *v = record->volume;
   double full = full_volume(record, 0, 0.0, &resting);
   full = full > 0.0 ? full : full_volume(record, 1, 0.0, &resting);
-  return v[0] > v[1] && v[1] > 0.0 && full > v[0] ? (full - v[0]) / (v[0] - v[1]) : 0.0;
+  return v[0] > v[1] && v[1] > 0.0 && full > v[0]
+             ? (cbrt(full) - cbrt(v[0])) / (cbrt(v[0]) - cbrt(v[1])) /* lengths, not volumes */
+             : 0.0;
 }
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {

@@ -4,6 +4,7 @@
 
 #include "precompute/patient/krige.h"
 #include "precompute/patient/patient.h"
+#include "sh/base/vec3.h"
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
 
@@ -79,17 +80,11 @@ void supine_patient_law_displacement(const supine_patient *patient,
 }
 
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            double r[3]) {
+                            const double u[3], double r[3]) {
   const supine_patient_correction *correction = &patient->correction;
   const supine_patient_frame *frame = &patient->frame;
-  supine_patient_centre here = {.side = place->side};
-  double u[3];
+  supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
   r[0] = r[1] = r[2] = 0.0;
-  if (correction->count == 0) {
-    return;
-  }
-  supine_patient_law_displacement(patient, place, u);
-  here.size = supine_patient_krige_size(correction->scale, u);
   for (int k = 0; k < 3; ++k) {
     here.at[k] = place->arm[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
   }
@@ -107,7 +102,7 @@ void supine_patient_displacement(const supine_patient *patient, const double poi
   const supine_patient_place place = supine_patient_find(&patient->frame, point, side);
   double r[3];
   supine_patient_law_displacement(patient, &place, u);
-  supine_patient_correct(patient, &place, r);
+  supine_patient_correct(patient, &place, u, r);
   for (int k = 0; k < 3; ++k) {
     u[k] += r[k];
   }

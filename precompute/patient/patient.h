@@ -37,9 +37,8 @@ typedef struct supine_patient_frame {
 
 enum {
   SUPINE_PATIENT_POWERS = 6, /**< c2, c4, c6, c7, c8, c9: not linear in the displacement */
-  SUPINE_PATIENT_STARTS = 6, /**< from which they are searched */
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_CENTRES_MAX = 600
+  SUPINE_PATIENT_CENTRES_MAX = 900
 };
 
 /** A kernel of the correction. */
@@ -52,7 +51,6 @@ typedef struct supine_patient_centre {
 
 typedef struct supine_patient_correction {
   size_t count; /**< 0: none */
-  double scale; /**< the law that sizes are counted in, over the law as it was fitted */
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient_correction;
 
@@ -97,9 +95,10 @@ void supine_patient_direction(const supine_patient *patient, const supine_patien
 void supine_patient_law_displacement(const supine_patient *patient,
                                      const supine_patient_place *place, double u[3]);
 
-/** Compute the correction at a place, mm. */
+/** Compute the correction at a place, mm.
+ * @param u  the law's displacement there, mm */
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            double r[3]);
+                            const double u[3], double r[3]);
 
 /** Compute u of a point, mm, without the motion between the scans.
  * @param side  as supine_patient_find */

@@ -46,7 +46,7 @@ static json_t *correction(const supine_patient_correction *of) {
                                    c->size,  c->weight[0], c->weight[1], c->weight[2]};
     (void)json_array_append_new(all, numbers(values, CENTRE));
   }
-  return json_pack("{s:f, s:o}", "scale", of->scale, "centres", all);
+  return json_pack("{s:o}", "centres", all);
 }
 
 static void add_report(json_t *root, const supine_patient *patient,
@@ -58,17 +58,12 @@ static void add_report(json_t *root, const supine_patient *patient,
   supine_patient_constants(patient, c);
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && patient->law == SUPINE_PATIENT_PAPER; ++k) {
     (void)json_object_set_new(constants, names[k],
-                              json_pack("{s:f, s:f, s:f, s:f}", "value", c[k], "standard_error",
-                                        report->error[k], "low", report->low[k], "high",
-                                        report->high[k]));
+                              json_pack("{s:f, s:f}", "value", c[k], "standard_error",
+                                        report->error[k]));
   }
   (void)json_object_set_new(root, "paper_constants", constants);
   (void)json_object_set_new(root, "fitted", scores(&report->fitted));
   (void)json_object_set_new(root, "held_out", scores(&report->held_out));
-  (void)json_object_set_new(
-      root, "starts",
-      json_pack("{s:o, s:i, s:f}", "rms_mm", numbers(report->starts, SUPINE_PATIENT_STARTS),
-                "agreeing", (int)report->starts_agreeing, "apart_mm", report->start_apart));
   (void)json_object_set_new(root, "blocks", json_integer((json_int_t)report->blocks));
   (void)json_object_set_new(root, "explained_fitted_percent",
                             json_real(100.0 * report->explained_fitted));
@@ -270,7 +265,6 @@ static bool take_law(const json_t *root, supine_patient *patient) {
 static bool take_correction(const json_t *object, supine_patient_correction *of) {
   const json_t *all = json_object_get(object, "centres");
   of->count = json_array_size(all);
-  of->scale = json_number_value(json_object_get(object, "scale"));
   bool right = json_is_array(all) && of->count <= SUPINE_PATIENT_CENTRES_MAX;
   for (size_t i = 0; right && i < of->count; ++i) {
     double v[CENTRE];

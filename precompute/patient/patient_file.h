@@ -69,20 +69,28 @@ char *supine_patient_text(const supine_patient_record *record,
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** Set force, directions and reach of a model to the patient's. The record is kept by the caller
- * for as long as the model. The corrected directions, with r the correction and f the force in the
- * fitted posture, at least 0.2 of its mean, are
- *
- *     d = (15)-(17) - r / f        so that f d is what the person's lungs move by
- *
- * Where the surface is not that of the fuller state, positions are those of its box. */
-void supine_patient_model(const supine_patient_record *record, supine_model *model);
+/** How a person's law moves the vertices of a surface, by (15)-(17) and the correction. */
+typedef struct supine_patient_field {
+  const supine_patient_record *record; /**< the caller's, to be kept */
+  double *moved;                       /**< [N, 3] mm, for a force of 1 that comes to 1 */
+} supine_patient_field;
 
-/** Compute the stiffness E [N] of a surface, relative.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_patient_set_stiffness(const supine_patient_record *record,
-                                           const supine_lungs *lungs, double *stiffness,
-                                           supine_error *error);
+/** Find the displacement of every vertex between the two states that were fitted; free it.
+ * @param state      that the surface shows: 0 the fuller, 1 the emptier
+ * @param stiffness  optional [N]: E, relative, of a record that has one
+ * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
+supine_status supine_patient_field_find(const supine_patient_record *record,
+                                        const supine_lungs *lungs, size_t state,
+                                        double *stiffness, supine_patient_field *field,
+                                        supine_error *error);
+void supine_patient_field_free(supine_patient_field *field);
+
+/** Set force, directions and reach of a model to the patient's. The field is kept by the caller for
+ * as long as the model. With u the displacement and f the force in the fitted posture, at least 0.2
+ * of its mean, the directions are
+ *
+ *     d = -u / f               so that f d is what the person's lungs move by */
+void supine_patient_model(const supine_patient_field *field, supine_model *model);
 
 /** Find the state that a surface shows, by its box.
  * @param state  0 the fuller, 1 the emptier

@@ -34,6 +34,22 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
   }
 }
 
+void supine_patient_row_displacement(const supine_patient *patient, const supine_patient_row *row,
+                                     double u[3]) {
+  const double *c = patient->powers + 3;
+  const double force =
+      row->force[0] + c[0] * row->force[1] + c[1] * row->force[2] + c[2] * row->force[3]; /* (18) */
+  double r[3];
+  supine_patient_direction(patient, &row->place, u);
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] *= force;
+  }
+  supine_patient_correct(patient, &row->place, u, r);
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] += r[k];
+  }
+}
+
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
   enum { CELLS = 64 }; /* a side: 2.5 m */

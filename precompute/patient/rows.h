@@ -27,6 +27,10 @@ typedef enum supine_patient_moved {
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
+/* Compute u of a row's point, mm: the law under the row's force, and the correction. */
+void supine_patient_row_displacement(const supine_patient *patient, const supine_patient_row *row,
+                                     double u[3]);
+
 /* Gives each row its block, a cube of 40 mm, the grid's origin drawn from the seed; the number of
  * blocks. */
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
@@ -37,30 +41,27 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned long seed,
                                        size_t *fold_of);
 
-/* --- the paper's law ------------------------------------------------------------------------- */
+/* --- the law --------------------------------------------------------------------------------- */
+
+/* Unknowns: c1, c3, c5; logarithms of c2, c4, c6; c7 to c9; translation; small rotation;
+ * all of the law. */
+enum { SUPINE_PATIENT_TERMS = 16 };
 
 typedef struct supine_patient_power {
   double powers[SUPINE_PATIENT_POWERS];
   double linear[9]; /* c1, c3, c5 in mm; translation in mm; small rotation in rad */
-  double squares;   /* what is left, weighted, mm^2 */
-  double pulled;    /* what holds down powers that the rows leave open has come to, mm^2 */
-  bool at_bound[SUPINE_PATIENT_POWERS];
 } supine_patient_power;
 
-/* The six starts. */
-extern const double supine_patient_starts[SUPINE_PATIENT_STARTS][SUPINE_PATIENT_POWERS];
+/* Bounds of c2, c4, c6 and of c7, c8, c9. */
+extern const double supine_patient_exponent_least, supine_patient_exponent_most,
+    supine_patient_slope_most;
 
-/* Variable projection: what is linear is solved for at each step of the rest (GSL's
- * multifit_nlinear, Levenberg-Marquardt).
- * @param powers     where to start
- * @param steps      at most
- * @param tolerance  of the unknowns' relative change in a step
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status supine_patient_power_fit(const supine_patient_row *rows, size_t count,
-                                       supine_patient_moved moved,
-                                       const double powers[SUPINE_PATIENT_POWERS], size_t steps,
-                                       double tolerance, supine_patient_power *fit,
-                                       supine_error *error);
+/* Compute what each unknown moves along a row, per unit; returns what the law leaves of it, mm. */
+double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
+                                   double x[SUPINE_PATIENT_TERMS]);
+
+/* Take a law and the motion into a patient, without a correction. */
+void supine_patient_take(const supine_patient_power *law, supine_patient *patient);
 
 /* What a fit leaves of a row, mm. */
 double supine_patient_power_residual(const supine_patient_power *fit,

@@ -11,20 +11,22 @@
 #include "sh/base/parallel.h"
 
 enum {
-  VERTICES_MAX = 2000, /* that take part: a law of nine constants is not better known from more */
+  VERTICES_MAX = 600,    /* that take part: kriging is of 90 mm */
+  EXPANDED_MAX = 2000,   /* the same where regions some 45 mm apart are to be found */
   ROUNDS_MAX = 60,
-  ROUND_STEPS = 4,
   GRAIN = 64
 };
 
-static const double settled = 2e-3;      /* mm RMS between two rounds */
+static const double settled = 2e-3; /* mm RMS between two rounds */
+static const double near_by = 0.5;  /* the same, where a law of known shape is near enough */
+static const double outlying = 1.0; /* mm: distances that are none, at least. Kriging carries what a
+                                       law misses, and would leave what is weighted down */
 static const double same_state = 0.02;   /* mm RMS */
 static const double overlap_least = 0.5; /* of the smaller box, along each axis */
 static const double size_most = 1.6;
 static const double matched_least = 0.3;
 static const double nearer_least =
     0.6; /* of the distance as given: so near and reversed is no chance */
-static const double round_tolerance = 1e-4;
 
 typedef supine_patient_matching matching;
 
@@ -33,25 +35,10 @@ typedef struct boxes {
   double low[2][3], high[2][3];
 } boxes;
 
-/* A law found so far; of the deep one with its correction. */
-typedef struct estimate {
-  supine_patient_law law;
-  supine_patient_moved moved;
-  supine_patient_power shape; /* of the deep law */
-  supine_patient_power power;
-  supine_patient_row *thinned; /* of the correction */
-  supine_patient_krige *krige;
-} estimate;
-
-static void estimate_free(estimate *e) {
-  supine_patient_krige_destroy(e->krige);
-  free(e->thinned);
-}
-
 /* Where the law puts the vertices that take part. */
 typedef struct placing {
   matching *m;
-  const estimate *e;
+  const supine_patient *patient;
   double *square; /* [count] of how far each went, mm^2 */
 } placing;
 
@@ -59,57 +46,51 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
   (void)thread;
   placing *w = context;
   matching *m = w->m;
-  const supine_patient_power *power = &w->e->power;
-  double *scratch = malloc((m->count + m->landmark_rows_count) * sizeof *scratch);
-  for (size_t i = begin; i < end && scratch != NULL; ++i) {
-    supine_patient_row row = m->rows[i];
-    row.value = 0.0;
+  for (size_t i = begin; i < end; ++i) {
+    const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
+    double u[3];
+    double motion[3];
+    supine_patient_row_displacement(w->patient, &m->rows[i], u);
+    supine_patient_motion(w->patient, from, motion);
     w->square[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
-      for (size_t k = 0; k < 3; ++k) {
-        row.axis[k] = a == k ? 1.0 : 0.0;
-      }
-      const double u = w->e->krige == NULL
-                           ? supine_patient_power_residual(power, &row)
-                           : supine_patient_krige_predict(w->e->krige, &row, NULL, scratch);
-      const double at = m->rest->mesh.vertices[3 * m->vertex[i] + a] + u;
+      const double at = from[a] + u[a] + motion[a];
       w->square[i] += pow(at - m->moved[3 * i + a], 2.0);
       m->moved[3 * i + a] = at;
     }
   }
-  free(scratch);
 }
 
-/* The law's own constants, or the deep law's scale and its correction, fitted to the rows. */
-static supine_status refit(const matching *m, estimate *e, supine_error *error) {
+/* Fit the deep law's size to the rows; or, `shaped`, its constants and the correction. */
+static supine_status refit(const matching *m, const supine_patient_fit_options *wanted, bool shaped,
+                           supine_patient_krige_options *options, supine_patient *patient,
+                           supine_error *error) {
   const size_t count = m->count + m->landmark_rows_count;
-  if (e->law == SUPINE_PATIENT_PAPER) {
-    return supine_patient_power_fit(m->rows, count, e->moved, e->power.powers, ROUND_STEPS,
-                                    round_tolerance, &e->power, error);
+  const supine_patient_power shape = supine_patient_deep(wanted->gravity);
+  supine_patient_krige *krige = NULL;
+  supine_patient_power law;
+  supine_status status;
+  if (shaped) {
+    status = supine_patient_krige_create(options, m->rows, count, &krige, error);
+  } else {
+    status = supine_patient_scale_fit(m->rows, count, wanted->moved, &shape, &law, error);
+    *options = supine_patient_krige_prior(wanted->law, &law, wanted->moved);
+    options->noise = 1.0;
+    options->sill = wanted->uncorrected ? 0.0 : -1.0;
+    supine_patient_take(&law, patient);
   }
-  if (e->thinned == NULL) {
-    e->thinned = malloc(count * sizeof *e->thinned);
+  if (status == SUPINE_OK && shaped) {
+    supine_patient_krige_take(krige, patient);
+    options->sill = supine_patient_krige_sill(krige);
   }
-  if (e->thinned == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
-  }
-  supine_patient_krige_destroy(e->krige);
-  e->krige = NULL;
-  const supine_patient_krige_options options = {.moved = e->moved, .noise_known = true};
-  const supine_status status =
-      supine_patient_scale_fit(m->rows, count, e->moved, &e->shape, &e->power, error);
-  return status != SUPINE_OK
-             ? status
-             : supine_patient_krige_create(&e->power, e->thinned,
-                                           supine_patient_krige_thin(m->rows, m->count,
-                                                                     m->landmark_rows_count / 3,
-                                                                     e->thinned),
-                                           &options, &e->krige, error);
+  supine_patient_krige_destroy(krige);
+  return status;
 }
 
 /* Move the vertices; mm RMS by which they moved. */
-static supine_status place(matching *m, const estimate *e, double *change, supine_error *error) {
-  placing w = {.m = m, .e = e, .square = calloc(m->count, sizeof(double))};
+static supine_status place(matching *m, const supine_patient *patient, double *change,
+                           supine_error *error) {
+  placing w = {.m = m, .patient = patient, .square = calloc(m->count, sizeof(double))};
   if (w.square == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", m->count);
   }
@@ -137,27 +118,25 @@ static void start_rows(matching *m, const boxes *b) {
   }
 }
 
-/* Distances that are no outliers, mm, at least: kriging carries what a law misses, and would leave
- * what is weighted down where it is. */
-static double scale_of(supine_patient_law law) {
-  return law == SUPINE_PATIENT_DEEP ? 1.0 : 0.0;
-}
-
-static supine_status settle(matching *m, const boxes *b, estimate *e,
-                            supine_patient_surface_report *report, double *rms, size_t *rounds,
+/* Rows of the nearest points and the fit to them by turns: the law's size first, so that what the
+ * surfaces do not show, the motion along them, begins with the law's. */
+static supine_status settle(matching *m, const boxes *b, const supine_patient_fit_options *wanted,
+                            supine_patient *patient, supine_patient_surface_report *report,
                             supine_error *error) {
+  supine_patient_krige_options options = {.sill = -1.0, .noise = 1.0};
   supine_status status = SUPINE_OK;
+  bool shaped = false;
   m->warm = false;
   start_rows(m, b);
-  for (*rounds = 0; status == SUPINE_OK && *rounds < ROUNDS_MAX; ++*rounds) {
+  for (report->rounds = 0; status == SUPINE_OK && report->rounds < ROUNDS_MAX; ++report->rounds) {
     double change = 0.0;
-    status = refit(m, e, error);
+    status = refit(m, wanted, shaped, &options, patient, error);
     if (status == SUPINE_OK) {
-      status = place(m, e, &change, error);
+      status = place(m, patient, &change, error);
     }
     if (status == SUPINE_OK) {
       supine_patient_matching_find(m);
-      report->matched = supine_patient_matching_weigh(m, scale_of(e->law), rms);
+      report->matched = supine_patient_matching_weigh(m, outlying, &report->after);
       if (report->matched < matched_least) {
         status = supine_error_set(error, SUPINE_ERROR_MESH,
                                   "only %.0f %% of the vertices find the other surface facing the "
@@ -165,8 +144,11 @@ static supine_status settle(matching *m, const boxes *b, estimate *e,
                                   100.0 * report->matched);
       }
     }
-    if (change < settled) {
-      break;
+    if (change < (shaped ? settled : near_by)) {
+      if (shaped) {
+        break;
+      }
+      shaped = true;
     }
   }
   return status;
@@ -191,64 +173,6 @@ static supine_status check_boxes(const boxes *b, supine_error *error) {
     }
   }
   return SUPINE_OK;
-}
-
-static supine_status step_on(const supine_patient_surface_task *task, double share,
-                             supine_error *error) {
-  return task->progress == NULL || task->progress(task->progress_context, share)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted");
-}
-
-/* Progress of the expandability, after that of the starts. */
-static const double starts_share = 0.2;
-
-static bool later_progress(void *context, double share) {
-  const supine_patient_surface_task *task = context;
-  return task->progress == NULL ||
-         task->progress(task->progress_context, starts_share + (1.0 - starts_share) * share);
-}
-
-/* All starts of the paper's law; the rows are left as the best one found them. */
-static supine_status start_all(matching *m, const supine_patient_surface_task *task, const boxes *b,
-                               estimate *best, supine_patient_surface_report *report,
-                               supine_error *error) {
-  double *kept = malloc(3 * m->count * sizeof *kept);
-  size_t winner = 0;
-  supine_status status = kept == NULL
-                             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for starts")
-                             : SUPINE_OK;
-  for (size_t k = 0; k < SUPINE_PATIENT_STARTS && status == SUPINE_OK; ++k) {
-    estimate e = {.law = SUPINE_PATIENT_PAPER, .moved = task->options.moved};
-    size_t rounds = 0;
-    memcpy(e.power.powers, supine_patient_starts[k], sizeof e.power.powers);
-    status = settle(m, b, &e, report, &report->distance[k], &rounds, error);
-    for (size_t i = 0; i < m->count && k > 0 && status == SUPINE_OK; ++i) {
-      double square = 0.0;
-      for (size_t a = 0; a < 3; ++a) {
-        square += pow(m->moved[3 * i + a] - kept[3 * i + a], 2.0);
-      }
-      report->point_apart = fmax(report->point_apart, sqrt(square));
-    }
-    if (status == SUPINE_OK && (k == 0 || report->distance[k] < report->distance[winner])) {
-      winner = k;
-      *best = e;
-      report->rounds = rounds;
-      memcpy(kept, m->moved, 3 * m->count * sizeof *kept);
-    }
-    if (status == SUPINE_OK) {
-      const double all = task->expandability ? starts_share : 1.0;
-      status = step_on(task, all * (double)(k + 1) / SUPINE_PATIENT_STARTS, error);
-    }
-  }
-  if (status == SUPINE_OK) { /* the rows of the winner */
-    memcpy(m->moved, kept, 3 * m->count * sizeof *kept);
-    m->warm = false;
-    supine_patient_matching_find(m);
-    report->matched = supine_patient_matching_weigh(m, 0.0, &report->after);
-  }
-  free(kept);
-  return status;
 }
 
 /* How far rest is from the state, box laid on box, some axes reversed; mm RMS to nearest points. */
@@ -313,12 +237,12 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
 
 /* The stiffness, and the rows of the law with it. What is held out is then counted as the
  * expandability's blocks have it, as their stiffness had not seen them either. */
-static supine_status expand(matching *m, const supine_patient_surface_task *task, estimate *e,
+static supine_status expand(matching *m, const supine_patient_surface_task *task,
                             supine_patient_surface_fit *fit, supine_error *error) {
   const supine_patient_expand_task wanted = {task->options.moved, task->model, task->gravity,
-                                             later_progress, (void *)task};
+                                             task->progress, task->progress_context};
   const supine_status status =
-      supine_patient_expand(m, &wanted, &e->power, &fit->stiffness, &fit->expand, error);
+      supine_patient_expand(m, &wanted, &fit->patient, &fit->stiffness, &fit->expand, error);
   if (status == SUPINE_OK) {
     fit->surface.matched = supine_patient_matching_weigh(m, 0.0, &fit->surface.after);
   }
@@ -352,22 +276,20 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
   return status;
 }
 
-/* Nearest points by the law that is wanted, then all that is to be said of it. */
+/* Nearest points, then all that is to be said of the law. */
 static supine_status run(matching *m, const supine_patient_surface_task *task, const boxes *b,
-                         const supine_patient_fit_options *wanted, estimate *e,
-                         supine_patient_surface_fit *fit, supine_error *error) {
-  supine_patient_surface_report *report = &fit->surface;
-  supine_status status = look_at_rest(m, report, error);
+                         const supine_patient_fit_options *wanted, supine_patient_surface_fit *fit,
+                         supine_error *error) {
+  fit->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
+  supine_status status = look_at_rest(m, &fit->surface, error);
   if (status == SUPINE_OK) {
     status = check_axes(m, b, error);
   }
   if (status == SUPINE_OK) {
-    status = wanted->law == SUPINE_PATIENT_PAPER
-                 ? start_all(m, task, b, e, report, error)
-                 : settle(m, b, e, report, &report->after, &report->rounds, error);
+    status = settle(m, b, wanted, &fit->patient, &fit->surface, error);
   }
   if (status == SUPINE_OK && task->expandability) {
-    status = expand(m, task, e, fit, error);
+    status = expand(m, task, fit, error);
   }
   return status == SUPINE_OK ? judge(m, task, wanted, fit, error) : status;
 }
@@ -382,15 +304,14 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
-  estimate e = {.law = wanted.law, .moved = wanted.moved};
-  e.shape = supine_patient_deep(wanted.gravity);
   *fit = (supine_patient_surface_fit){0};
   memcpy(b.low[0], task->rest->minimum, sizeof b.low[0]);
   memcpy(b.high[0], task->rest->maximum, sizeof b.high[0]);
   supine_mesh_box(task->state, b.low[1], b.high[1]);
   supine_status status = check_boxes(&b, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(task->rest, task->state, task->model, VERTICES_MAX,
+    status = supine_patient_matching_create(task->rest, task->state, task->model,
+                                            task->expandability ? EXPANDED_MAX : VERTICES_MAX,
                                             task->landmarks != NULL ? task->landmarks->count : 0,
                                             &m, error);
   }
@@ -398,9 +319,8 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
     supine_patient_matching_append(&m, task->landmarks);
   }
   if (status == SUPINE_OK) {
-    status = run(&m, task, &b, &wanted, &e, fit, error);
+    status = run(&m, task, &b, &wanted, fit, error);
   }
-  estimate_free(&e);
   supine_patient_matching_free(&m);
   return status;
 }

@@ -18,9 +18,7 @@
 
 /** How the surfaces came together. */
 typedef struct supine_patient_surface_report {
-  double distance[SUPINE_PATIENT_STARTS]; /**< RMS of point to plane after each start, mm */
-  double point_apart;   /**< largest distance between where two starts put a vertex, mm */
-  size_t rounds;        /**< of the best start */
+  size_t rounds;
   size_t vertices;      /**< that took part */
   double matched;       /**< share of them with a compatible point */
   double before, after; /**< RMS of point to plane at rest and in the end, mm */
