@@ -30,11 +30,11 @@ static const double regions_differ = 1.0;
 static const double noise_least = 0.3; /* mm: no surface is known better */
 static const double together = 10.0; /* rows that err alike, as neighbours do: they count as one */
 
-static const double near_by = 1.7;    /* of the least distance between centres: neighbours */
-static const double least = 0.02;     /* a of any region */
-static const double worth = 0.95;     /* of the held-out RMS: what leaves more is not kept */
-static const double settled = 1e-3;   /* of any a, in a turn */
-static const double residual = 1e-6;  /* of solves */
+static const double near_by = 1.7;   /* of the least distance between centres: neighbours */
+static const double least = 0.02;    /* a of any region */
+static const double worth = 0.95;    /* of the held-out RMS: what leaves more is not kept */
+static const double settled = 1e-3;  /* of any a, in a turn */
+static const double residual = 1e-6; /* of solves */
 
 /* The regions' values, and a law to go with them. */
 typedef struct estimate {
@@ -440,8 +440,7 @@ static supine_status finish(study *s, const estimate *e, supine_patient *patient
 }
 
 supine_status supine_patient_expand(supine_patient_matching *matching,
-                                    const supine_patient_expand_task *task,
-                                    supine_patient *patient,
+                                    const supine_patient_expand_task *task, supine_patient *patient,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
   supine_patient_matching *m = matching;

@@ -51,8 +51,7 @@ typedef struct supine_patient_expand_report {
  * @param stiffness  counts 0 where it was not kept
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
-                                    const supine_patient_expand_task *task,
-                                    supine_patient *patient,
+                                    const supine_patient_expand_task *task, supine_patient *patient,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 

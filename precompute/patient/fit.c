@@ -32,9 +32,9 @@ typedef struct study {
   const supine_patient_fit_options *options;
   supine_patient_row *rows;
   size_t single, row_count, components;
-  double sill; /* of all rows; below 0: to be found */
-  size_t *fold;       /* [SEEDS, row_count] */
-  squares *left;      /* [ITEMS] of held-out folds */
+  double sill;   /* of all rows; below 0: to be found */
+  size_t *fold;  /* [SEEDS, row_count] */
+  squares *left; /* [ITEMS] of held-out folds */
   size_t blocks;
   supine_status *failed; /* [ITEMS] */
 } study;
@@ -258,10 +258,9 @@ static supine_status fit_all(study *s, supine_patient *patient, squares *fitted,
   double *scratch = malloc(s->row_count * sizeof *scratch);
   supine_patient_krige *krige = NULL;
   supine_patient_power law;
-  supine_status status =
-      scratch == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", s->row_count)
-          : fit_rows(s, s->rows, s->row_count, &law, &krige, error);
+  supine_status status = scratch == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                                            "no memory for %zu rows", s->row_count)
+                                         : fit_rows(s, s->rows, s->row_count, &law, &krige, error);
   if (status == SUPINE_OK) {
     s->sill = supine_patient_krige_sill(krige);
 

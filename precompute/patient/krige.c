@@ -16,11 +16,11 @@ enum {
   TERMS = SUPINE_PATIENT_TERMS,
   LAW = SUPINE_PATIENT_CONSTANTS, /* the first terms; motion follows */
   SCALE = TERMS - 1,
-  WIDTH = TERMS + 1,              /* of the design: the terms, and what is left of the value */
+  WIDTH = TERMS + 1, /* of the design: the terms, and what is left of the value */
   STEPS = 60
 };
 
-static const double scale_spread = 0.3; /* of a law whose shape is kept */
+static const double scale_spread = 0.3;  /* of a law whose shape is kept */
 static const double settled = 1e-10;     /* relative, of the squares in a step */
 static const double damping_most = 1e10; /* of a step: no step helps any more */
 
@@ -36,6 +36,7 @@ struct supine_patient_krige {
   double normal[TERMS * TERMS];  /* of the terms, factored (Cholesky) */
   double right[TERMS];
   double squares; /* left, whitened, with the prior's */
+  double sill;    /* factor on g's covariance in sizes of the law */
 };
 
 supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
@@ -72,11 +73,16 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
 
 /* --- the terms ------------------------------------------------------------------------------- */
 
+/* Whether the law's shape is the one that is known. */
+static bool keeps_shape(const supine_patient_krige_options *options) {
+  return options->shape_kept && options->sill >= 1.0;
+}
+
 /* Standard deviation of a term: 0 known, INFINITY free. */
 static double spread_of(const supine_patient_krige_options *options, size_t term) {
   static const size_t motion[] = {0, 3, 6};
   const double unit = term < 3 ? fabs(options->mean.linear[term]) : 1.0;
-  const bool kept = options->shape_kept && options->sill >= 1.0;
+  const bool kept = keeps_shape(options);
   return term == SCALE                         ? (kept ? scale_spread : 0.0)
          : term < LAW                          ? (kept ? 0.0 : options->spread[term / 3] * unit)
          : term - LAW < motion[options->moved] ? INFINITY
@@ -88,9 +94,9 @@ static double offset_of(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->options.mean;
   return term == SCALE ? law->linear[0] / mean->linear[0] - 1.0
-         : term < 3   ? law->linear[term] - mean->linear[term]
-         : term < 6 ? log(law->powers[term - 3] / mean->powers[term - 3])
-                    : law->powers[term - 3] - mean->powers[term - 3];
+         : term < 3    ? law->linear[term] - mean->linear[term]
+         : term < 6    ? log(law->powers[term - 3] / mean->powers[term - 3])
+                       : law->powers[term - 3] - mean->powers[term - 3];
 }
 
 static supine_patient_power moved_by(const supine_patient_power *law, const double step[TERMS]) {
@@ -113,11 +119,16 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->options.noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factor the covariance of the rows, noise and g of the law's sizes.
+/* Factor the covariance of the rows, noise and g. Where the law has its known shape, g is as large
+ * as that law's size by least squares makes it.
  * @return the logarithm of half its determinant; NAN where it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
+  k->sill = k->options.sill;
+  if (keeps_shape(&k->options)) {
+    k->sill *= fabs(k->options.mean.linear[0] / k->law.linear[0]);
+  }
   for (size_t i = 0; i < n; ++i) {
     k->centre[i] = centre_of(&k->law, &k->rows[i]);
     logarithm += k->options.sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
@@ -127,7 +138,7 @@ static double factor(supine_patient_krige *k) {
   }
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
-      k->factor[i * n + j] = k->options.sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
+      k->factor[i * n + j] = k->sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
                              supine_patient_krige_covariance(&k->centre[i], &k->centre[j]);
     }
     k->factor[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
@@ -371,14 +382,14 @@ double supine_patient_krige_predict(const supine_patient_krige *krige,
   if (k->options.sill > 0.0) {
     const supine_patient_centre at = centre_of(&k->law, row);
     for (size_t i = 0; i < k->count; ++i) {
-      scratch[i] = k->options.sill * supine_dot(row->axis, k->rows[i].axis) *
+      scratch[i] = k->sill * supine_dot(row->axis, k->rows[i].axis) *
                    supine_patient_krige_covariance(&at, &k->centre[i]);
     }
     value += cblas_ddot(n, scratch, 1, k->weight, 1);
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, scratch, 1);
     cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, WIDTH, scratch, 1, 1.0, x, 1);
-    *variance = k->options.sill * supine_patient_krige_covariance(&at, &at) -
-                cblas_ddot(n, scratch, 1, scratch, 1);
+    *variance =
+        k->sill * supine_patient_krige_covariance(&at, &at) - cblas_ddot(n, scratch, 1, scratch, 1);
   }
   for (size_t t = 0; t < TERMS; ++t) {
     x[t] = spread_of(&k->options, t) > 0.0 ? x[t] : 0.0;
@@ -401,7 +412,7 @@ static void add_centre(const supine_patient_krige *k, size_t i, supine_patient *
     c->centre[c->count++] = centre;
   }
   for (size_t a = 0; a < 3; ++a) {
-    c->centre[c->count - 1].weight[a] += k->options.sill * k->weight[i] * k->rows[i].axis[a];
+    c->centre[c->count - 1].weight[a] += k->sill * k->weight[i] * k->rows[i].axis[a];
   }
 }
 

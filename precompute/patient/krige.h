@@ -21,12 +21,12 @@ typedef struct supine_patient_krige_options {
                        slopes; 0: known */
   bool shape_kept;  /* where g has all of its covariance the law's size alone is found */
   supine_patient_moved moved; /* which motion is free */
-  double sill;  /* share of g's covariance, 0: no g; below 0: whichever makes the rows most likely */
+  double sill; /* share of g's covariance, 0: no g; below 0: whichever makes the rows most likely */
   double noise; /* factor on the rows' noise; below 0: the most likely */
 } supine_patient_krige_options;
 
-/* The options of a law whose size is known. Of `deep` the shape is kept, or, where the rows leave less
- * to g than people's do, all constants within 30 %; of `paper` they are free. */
+/* The options of a law whose size is known. Of `deep` the shape is kept, or, where the rows leave
+ * less to g than people's do, all constants within 30 %; of `paper` they are free. */
 supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
                                                         const supine_patient_power *mean,
                                                         supine_patient_moved moved);

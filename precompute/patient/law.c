@@ -16,7 +16,7 @@ double supine_patient_power_design(const supine_patient_power *law, const supine
   const double *slopes = law->powers + 3;
   const double force = row->force[0] + slopes[0] * row->force[1] + slopes[1] * row->force[2] +
                        slopes[2] * row->force[3]; /* (18) */
-  double even = 0.0; /* what a force of 1 moves */
+  double even = 0.0;                              /* what a force of 1 moves */
   double left = -row->value;
   for (size_t a = 0; a < 3; ++a) {
     const double box = fmin(1.0, fmax(1e-12, row->place.box[a]));

@@ -101,17 +101,16 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
     supine_patient_place place;
     supine_lungs_box_coordinates(&w->lungs, i, place.box);
-    ratio[i] = solution.catch_[i] /
-               fmax(force_least, supine_patient_force_at(&record->patient, &place));
+    ratio[i] =
+        solution.catch_[i] / fmax(force_least, supine_patient_force_at(&record->patient, &place));
   }
   supine_physics_solution_free(&solution);
   return status;
 }
 
 supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_lungs *lungs, size_t state,
-                                        double *stiffness, supine_patient_field *field,
-                                        supine_error *error) {
+                                        const supine_lungs *lungs, size_t state, double *stiffness,
+                                        supine_patient_field *field, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   work w = {.record = record,
             .lungs = *lungs,

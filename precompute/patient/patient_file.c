@@ -57,9 +57,9 @@ static void add_report(json_t *root, const supine_patient *patient,
   json_t *constants = json_object();
   supine_patient_constants(patient, c);
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && patient->law == SUPINE_PATIENT_PAPER; ++k) {
-    (void)json_object_set_new(constants, names[k],
-                              json_pack("{s:f, s:f}", "value", c[k], "standard_error",
-                                        report->error[k]));
+    (void)json_object_set_new(
+        constants, names[k],
+        json_pack("{s:f, s:f}", "value", c[k], "standard_error", report->error[k]));
   }
   (void)json_object_set_new(root, "paper_constants", constants);
   (void)json_object_set_new(root, "fitted", scores(&report->fitted));

@@ -80,9 +80,8 @@ typedef struct supine_patient_field {
  * @param stiffness  optional [N]: E, relative, of a record that has one
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_lungs *lungs, size_t state,
-                                        double *stiffness, supine_patient_field *field,
-                                        supine_error *error);
+                                        const supine_lungs *lungs, size_t state, double *stiffness,
+                                        supine_patient_field *field, supine_error *error);
 void supine_patient_field_free(supine_patient_field *field);
 
 /** Set force, directions and reach of a model to the patient's. The field is kept by the caller for

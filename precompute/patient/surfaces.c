@@ -11,8 +11,8 @@
 #include "sh/base/parallel.h"
 
 enum {
-  VERTICES_MAX = 600,    /* that take part: kriging is of 90 mm */
-  EXPANDED_MAX = 2000,   /* the same where regions some 45 mm apart are to be found */
+  VERTICES_MAX = 600,  /* that take part: kriging is of 90 mm */
+  EXPANDED_MAX = 2000, /* the same where regions some 45 mm apart are to be found */
   ROUNDS_MAX = 60,
   GRAIN = 64
 };
@@ -310,10 +310,9 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
   supine_mesh_box(task->state, b.low[1], b.high[1]);
   supine_status status = check_boxes(&b, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(task->rest, task->state, task->model,
-                                            task->expandability ? EXPANDED_MAX : VERTICES_MAX,
-                                            task->landmarks != NULL ? task->landmarks->count : 0,
-                                            &m, error);
+    status = supine_patient_matching_create(
+        task->rest, task->state, task->model, task->expandability ? EXPANDED_MAX : VERTICES_MAX,
+        task->landmarks != NULL ? task->landmarks->count : 0, &m, error);
   }
   if (status == SUPINE_OK && task->landmarks != NULL) {
     supine_patient_matching_append(&m, task->landmarks);
