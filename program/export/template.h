@@ -18,7 +18,8 @@
 
 #include <jansson.h>
 
-/** A file that the build puts into the program (supine_embed); its array ends with a name of NULL. */
+/** A file that the build puts into the program (supine_embed); its array ends with a name of NULL.
+ */
 typedef struct supine_asset {
   const char *name;  /**< "page.css" */
   const char *bytes; /**< ends with a 0 that `size` does not count */

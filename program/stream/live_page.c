@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/export/template.h"
 #include "program/export/export.h"
+#include "program/export/template.h"
 #include "program/stream/live_page.h"
 
 extern const supine_asset supine_stream_assets[]; /* live.js, put in by the build */
