@@ -41,13 +41,13 @@ PROJECT_NUMBER = $("$supine" --version | sed 's/[^0-9]*\([0-9.]*\).*/\1/')
 PROJECT_BRIEF = "lungs that deform with gravity, in real time"
 OUTPUT_DIRECTORY = $out
 INPUT = README.md $out/commands.md tests/FIGURES.md runtime/BINDINGS.md CHANGELOG.md SECURITY.md \\
-  runtime/include/supine sh/include/supine
+  runtime/include/supine
 USE_MDFILE_AS_MAINPAGE = README.md
 FILE_PATTERNS = *.h *.md
 IMAGE_PATH = . program/render $out/made
 EXAMPLE_PATH = tests/example
 HTML_EXTRA_FILES = $out/made/page.html $out/made/report.html
-STRIP_FROM_INC_PATH = runtime/include sh/include
+STRIP_FROM_INC_PATH = runtime/include
 EXTRACT_ALL = YES
 OPTIMIZE_OUTPUT_FOR_C = YES
 JAVADOC_AUTOBRIEF = YES

@@ -3,7 +3,7 @@
 #ifndef SUPINE_BASIS_FILE_H
 #define SUPINE_BASIS_FILE_H
 
-#include "precompute/fields/fields.h"
+#include "precompute/fields.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 

@@ -11,7 +11,7 @@ mkdir -p build
 if [ "$what" = all ] || [ "$what" = cppcheck ]; then
   cppcheck --std=c11 --enable=warning,performance,portability --inline-suppr --quiet --error-exitcode=1 \
     --suppress=missingIncludeSystem --suppressions-list=tests/cppcheck.supp \
-    -I . -I sh/include -I runtime/include -D_GNU_SOURCE sh mesh precompute runtime program packaging
+    -I . -I runtime/include -D_GNU_SOURCE sh mesh precompute runtime program packaging
 fi
 if [ "$what" = all ] || [ "$what" = clang ] || [ "$what" = clang-tidy ]; then
   cmake -S . -B build/clang -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=Debug \
@@ -29,7 +29,7 @@ if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
       xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang --extra-arg=-include \
         --extra-arg="$PWD/tests/analyse.h"
     clang-tidy --quiet -p build/clang sh/base/status.c
-    clang-tidy --quiet runtime/python/*.c -- -I. -Iruntime/include -Ish/include $(python3-config --includes)
+    clang-tidy --quiet runtime/python/*.c -- -I. -Iruntime/include $(python3-config --includes)
   } 2>/dev/null | grep -E ': (warning|error): ' | sort -u |
     awk -v root="$PWD/" 'NR == FNR { known[$1]; next }
       {

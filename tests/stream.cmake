@@ -20,13 +20,13 @@ set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_se
   $<TARGET_FILE:supine>)
 if(Python3_EXECUTABLE)
   add_test(NAME stream_link COMMAND ${with_server} 1000 "--volume rest+400 --device Patient"
-    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples}/slicer {port} {basis})
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples} {port} {basis})
   add_test(NAME stream_slicer COMMAND ${with_server} 500
       "--volume rest+400 --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1"
-    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${samples}/slicer
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${samples}
     {port} {basis})
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
-    ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples}/slicer)
+    ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
   # The Unity sample, by Mono; its part in the engine against stand-ins for the engine's types.
   find_program(MCS_PROGRAM mcs)
@@ -35,10 +35,10 @@ if(Python3_EXECUTABLE)
     set(unity ${CMAKE_CURRENT_BINARY_DIR}/unity)
     file(MAKE_DIRECTORY ${unity})
     add_test(NAME stream_unity_compiles COMMAND ${MCS_PROGRAM} -warnaserror -target:library
-      -out:${unity}/behaviour.dll ${samples}/unity/SupineLink.cs ${samples}/unity/LungBehaviour.cs
+      -out:${unity}/behaviour.dll ${samples}/SupineLink.cs ${samples}/LungBehaviour.cs
       ${CMAKE_CURRENT_SOURCE_DIR}/stream/UnityStub.cs)
     add_test(NAME stream_unity_link_compiles COMMAND ${MCS_PROGRAM} -warnaserror
-      -out:${unity}/link.exe ${samples}/unity/SupineLink.cs
+      -out:${unity}/link.exe ${samples}/SupineLink.cs
       ${CMAKE_CURRENT_SOURCE_DIR}/stream/TestLink.cs)
     add_test(NAME stream_unity COMMAND ${with_server} 1000 "--volume rest+400"
       ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=$<TARGET_FILE_DIR:supine_runtime_shared>

@@ -3,7 +3,7 @@
  * wrong. */
 #include <sys/stat.h>
 
-#include "precompute/fields/fields.h"
+#include "precompute/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"

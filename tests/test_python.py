@@ -45,7 +45,7 @@ with tempfile.TemporaryDirectory() as folder:
     run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", os.path.join("wheels", wheel))
 
     run(cc, "-std=c17", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{source}/runtime/include",
-        f"-I{source}/sh/include", f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
+        f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
     run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))

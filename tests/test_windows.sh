@@ -20,10 +20,10 @@ sed -n 's/.*\[ *[0-9]*\] .*\(supine_[a-z0-9_]*\)$/\1/p' "$work/dump" | sort -u >
 nm -g --defined-only "$library" | awk 'NF == 3 {print $3}' | sort -u >"$work/here"
 [ "$(grep -cx 'supine_deform' "$work/shown")" = 1 ]
 [ -z "$(comm -23 "$work/shown" "$work/here")" ] || { echo "shows what is not of the library"; exit 1; }
-for header in "$source"/runtime/include/supine/*.h "$source"/sh/include/supine/*.h; do
+for header in "$source"/runtime/include/supine/*.h; do
   printf '#include "%s"\n' "$header"
 done >"$work/all.c"
-include="-I$source/runtime/include -I$source/sh/include"
+include="-I$source/runtime/include"
 # shellcheck disable=SC2086
 "$cc" -std=c17 -E -P $include "$work/all.c" | grep -o 'supine_[a-z0-9_]*(' | tr -d '(' | sort -u >"$work/declared"
 diff "$work/declared" "$work/shown" || { echo "headers and library disagree"; exit 1; }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Charts of the HTML report: where their lines and dots go, in page/profile.html and page/map.html.
+/* Charts of the HTML report: where their lines and dots go, in profile.html and map.html.
  */
 #include <math.h>
 #include <string.h>
@@ -22,7 +22,7 @@ static double share(const supine_comparison *c, size_t posture, size_t slab) {
   return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
 }
 
-/* The plot's box in page/profile.html. */
+/* The plot's box in profile.html. */
 enum { LEFT = 46, RIGHT = 404, TOP = 14, BOTTOM = 286 };
 
 static double across(double value, double low, double high) {
@@ -95,7 +95,7 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
   return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
-/* The map of page/map.html. */
+/* The map of map.html. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
 /* The map's place of a direction: across, rolling from right over supine and left to prone; down,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A comparison as one HTML file that needs nothing else: what fills page/report.html. */
+/* A comparison as one HTML file that needs nothing else: what fills report.html. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +14,8 @@
 #include "program/options/basis_input.h"
 #include "program/report/comparison_parts.h"
 
-extern const supine_asset supine_report_assets[]; /* page/, put in by the build */
+extern const supine_asset
+    supine_report_assets[]; /* the .html and .css files, put in by the build */
 
 static void set_statistics(json_t *row, const supine_distance_statistics *d) {
   (void)json_object_set_new(row, "mean", json_sprintf("%.2f", d->mean));

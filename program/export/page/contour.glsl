@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // Contour lines, the same in pictures (program/render/draw.c), report and page: how much of one is here, 0 to 1, at multiples
 // of `spacing` above 0; none where they would lie closer than can be seen.
 float contour(float value, float spacing) {

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/fields/fields.h"
+#include "precompute/fields.h"
 #include "sh/base/parallel.h"
 #include <supine/safetensors.h>
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/fields/fields.h"
+#include "precompute/fields.h"
 #include "sh/base/vec3.h"
 #include "sh/grid.h"
 #include <supine/sh.h>
