@@ -17,4 +17,12 @@
 #include <string.h>
 #include <unistd.h>
 
+/* Write a text as a file. */
+static inline void test_write(const char *path, const char *text) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  assert_true(fputs(text, file) >= 0);
+  assert_int_equal(fclose(file), 0);
+}
+
 #endif

@@ -27,13 +27,6 @@ static int teardown(void **state) {
   return unlink(path);
 }
 
-static void write_text(const char *text) {
-  FILE *file = fopen(path, "wb");
-  assert_non_null(file);
-  (void)fputs(text, file);
-  assert_int_equal(fclose(file), 0);
-}
-
 static void test_regional_follows_box_coordinates(void **state) {
   (void)state;
   const size_t n = lungs.mesh.vertex_count;
@@ -86,7 +79,7 @@ static void test_load_both_forms_read_the_same(void **state) {
   for (size_t t = 0; t < 3; ++t) {
     double a[3] = {-1.0, -1.0, -1.0};
     supine_error error = {0};
-    write_text(texts[t]);
+    test_write(path, texts[t]);
     if (supine_tissue_expandability_load(path, 3, a, &error) != SUPINE_OK) {
       fail_msg("%s", error.message);
     }
@@ -121,7 +114,7 @@ static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     double a[3];
     supine_error error = {0};
-    write_text(bad[i].text);
+    test_write(path, bad[i].text);
     assert_int_equal(supine_tissue_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
     if (strstr(error.message, bad[i].line) == NULL ||
         strstr(error.message, bad[i].detail) == NULL) {

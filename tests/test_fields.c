@@ -386,13 +386,6 @@ static void test_fit_few_directions_say_what_they_reach(void **state) {
   supine_fields_free(&fields);
 }
 
-static void write_text(const char *name, const char *text) {
-  FILE *file = fopen(in_folder(name), "wb");
-  assert_non_null(file);
-  (void)fputs(text, file);
-  assert_int_equal(fclose(file), 0);
-}
-
 /* Asks for a failure of this kind whose message has these words. */
 static void expect_failure(const char *name, supine_status status, const char *words) {
   supine_fields fields = {0};
@@ -419,7 +412,7 @@ static void test_load_list_of_surfaces_gives_displacements(void **state) {
   (void)state;
   save_deformed("a.ply", 0.5);
   save_deformed("b.ply", -0.25);
-  write_text("list.csv", "# two fields\ngx,gy,gz,file\n0,2,0,a.ply\n0,0,-1,b.ply\n");
+  test_write(in_folder("list.csv"), "# two fields\ngx,gy,gz,file\n0,2,0,a.ply\n0,0,-1,b.ply\n");
   supine_fields fields = {0};
   supine_error error;
   if (supine_fields_load(in_folder("list.csv"), &lungs, NULL, &fields, &error) != SUPINE_OK) {
@@ -448,21 +441,21 @@ static void test_load_bad_lists_name_line_and_remedy(void **state) {
   memcpy(turned.triangles + 3, lungs.mesh.triangles, 3 * sizeof(uint32_t));
   assert_int_equal(supine_mesh_save(in_folder("turned.ply"), &turned, NULL, NULL), SUPINE_OK);
   free(turned.triangles);
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,missing.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,missing.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_READ, "missing.ply");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,other.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,other.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_MESH, "bad.csv:3");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,turned.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,turned.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_MESH, "triangle 0 joins other vertices");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n1,0,0,a.ply\n0,3,0,a.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n1,0,0,a.ply\n0,3,0,a.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "line 2 and 4 have the same direction");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,nan,0,a.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,nan,0,a.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "bad.csv:3");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n0,0,0,a.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,0,a.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "no direction");
-  write_text("bad.csv", "gx,gy,file\n0,1,a.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,file\n0,1,a.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "gz");
-  write_text("bad.csv", "gx,gy,gz,file\n0,1,0,a.ply\n");
+  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n");
   expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "at least two");
   expect_failure("nothing.csv", SUPINE_ERROR_READ, "nothing.csv");
 }

@@ -578,22 +578,15 @@ static void test_grid_bad_requests_refused(void **state) {
                    SUPINE_ERROR_MESH);
 }
 
-static void write_text(const char *path, const char *text) {
-  FILE *file = fopen(path, "w");
-  assert_non_null(file);
-  assert_true(fputs(text, file) >= 0);
-  assert_int_equal(fclose(file), 0);
-}
-
 static void test_content_points_names_axes_and_units(void **state) {
   (void)state;
   char path[80];
   (void)snprintf(path, sizeof path, "%s/points.csv", folder);
-  write_text(path, "name,x,y,z\ncarina,1,2,3\n# a remark\n,-4.5,5,6\n");
+  test_write(path, "name,x,y,z\ncarina,1,2,3\n# a remark\n,-4.5,5,6\n");
   const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
   supine_inside_content content = {0};
   assert_int_equal(supine_inside_content_points(path, &ras, &content, NULL), SUPINE_OK);
-  write_text(path, "z,y,x\n7,8,9\n");
+  test_write(path, "z,y,x\n7,8,9\n");
   assert_int_equal(supine_inside_content_points(path, NULL, &content, NULL), SUPINE_OK);
   assert_string_equal(content.names, "carina\n2\n1");
   static const double expected[] = {-10, -20, 30, 45, -50, 60, 9, 8, 7};
@@ -618,7 +611,7 @@ static void test_content_points_bad_files_refused(void **state) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_inside_content content = {0};
     supine_error error;
-    write_text(path, bad[i]);
+    test_write(path, bad[i]);
     assert_int_equal(supine_inside_content_points(path, NULL, &content, &error),
                      SUPINE_ERROR_FORMAT);
     assert_non_null(strstr(error.message, path));
@@ -633,7 +626,7 @@ static void test_content_meshes_parts_and_triangles(void **state) {
   (void)state;
   char path[80];
   (void)snprintf(path, sizeof path, "%s/nodule.obj", folder);
-  write_text(path, "v 70 0 -40\nv 75 0 -40\nv 70 5 -40\nv 70 0 -35\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf "
+  test_write(path, "v 70 0 -40\nv 75 0 -40\nv 70 5 -40\nv 70 0 -35\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf "
                    "2 3 4\n");
   supine_inside_content content = {0};
   assert_int_equal(supine_inside_content_mesh(path, NULL, &content, NULL), SUPINE_OK);

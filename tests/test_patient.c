@@ -448,13 +448,6 @@ static void test_fit_fewer_points_than_unknowns_refused(void **state) {
 
 /* --- patient.json and what it makes of a surface --------------------------------------------- */
 
-static void write_text(const char *path, const char *text) {
-  FILE *file = fopen(path, "wb");
-  assert_non_null(file);
-  assert_true(fputs(text, file) >= 0);
-  assert_int_equal(fclose(file), 0);
-}
-
 static void test_record_written_and_read_same(void **state) {
   (void)state;
   static const char path[] = "test_patient_record.json";
@@ -504,11 +497,11 @@ static void test_record_written_and_read_same(void **state) {
     char *at = strstr(spoiled, key);
     assert_non_null(at);
     at[1] = '#';
-    write_text(path, spoiled);
+    test_write(path, spoiled);
     assert_int_equal(supine_patient_read(path, &after, &error), SUPINE_ERROR_FORMAT);
     free(spoiled);
   }
-  write_text(path, "{\"format\"");
+  test_write(path, "{\"format\"");
   assert_int_equal(supine_patient_read(path, &after, &error), SUPINE_ERROR_FORMAT);
   assert_int_equal(supine_patient_read("/no/such.json", &after, &error), SUPINE_ERROR_READ);
   (void)remove(path);

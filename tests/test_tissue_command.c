@@ -38,13 +38,6 @@ static int teardown(void **state) {
   return rmdir(folder);
 }
 
-static void write_text(const char *content) {
-  FILE *file = fopen(csv, "wb");
-  assert_non_null(file);
-  (void)fputs(content, file);
-  assert_int_equal(fclose(file), 0);
-}
-
 static int solve(const char *option, const char *value, const char *path) {
   return COMMAND_RUN(&supine_command_solve, KEPT_ERR, text, lungs, "--posture", "supine",
                      "--volume", "scan+400", "-o", path, option, value);
@@ -131,10 +124,10 @@ static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
 
 static void test_solve_bad_expandability_file_names_vertex(void **state) {
   (void)state;
-  write_text("expandability\n1\n1\n-3\n");
+  test_write(csv, "expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 must be positive"));
-  write_text("expandability\n1\n1\n");
+  test_write(csv, "expandability\n1\n1\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "vertex 2 of"));
   assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);

@@ -8,29 +8,6 @@
 
 #include "sh_helpers.h"
 
-/* Allocations that are still to succeed; the linker sends the library's here. */
-static int allocations_left = -1;
-
-static int allocation_fails(void) {
-  return allocations_left >= 0 && allocations_left-- == 0;
-}
-
-/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names that ld --wrap sets
- */
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-
-void *__wrap_malloc(size_t size) {
-  return allocation_fails() ? NULL : __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t count, size_t size) {
-  return allocation_fails() ? NULL : __real_calloc(count, size);
-}
-/* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
-
 typedef struct setup {
   size_t band, count, points, longitudes;
   supine_sh_grid *grid;
@@ -278,31 +255,6 @@ static void test_create_small_grid_or_high_band_refused(void **state) {
   supine_sh_transform_destroy(NULL);
 }
 
-/* Allocation 0, 1, 2, ... fails until a run succeeds; leaks are for the sanitizer to find. */
-static void test_create_each_allocation_failing_reported(void **state) {
-  (void)state;
-  int failures = 0;
-  for (int allowed = 0;; ++allowed) {
-    supine_sh_grid *grid = NULL;
-    supine_sh_transform *plan = NULL;
-    allocations_left = allowed;
-    supine_status status = supine_sh_grid_create(6, 8, &grid);
-    if (status == SUPINE_OK) {
-      status = supine_sh_transform_create(3, grid, 5, &plan, NULL);
-    }
-    allocations_left = -1;
-    supine_sh_transform_destroy(plan);
-    supine_sh_grid_destroy(grid);
-    if (status == SUPINE_OK) {
-      break;
-    }
-    assert_int_equal(status, SUPINE_ERROR_MEMORY);
-    assert_null(plan);
-    ++failures;
-  }
-  assert_true(failures >= 8); /* 4 of the grid, 4 of the plan */
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_transform_band_limited_round_trip),
@@ -312,7 +264,6 @@ int main(void) {
       cmocka_unit_test(test_forward_rings_in_any_order_same_coefficients),
       cmocka_unit_test(test_forward_neighbour_fields_do_not_mix),
       cmocka_unit_test(test_create_small_grid_or_high_band_refused),
-      cmocka_unit_test(test_create_each_allocation_failing_reported),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
