@@ -148,37 +148,30 @@ static supine_status leave_one_out(const fit *f, const double *gram, double *rel
   return SUPINE_OK;
 }
 
-/* The product grid that the directions are, if any: its rule, and the place of each direction. */
-static supine_sh_grid *find_grid(const supine_fields *fields, size_t *place) {
+/* Find the product grid that the directions are, if any, and its rule's weights [M]. */
+static bool find_grid(const supine_fields *fields, double *weight) {
   static const double same = 1e-5;
   const size_t m = fields->direction_count;
-  for (size_t latitudes = 2; latitudes <= m / 3; ++latitudes) {
+  size_t found = 0;
+  for (size_t latitudes = 2; latitudes <= m / 3 && found < m; ++latitudes) {
     supine_sh_grid *grid = NULL;
     if (m % latitudes != 0 || supine_sh_grid_create(latitudes, m / latitudes, &grid) != SUPINE_OK) {
       continue;
     }
-    size_t found = 0;
-    for (size_t j = 0; j < m; ++j) { /* nodes are distinct, so each direction finds one at most */
+    found = 0;
+    for (size_t j = 0; j < m && found == j; ++j) { /* nodes are distinct: each finds one at most */
       double g[3];
       supine_sh_grid_direction(grid, j / grid->longitudes, j % grid->longitudes, g);
-      for (size_t d = 0; d < m; ++d) {
-        const double *h = fields->directions + 3 * d;
-        if (supine_distance(g, h) < same) {
-          place[d] = j;
+      for (size_t d = 0; d < m && found == j; ++d) {
+        if (supine_distance(g, fields->directions + 3 * d) < same) {
+          weight[d] = grid->weight[j / grid->longitudes] * 2.0 * M_PI / (double)grid->longitudes;
           ++found;
-          break;
         }
       }
-      if (found != j + 1) {
-        break;
-      }
-    }
-    if (found == m) {
-      return grid;
     }
     supine_sh_grid_destroy(grid);
   }
-  return NULL;
+  return found == m;
 }
 
 /* Unit direction of each vertex that its displacements follow best, (the leading eigenvector of the
@@ -224,8 +217,7 @@ typedef struct fitting {
   const double *values; /* [M, rows] */
   double *owned;        /* the values of scalar fields */
   double *weight;       /* [M] */
-  size_t *place;        /* [M] node of each direction on the grid */
-  supine_sh_grid *grid; /* NULL: scattered */
+  bool grid;            /* the directions are a product grid */
   double *gram;         /* [M, M] of the values */
   double field2;        /* sum of the squared displacements */
   double lost2;         /* what scalar fields lose of it */
@@ -236,8 +228,6 @@ typedef struct fitting {
 static void fitting_free(fitting *w) {
   free(w->owned);
   free(w->weight);
-  free(w->place);
-  supine_sh_grid_destroy(w->grid);
   free(w->gram);
   fit_free(&w->chosen);
   supine_projection_free(&w->projection);
@@ -250,11 +240,9 @@ static supine_status prepare(fitting *w, double *directions, supine_error *error
   w->rows = w->options->scalar ? n : 3 * n;
   w->values = fields->displacement;
   w->weight = calloc(m, sizeof *w->weight);
-  w->place = malloc(m * sizeof *w->place);
   w->gram = calloc(m * m, sizeof *w->gram);
   w->owned = w->options->scalar ? malloc(m * n * sizeof *w->owned) : NULL;
-  if (w->weight == NULL || w->place == NULL || w->gram == NULL ||
-      (w->options->scalar && w->owned == NULL)) {
+  if (w->weight == NULL || w->gram == NULL || (w->options->scalar && w->owned == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
   for (size_t i = 0; i < 3 * m * n; ++i) {
@@ -267,11 +255,9 @@ static supine_status prepare(fitting *w, double *directions, supine_error *error
     w->lost2 = best_directions(fields, directions, w->owned);
     w->values = w->owned;
   }
-  w->grid = find_grid(fields, w->place);
-  for (size_t i = 0; i < m; ++i) {
-    w->weight[i] = w->grid == NULL ? 1.0
-                                   : w->grid->weight[w->place[i] / w->grid->longitudes] * 2.0 *
-                                         M_PI / (double)w->grid->longitudes;
+  w->grid = find_grid(fields, w->weight);
+  for (size_t i = 0; i < m && !w->grid; ++i) {
+    w->weight[i] = 1.0;
   }
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)m, (int)m, (int)w->rows, 1.0, w->values,
               (int)w->rows, w->values, (int)w->rows, 0.0, w->gram, (int)m);
@@ -320,7 +306,7 @@ static supine_status choose_band(fitting *w, supine_fit_report *report, supine_e
   }
   report->band_highest = determined - 1;
   report->condition = w->chosen.condition;
-  report->grid = w->grid != NULL;
+  report->grid = w->grid;
   return SUPINE_OK;
 }
 
