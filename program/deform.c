@@ -5,6 +5,9 @@
 #include <string.h>
 
 #include "mesh/mesh.h"
+#include "sh/base/csv.h"
+#include "sh/base/output.h"
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 #include <supine/runtime.h>
 
@@ -23,14 +26,25 @@ typedef struct request {
   bool has_scale, as_scanned;
   double scale;
   supine_deform_content content;
+  const char *states; /* a list of them */
+  char *output;       /* of a row of it */
 } request;
+
+#define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error; what is "
                          "inside also goes into .csv, images into .nrrd, .nii, .nii.gz or .mha",
-     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT,
-     .endings = SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"},
+     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
+     .rivals = "output"},
+    {"states", 0, "LIST",
+     "many states in one call, for which the basis and the image are read once: a CSV file with "
+     "the "
+     "columns posture, volume and output, a file beside the list: surface, points, field, or what "
+     "--image or --labels moves",
+     SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
+     .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
@@ -183,23 +197,114 @@ cleanup:
   return result;
 }
 
+/* Fill a request with the state and the output of a row of --states. */
+static int read_row(const supine_csv *csv, request *row) {
+  const char *const output = supine_csv_text(csv, 1);
+  const char *const volume = supine_csv_text(csv, 2);
+  supine_state *state = &row->volume.state;
+  supine_error error;
+  state->gravity[1] = 1.0; /* supine, unless the row says otherwise */
+  supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &error);
+  if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
+    status = supine_state_parse_volume(volume, state, &error);
+  }
+  if (status != SUPINE_OK) {
+    return supine_options_usage(name, "%s:%zu: %s", csv->path, csv->line, error.message);
+  }
+  const bool voxels = supine_image_supports(output);
+  const bool image = row->content.image != NULL || row->content.labels != NULL;
+  if (!voxels && !supine_mesh_save_supports(output) &&
+      !supine_text_ends_in_any_case(output, ".csv")) {
+    return supine_options_usage(name, "%s:%zu: %s: the name must end in %s", csv->path, csv->line,
+                                output, ENDINGS);
+  }
+  memcpy(row->orientation.gravity, state->gravity, sizeof state->gravity);
+  row->orientation.given = true;
+  row->output = supine_path_beside(csv->path, output);
+  *(voxels && !image ? &row->content.field : &row->content.path) = row->output;
+  return row->output == NULL
+             ? supine_options_fail(name, &(supine_error){SUPINE_ERROR_MEMORY, "out of memory"})
+             : supine_command_deform_content_check(&row->content, name);
+}
+
+/* Is the last row's output no input and no other row's, and can it be written? */
+static int check_row(const char *basis, const request *rows, size_t count) {
+  const request *row = &rows[count - 1];
+  const char *const inputs[] = {basis, row->states, row->content.image, row->content.labels};
+  supine_error error;
+  for (size_t i = 0; i < sizeof inputs / sizeof *inputs; ++i) {
+    if (inputs[i] != NULL &&
+        supine_options_check_output(name, row->output, inputs[i]) != SUPINE_EXIT_OK) {
+      return SUPINE_EXIT_USAGE;
+    }
+  }
+  for (size_t i = 0; i + 1 < count; ++i) {
+    if (strcmp(rows[i].output, row->output) == 0) {
+      return supine_options_usage(name, "%s: two rows write %s", row->states, row->output);
+    }
+  }
+  return supine_output_try(row->output, &error) == SUPINE_OK ? SUPINE_EXIT_OK
+                                                             : supine_options_fail(name, &error);
+}
+
+/* Requests for the rows of --states, all checked before any work. */
+static int read_rows(const char *basis, const request *wanted, request **rows, size_t *count) {
+  static const char *const columns[] = {"posture", "output", "volume"};
+  supine_csv csv;
+  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
+  supine_status status = supine_csv_open(wanted->states, columns, 3, 2, &csv, &error);
+  bool more = true;
+  int result = status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(name, &error);
+  if (result == SUPINE_EXIT_OK && wanted->orientation.given) {
+    result = supine_options_usage(name, "give a posture or --states, not both");
+  }
+  while (result == SUPINE_EXIT_OK && more) {
+    request *grown = realloc(*rows, (*count + 1) * sizeof **rows);
+    *rows = grown != NULL ? grown : *rows;
+    if (grown == NULL || supine_csv_next(&csv, &more, &error) != SUPINE_OK) {
+      result = supine_options_fail(name, &error);
+    } else if (more) {
+      grown[*count] = *wanted;
+      result = read_row(&csv, &grown[(*count)++]);
+      result = result == SUPINE_EXIT_OK ? check_row(basis, grown, *count) : result;
+    }
+  }
+  supine_csv_close(&csv);
+  return result == SUPINE_EXIT_OK && *count == 0
+             ? supine_options_usage(name, "%s: no row follows the header", wanted->states)
+             : result;
+}
+
 static int run(void *chosen, const supine_arguments *given) {
-  const request *wanted = chosen;
+  request *wanted = chosen;
+  const bool many = wanted->states != NULL;
+  request *rows = many ? NULL : wanted;
+  size_t count = many ? 0 : 1;
   supine_basis *basis = NULL;
   supine_error error;
   double gravity[3];
-  int result = supine_command_deform_content_check(&wanted->content, name);
-  if (result == SUPINE_EXIT_OK) {
+  int result = many ? read_rows(given->operand[0], wanted, &rows, &count)
+                    : supine_command_deform_content_check(&wanted->content, name);
+  if (result == SUPINE_EXIT_OK && !many) {
     result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
   }
-  if (result != SUPINE_EXIT_OK) {
-    return result;
+  if (result == SUPINE_EXIT_OK && supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT,
+                                                            &basis, &error) != SUPINE_OK) {
+    result = supine_options_fail(name, &error);
   }
-  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, &error) !=
-      SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  if (result == SUPINE_EXIT_OK) {
+    result = supine_command_deform_content_read(&wanted->content, name);
   }
-  result = deform(basis, wanted, gravity);
+  for (size_t i = 0; i < count && result == SUPINE_EXIT_OK; ++i) {
+    rows[i].content.source = wanted->content.source;
+    (void)supine_options_orientation_finish(&rows[i].orientation, name, gravity); /* was given */
+    result = deform(basis, &rows[i], gravity);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    free(rows[i].output);
+  }
+  free(many ? rows : NULL);
+  supine_image_free(&wanted->content.source);
   supine_basis_close(basis);
   return result;
 }
@@ -207,7 +312,8 @@ static int run(void *chosen, const supine_arguments *given) {
 const supine_command supine_command_deform = {
     name,
     "deform a basis for a posture and a volume",
-    .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE",
+    .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
+             "BASIS --states LIST",
     .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
              "writes the surface. This is what the run-time library does each frame. Each point "
              "comes with its expected error, expected_error_mm: " SUPINE_EXPECTED_MEANING
@@ -219,7 +325,9 @@ const supine_command supine_command_deform = {
         "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
         "-o out.ply\n"
         "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"
-        "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
+        "  supine deform grid.safetensors --posture prone --image ct.nii.gz --density -o "
+        "prone.nii.gz\n"
+        "  supine deform grid.safetensors --states list.csv --image ct.nii.gz --density",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
 #include "mesh/mesh.h"
@@ -31,14 +31,14 @@ const supine_option supine_command_deform_content_options[] = {
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE", "image to move, into -o: .nrrd, .nii, .nii.gz or .mha, linear",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+    {"density", 0, NULL,
+     "of --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
+     "of "
+     "volume, so that mass is kept; the file's header says so",
+     SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE", "label map to move, into -o: nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {.name = NULL}};
-
-static bool is_csv(const char *path) {
-  const size_t length = strlen(path);
-  return length > 4 && strcasecmp(path + length - 4, ".csv") == 0;
-}
 
 int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command) {
   const bool image = wanted->image != NULL || wanted->labels != NULL;
@@ -56,12 +56,44 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
   if (wanted->inverse && wanted->field == NULL) {
     return supine_options_usage(command, "--inverse is of --field-out FILE, which is missing");
   }
+  if (wanted->density && wanted->image == NULL) {
+    return supine_options_usage(command, "--density is of --image FILE, which is missing");
+  }
+  return SUPINE_EXIT_OK;
+}
+
+int supine_command_deform_content_read(supine_deform_content *wanted, const char *command) {
+  static const double aerated = -300.0; /* some voxel of any lung in Hounsfield units is below */
+  const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
+  supine_image *image = &wanted->source;
+  supine_error error;
+  if (path == NULL) {
+    return SUPINE_EXIT_OK;
+  }
+  if (supine_image_read(path, image, &error) != SUPINE_OK) {
+    return supine_options_fail(command, &error);
+  }
+  double least = INFINITY;
+  for (size_t i = 0; wanted->density && i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    least = fmin(least, supine_image_get(image, i));
+  }
+  if (wanted->density && !(least < aerated)) {
+    (void)supine_error_set(&error, SUPINE_ERROR_FORMAT,
+                           "%s: no voxel is below %g, so it is not in Hounsfield units, which "
+                           "--density needs: convert it, or leave the option out",
+                           path, aerated);
+    return supine_options_fail(command, &error);
+  }
+  if (wanted->image != NULL && !wanted->density) {
+    supine_options_say(command, "densities are not scaled by the change of volume; for a CT, "
+                                "--density keeps the tissue's mass");
+  }
   return SUPINE_EXIT_OK;
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
   return wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL ||
-         is_csv(wanted->path);
+         supine_text_ends_in_any_case(wanted->path, ".csv");
 }
 
 /* A vector, mm, LPS, in other axes and another unit. */
@@ -101,12 +133,13 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     supine_deform(basis, &from->pose, before);
     supine_mesh_unit_name(unit, unit_name);
     supine_mesh_axes_letters(frame->axes, axes);
-    (void)fprintf(output.file,
-                  "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: its length%s\n"
-                  "name,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
-                  from->name, axes, unit_name,
-                  expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
-                  expected->sigma == NULL ? "" : ",expected_error_mm");
+    (void)fprintf(
+        output.file,
+        "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: its length%s\n"
+        "name,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
+        from->name, axes, unit_name,
+        expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
+        expected->sigma == NULL ? "" : ",expected_error_mm");
     for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
@@ -157,15 +190,25 @@ static supine_status write_field(const supine_deform_content *wanted, const char
   return status;
 }
 
-static supine_status write_image(const supine_deform_content *wanted, const supine_field *inverse,
-                                 supine_image *image, supine_error *error) {
-  supine_status status = supine_field_resample(inverse, wanted->labels != NULL, image, error);
+static supine_status write_image(const supine_deform_content *wanted, const supine_field *forward,
+                                 const supine_field *inverse, supine_error *error) {
+  supine_image moved;
+  supine_status status =
+      supine_field_resample(inverse, wanted->density ? &forward->depth : NULL,
+                            wanted->labels != NULL, &wanted->source, &moved, error);
   if (status == SUPINE_OK) {
-    status = supine_image_write(wanted->path, image, NULL, error);
+    status =
+        supine_image_write(wanted->path, &moved,
+                           wanted->density ? "HU + 1000 inside the lungs scaled by their local "
+                                             "change of volume: mass is kept"
+                                           : NULL,
+                           error);
+    supine_image_free(&moved);
   }
   if (status == SUPINE_OK) {
-    (void)printf("%s: %zu x %zu x %zu voxels\n", wanted->path, image->size[0], image->size[1],
-                 image->size[2]);
+    const size_t *size = wanted->source.size;
+    (void)printf("%s: %zu x %zu x %zu voxels%s\n", wanted->path, size[0], size[1], size[2],
+                 wanted->density ? ", densities scaled inside the lungs" : "");
   }
   return status;
 }
@@ -191,7 +234,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
                                  supine_error *error) {
   supine_field back = {0};
   supine_field_residual residual;
-  const supine_status status = supine_field_invert(first, &back, &residual, error);
+  supine_status status = supine_field_invert(first, &back, &residual, error);
   const size_t *size = second->nodes.size;
   float *u = malloc(3 * size[0] * size[1] * size[2] * sizeof *u);
   if (u == NULL || status != SUPINE_OK) {
@@ -204,7 +247,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
     const float *v = (const float *)back.nodes.values + 3 * i;
     double place[3];
     double moved[3];
-    supine_field_place(&second->nodes, i, place);
+    supine_image_place(&second->nodes, i, place);
     for (size_t k = 0; k < 3; ++k) {
       place[k] += (double)v[k];
     }
@@ -215,8 +258,14 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   }
   free(second->nodes.values);
   second->nodes.values = u;
+  supine_image depth;
+  status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
+  if (status == SUPINE_OK) { /* of where the tissue was in the scan */
+    supine_image_free(&second->depth);
+    second->depth = depth;
+  }
   supine_field_free(&back);
-  return SUPINE_OK;
+  return status;
 }
 
 /* The field from one pose to another; a pose of the scan needs no way back. */
@@ -238,26 +287,21 @@ static supine_status find_field(const supine_basis *basis, const supine_pose *po
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
                                const supine_pose *pose, const supine_reference_pose *before,
                                bool other, supine_error *error) {
-  const char *from = wanted->image != NULL ? wanted->image : wanted->labels;
+  const bool image = wanted->source.values != NULL;
   supine_field forward = {0};
   supine_field inverse = {0};
-  supine_image image = {0};
   supine_status status = find_field(basis, pose, before, other, &forward, error);
-  if (status == SUPINE_OK && from != NULL) {
-    status = supine_image_read(from, &image, error);
-  }
-  if (status == SUPINE_OK && (from != NULL || wanted->inverse)) {
+  if (status == SUPINE_OK && (image || wanted->inverse)) {
     status = invert(&forward, &inverse, error);
   }
   if (status == SUPINE_OK && wanted->field != NULL) {
     status = write_field(wanted, before->name, &forward, &inverse, error);
   }
-  if (status == SUPINE_OK && from != NULL) {
-    status = write_image(wanted, &inverse, &image, error);
+  if (status == SUPINE_OK && image) {
+    status = write_image(wanted, &forward, &inverse, error);
   }
   supine_field_free(&forward);
   supine_field_free(&inverse);
-  supine_image_free(&image);
   return status;
 }
 
@@ -272,7 +316,8 @@ int supine_command_deform_content(const supine_deform_content *wanted, const cha
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
     status = move_grid(wanted, basis, pose, from, other, &error);
   }
-  if (status == SUPINE_OK && wanted->path != NULL && is_csv(wanted->path)) {
+  if (status == SUPINE_OK && wanted->path != NULL &&
+      supine_text_ends_in_any_case(wanted->path, ".csv")) {
     status = write_points(wanted->path, basis, pose, from, expected, frame, &error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(expected, stdout);

@@ -5,7 +5,7 @@
 
 #include <supine/runtime.h>
 
-#include "mesh/mesh.h"
+#include "mesh/image/image.h"
 
 #include "program/options/expected.h"
 #include "program/options/state.h"
@@ -15,13 +15,17 @@ typedef struct supine_deform_content {
   const char *field;  /* --field-out */
   const char *image;  /* --image */
   const char *labels; /* --labels */
-  bool inverse;
+  bool inverse, density;
+  supine_image source; /* what --image or --labels names, once read */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];
 
 /* Do the options fit each other? An exit code. */
 int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command);
+
+/* Reads what --image or --labels names, and says whether densities are scaled; an exit code. */
+int supine_command_deform_content_read(supine_deform_content *wanted, const char *command);
 
 /* Is what is wanted none of a surface's files? */
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);

@@ -100,16 +100,12 @@ static supine_status read_grid(const supine_inside_shells *shells, const request
     return supine_inside_content_grid(shells, NULL, wanted->grid, margin, content, error);
   }
   supine_image image = {0};
-  const supine_status status = supine_image_read(image_path, &image, error);
-  if (status != SUPINE_OK) {
-    return status;
+  supine_status status = supine_image_read(image_path, &image, error);
+  if (status == SUPINE_OK) {
+    status = supine_inside_content_grid(shells, &image, wanted->grid, margin, content, error);
   }
-  supine_inside_grid like;
-  memcpy(like.size, image.size, sizeof like.size);
-  memcpy(like.origin, image.origin, sizeof like.origin);
-  memcpy(like.step, image.step, sizeof like.step);
   supine_image_free(&image);
-  return supine_inside_content_grid(shells, &like, wanted->grid, margin, content, error);
+  return status;
 }
 
 /* The labels of a map, each a part. */

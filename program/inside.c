@@ -46,8 +46,8 @@ static void add_part(const supine_command_names *names, size_t part, const size_
       out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
     }
   }
-  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm", names->text[part],
-                 (double)middle.value);
+  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm",
+                 names->text[part], (double)middle.value);
   out->mark[out->marks.count++] = middle;
 }
 

@@ -498,12 +498,11 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
   bool well = rigid->dtype == SUPINE_U32 && rigid->rank == 2 && rigid->shape[1] == 2;
   for (size_t i = 0; well && i < rigid->shape[0]; ++i) {
     const uint32_t *range = (const uint32_t *)rigid->data + 2 * i;
-    size_t lung = 0;
-    while (lung < basis->info.lung_count && range[0] >= basis->lung_begin[lung + 1]) {
-      ++lung;
+    well = false;
+    for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+      well = well || (range[0] >= basis->lung_begin[lung] && range[0] < range[1] &&
+                      range[1] <= basis->lung_begin[lung + 1]);
     }
-    well = lung < basis->info.lung_count && range[0] < range[1] &&
-           range[1] <= basis->lung_begin[lung + 1];
   }
   if (!well) {
     return refuse(c, "rigid must be ranges of vertices, [R, 2], each in one lung");

@@ -510,16 +510,15 @@ static void test_embed_outside_counted_and_clamped(void **state) {
 /* Every point inside lies in a cell whose eight corners are stored. */
 static void test_grid_cells_of_all_points_inside_are_whole(void **state) {
   (void)state;
-  const supine_inside_grid like = {
-      .size = {300, 260, 280},
-      .origin = {180.0, 120.0, -200.0},
-      .step = {{-0.96, 0.28, 0.0}, {-0.28, -0.96, 0.0}, {0.0, 0.0, 1.5}}};
+  const supine_image like = {.size = {300, 260, 280},
+                             .origin = {180.0, 120.0, -200.0},
+                             .step = {{-0.96, 0.28, 0.0}, {-0.28, -0.96, 0.0}, {0.0, 0.0, 1.5}}};
   for (int oblique = 0; oblique < 2; ++oblique) {
     supine_inside_content content = {0};
     assert_int_equal(
         supine_inside_content_grid(&shells, oblique ? &like : NULL, 6.0, 0.0, &content, NULL),
         SUPINE_OK);
-    const supine_inside_grid *grid = &content.grid;
+    const supine_image *grid = &content.grid;
     const size_t nodes = grid->size[0] * grid->size[1] * grid->size[2];
     unsigned char *stored = calloc(nodes, 1);
     for (size_t i = 0; i < content.count; ++i) {
@@ -561,9 +560,9 @@ static void test_grid_bad_requests_refused(void **state) {
   (void)state;
   supine_inside_content content = {0};
   supine_error error;
-  const supine_inside_grid elsewhere = {.size = {20, 20, 20},
-                                        .origin = {4000.0, 0.0, 0.0},
-                                        .step = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  const supine_image elsewhere = {.size = {20, 20, 20},
+                                  .origin = {4000.0, 0.0, 0.0},
+                                  .step = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   assert_int_equal(supine_inside_content_grid(&shells, NULL, 0.0, 0.0, &content, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_inside_content_grid(&shells, NULL, NAN, 0.0, &content, &error),

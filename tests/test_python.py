@@ -48,7 +48,9 @@ with tempfile.TemporaryDirectory() as folder:
         f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
     run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
-    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
+    run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
+    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors",
+                     supine))
 
     # The examples; VTK's where Debian's python has it.
     with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:

@@ -122,6 +122,16 @@ void supine_image_set_axes(supine_image *image, supine_axes axes) {
   image->axes = axes;
 }
 
+void supine_image_place(const supine_image *image, size_t index, double point[3]) {
+  const double at[3] = {(double)(index % image->size[0]),
+                        (double)(index / image->size[0] % image->size[1]),
+                        (double)(index / image->size[0] / image->size[1])};
+  for (int k = 0; k < 3; ++k) {
+    point[k] = image->origin[k] + at[0] * image->step[0][k] + at[1] * image->step[1][k] +
+               at[2] * image->step[2][k];
+  }
+}
+
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
   const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
   double from[3];

@@ -81,6 +81,9 @@ void supine_image_put(supine_image *image, size_t begin, size_t count, const dou
 /** Takes the header's coordinates for coordinates in other axes than it says; AUTO: no change. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
+/** Compute where voxel `index`, i + size[0] (j + size[1] k), has its centre, mm. */
+void supine_image_place(const supine_image *image, size_t index, double point[3]);
+
 /** Coordinates of a point in voxels: (0, 0, 0) is the first voxel's centre. */
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]);
 

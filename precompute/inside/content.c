@@ -132,7 +132,6 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error) {
-  const bool all = strcmp(names, "all") == 0;
   content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
   if (content->rigid == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
@@ -141,12 +140,11 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
     const size_t length = strcspn(at, ",");
     const char *part = content->names;
     bool found = false;
-    for (size_t i = 0; i < content->part_count; ++i) {
-      const size_t size = strcspn(part, "\n");
-      if (all || (size == length && memcmp(part, at, size) == 0)) {
+    for (size_t i = 0; i < content->part_count; ++i, part += strcspn(part, "\n") + 1) {
+      const bool same = strncmp(part, at, length) == 0 && strchr("\n", part[length]) != NULL;
+      if (same || strcmp(names, "all") == 0) {
         content->rigid[i] = found = true;
       }
-      part += size + 1;
     }
     if (!found) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

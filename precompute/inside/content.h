@@ -4,14 +4,7 @@
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
-#include "mesh/mesh.h"
-
-/** A grid of nodes: node (i, j, k) lies at origin + i step[0] + j step[1] + k step[2]. */
-typedef struct supine_inside_grid {
-  size_t size[3];
-  double origin[3];  /**< mm */
-  double step[3][3]; /**< mm */
-} supine_inside_grid;
+#include "mesh/image/image.h"
 
 /** Points, of which some may be corners of triangles. Zero-initialise; supine_inside_content_free
  * releases what the functions below put there. */
@@ -25,7 +18,7 @@ typedef struct supine_inside_content {
   size_t part_count;   /**< names of parts; 0: a grid */
   char *names;         /**< in order of part, each but the last followed by a newline */
   bool *rigid;         /**< [part_count] parts that keep their size; NULL: none */
-  supine_inside_grid grid;
+  supine_image grid;   /**< size, origin and step of its nodes */
 } supine_inside_content;
 
 /** Appends the points of a file, each a part of its own; options and statuses as

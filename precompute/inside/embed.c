@@ -45,34 +45,21 @@ static void find_places(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Points [begin, end) of the content, a rigid part: into the lung of most of them. */
-static void gather_part(embedding *e, size_t begin, size_t end) {
-  size_t count[SUPINE_LUNGS_MAX] = {0};
-  size_t most = 0;
-  for (size_t i = begin; i < end; ++i) {
-    const size_t lung = e->lung[i];
-    most = ++count[lung] > count[most] ? lung : most;
-  }
-  for (size_t i = begin; i < end; ++i) {
-    if (e->lung[i] != most) {
-      e->lung[i] = (unsigned char)most;
-      e->place[i] = supine_inside_surface_find(e->shells->shell[most].surface,
-                                               e->content->points + 3 * i, NULL);
-    }
-  }
-}
-
+/* Put the points of each rigid part into the lung of most of them. */
 static void gather_parts(embedding *e) {
   const supine_inside_content *content = e->content;
-  for (size_t begin = 0; content->rigid != NULL && begin < content->count;) {
-    size_t end = begin + 1;
-    while (end < content->count && content->part[end] == content->part[begin]) {
-      ++end;
+  for (size_t begin = 0, end = 0; content->rigid != NULL && begin < content->count; begin = end) {
+    size_t count[SUPINE_LUNGS_MAX] = {0};
+    size_t most = 0;
+    for (; end < content->count && content->part[end] == content->part[begin]; ++end) {
+      const size_t lung = e->lung[end];
+      most = ++count[lung] > count[most] ? lung : most;
     }
-    if (content->rigid[content->part[begin]]) {
-      gather_part(e, begin, end);
+    for (size_t i = begin; i < end && content->rigid[content->part[begin]]; ++i) {
+      e->lung[i] = (unsigned char)most;
+      e->place[i] =
+          supine_inside_surface_find(e->shells->shell[most].surface, content->points + 3 * i, NULL);
     }
-    begin = end;
   }
 }
 
@@ -108,8 +95,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
     e->triangles[i] = position[e->content->triangles[i]];
   }
   free(position);
-  for (size_t begin = 0; e->content->rigid != NULL && begin < n;) {
-    size_t end = begin + 1;
+  for (size_t begin = 0, end = 0; e->content->rigid != NULL && begin < n; begin = end) {
     while (end < n && e->part[end] == e->part[begin]) {
       ++end;
     }
@@ -117,7 +103,6 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
       e->rigid[2 * e->rigid_count] = (uint32_t)begin;
       e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
     }
-    begin = end;
   }
   report->count = n;
   report->rigid = e->rigid_count;
@@ -333,7 +318,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
   static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
                                        "resting_volume"};
   const supine_inside_content *content = e->content;
-  const supine_inside_grid *grid = &content->grid;
+  const supine_image *grid = &content->grid;
   const size_t n = content->count;
   const double frame[4][3] = {{grid->origin[0], grid->origin[1], grid->origin[2]},
                               {grid->step[0][0], grid->step[0][1], grid->step[0][2]},

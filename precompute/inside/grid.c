@@ -10,37 +10,8 @@
 
 static const double nodes_max = 2147483648.0;
 
-static void node_point(const supine_inside_grid *grid, const double node[3], double point[3]) {
-  for (int k = 0; k < 3; ++k) {
-    point[k] = grid->origin[k] + node[0] * grid->step[0][k] + node[1] * grid->step[1][k] +
-               node[2] * grid->step[2][k];
-  }
-}
-
-/* Coordinates of a point in steps of the grid: Cramer's rule. */
-static void grid_coordinates(const supine_inside_grid *grid, const double point[3],
-                             double node[3]) {
-  const double *a = grid->step[0];
-  const double *b = grid->step[1];
-  const double *c = grid->step[2];
-  double x[3];
-  for (int k = 0; k < 3; ++k) {
-    x[k] = point[k] - grid->origin[k];
-  }
-  const double *columns[4] = {a, b, c, x};
-  double determinant[4];
-  for (int replaced = 0; replaced < 4; ++replaced) { /* the fourth: none */
-    determinant[replaced] =
-        supine_triple(columns[replaced == 0 ? 3 : 0], columns[replaced == 1 ? 3 : 1],
-                      columns[replaced == 2 ? 3 : 2]);
-  }
-  for (int k = 0; k < 3; ++k) {
-    node[k] = determinant[k] / determinant[3];
-  }
-}
-
 /* The box of the lungs and the margin in steps of `grid`. */
-static void cover(const supine_inside_shells *shells, const supine_inside_grid *grid, double margin,
+static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
     low[k] = INFINITY;
@@ -50,7 +21,7 @@ static void cover(const supine_inside_shells *shells, const supine_inside_grid *
     const supine_inside_shell *shell = &shells->shell[lung];
     for (size_t i = 0; i < shell->vertex_count; ++i) {
       double node[3];
-      grid_coordinates(grid, shell->vertices + 3 * i, node);
+      supine_image_locate(grid, shell->vertices + 3 * i, node);
       for (int k = 0; k < 3; ++k) {
         low[k] = fmin(low[k], node[k]);
         high[k] = fmax(high[k], node[k]);
@@ -64,12 +35,11 @@ static void cover(const supine_inside_shells *shells, const supine_inside_grid *
 }
 
 /* The grid that covers the lungs: a box of its own, or every n-th node of another's. */
-static supine_status make_grid(const supine_inside_shells *shells, const supine_inside_grid *like,
-                               double spacing, double margin, supine_inside_grid *grid,
+static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
+                               double spacing, double margin, supine_image *grid,
                                supine_error *error) {
-  static const supine_inside_grid plain = {
-      .step = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
-  supine_inside_grid from = like != NULL ? *like : plain;
+  static const supine_image plain = {.step = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+  supine_image from = like != NULL ? *like : plain;
   double low[3];
   double high[3];
   double first[3];
@@ -100,14 +70,17 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
                             "a grid of %g mm has %.3g nodes; give a larger spacing", spacing,
                             nodes);
   }
-  node_point(&from, first, grid->origin);
+  for (int a = 0; a < 3; ++a) {
+    grid->origin[a] = from.origin[a] + first[0] * from.step[0][a] + first[1] * from.step[1][a] +
+                      first[2] * from.step[2][a];
+  }
   return SUPINE_OK;
 }
 
 /* Which lung each node is of, and whether it is to be kept. */
 typedef struct search {
   const supine_inside_shells *shells;
-  const supine_inside_grid *grid;
+  const supine_image *grid;
   double limit; /* mm outside that are kept */
   unsigned char *keep;
 } search;
@@ -119,9 +92,8 @@ static void search_rows(void *context, size_t begin, size_t end, size_t thread) 
   for (size_t row = begin; row < end; ++row) {
     supine_inside_walk walk = {0};
     for (size_t i = 0; i < size[0]; ++i) {
-      const double node[3] = {(double)i, (double)(row % size[1]), (double)(row / size[1])};
       double point[3];
-      node_point(work->grid, node, point);
+      supine_image_place(work->grid, row * size[0] + i, point);
       const size_t lung = supine_inside_shells_find(work->shells, point, work->limit, &walk);
       const double depth = walk.place[lung].depth;
       work->keep[row * size[0] + i] = depth > 0.0 ? 2 : depth > -work->limit ? 1 : 0;
@@ -129,7 +101,7 @@ static void search_rows(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-static supine_status take_nodes(const supine_inside_grid *grid, const unsigned char *keep,
+static supine_status take_nodes(const supine_image *grid, const unsigned char *keep,
                                 supine_inside_content *content, supine_error *error) {
   const size_t nodes = grid->size[0] * grid->size[1] * grid->size[2];
   size_t count = 0;
@@ -152,10 +124,7 @@ static supine_status take_nodes(const supine_inside_grid *grid, const unsigned c
   content->grid = *grid;
   for (size_t i = 0; i < nodes; ++i) {
     if (keep[i] != 0) {
-      const double node[3] = {(double)(i % grid->size[0]),
-                              (double)(i / grid->size[0] % grid->size[1]),
-                              (double)(i / grid->size[0] / grid->size[1])};
-      node_point(grid, node, content->points + 3 * content->count);
+      supine_image_place(grid, i, content->points + 3 * content->count);
       content->part[content->count++] = (uint32_t)i;
     }
   }
@@ -163,10 +132,9 @@ static supine_status take_nodes(const supine_inside_grid *grid, const unsigned c
 }
 
 supine_status supine_inside_content_grid(const supine_inside_shells *shells,
-                                         const supine_inside_grid *like, double spacing,
-                                         double margin, supine_inside_content *content,
-                                         supine_error *error) {
-  supine_inside_grid grid = {0};
+                                         const supine_image *like, double spacing, double margin,
+                                         supine_inside_content *content, supine_error *error) {
+  supine_image grid = {0};
   if (!(spacing > 0.0) || !isfinite(spacing)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a grid's spacing must be positive, not %g mm", spacing);

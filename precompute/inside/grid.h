@@ -20,8 +20,7 @@
  * @retval SUPINE_ERROR_MESH      no node is inside a lung
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_content_grid(const supine_inside_shells *shells,
-                                         const supine_inside_grid *like, double spacing,
-                                         double margin, supine_inside_content *content,
-                                         supine_error *error);
+                                         const supine_image *like, double spacing, double margin,
+                                         supine_inside_content *content, supine_error *error);
 
 #endif

@@ -118,15 +118,6 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   }
 }
 
-void supine_field_place(const supine_image *nodes, size_t i, double place[3]) {
-  const double at[3] = {(double)(i % nodes->size[0]), (double)(i / nodes->size[0] % nodes->size[1]),
-                        (double)(i / nodes->size[0] / nodes->size[1])};
-  for (int k = 0; k < 3; ++k) {
-    place[k] = nodes->origin[k] + at[0] * nodes->step[0][k] + at[1] * nodes->step[1][k] +
-               at[2] * nodes->step[2][k];
-  }
-}
-
 supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
                                   supine_field *field, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -142,23 +133,29 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   float *moved = malloc(3 * n * sizeof *moved);
   unsigned char *known = calloc(count, 1);
   float *u = calloc(3 * count, sizeof *u);
-  made.inside = calloc(count, 1);
+  float *below = malloc(count * sizeof *below);
   made.nodes.values = u;
-  if (moved == NULL || known == NULL || u == NULL || made.inside == NULL) {
+  made.depth = made.nodes;
+  made.depth.channels = 1;
+  made.depth.values = below;
+  if (moved == NULL || known == NULL || u == NULL || below == NULL) {
     status =
         supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
     supine_field_free(&made);
   } else {
     supine_displace_range(basis, pose, 0, n, moved);
+    for (size_t i = 0; i < count; ++i) {
+      below[i] = (float)-fade; /* where the basis has no node */
+    }
     for (size_t i = 0; i < n; ++i) { /* from the scan's node, which full inflation may have moved */
       double node[3];
-      supine_field_place(&made.nodes, part[i], node);
+      supine_image_place(&made.nodes, part[i], node);
       for (size_t k = 0; k < 3; ++k) {
         u[3 * (size_t)part[i] + k] =
             (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
       }
       known[part[i]] = 1;
-      made.inside[part[i]] = depth[i] > 0.0F;
+      below[part[i]] = depth[i];
     }
     fade_out(&made.nodes, known, fade);
     *field = made;
@@ -170,7 +167,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
 
 void supine_field_free(supine_field *field) {
   supine_image_free(&field->nodes);
-  free(field->inside);
+  supine_image_free(&field->depth);
   *field = (supine_field){0};
 }
 

@@ -12,8 +12,8 @@
 
 /** u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
-  supine_image nodes;    /**< three channels, F32 */
-  unsigned char *inside; /**< of each node: 1 inside a lung at rest, else 0 */
+  supine_image nodes; /**< three channels, F32 */
+  supine_image depth; /**< one, F32: mm below the lungs' surface, negative outside; none of an inverse */
 } supine_field;
 
 /** The field of a basis's grid in a pose, from the scan. Outside the lungs, beyond the nodes that
@@ -24,9 +24,6 @@ typedef struct supine_field {
 supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
                                   supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);
-
-/** Where node i of a grid is, mm. */
-void supine_field_place(const supine_image *nodes, size_t i, double place[3]);
 
 /** u at any point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
@@ -44,12 +41,17 @@ typedef struct supine_field_residual {
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
 
-/** image(y) = image(y + v(y)) in place, on its own voxels; where that lies outside the image, the
- * nearest of its voxels.
+/** moved(y) = image(y + v(y)) on the image's own voxels; where that lies outside the image, the
+ * nearest of its voxels. With a depth, that of the field, densities (Hounsfield units + 1000) inside
+ * the lungs are multiplied by det(dv/dy + 1), the volume that the tissue had of that it has now, so
+ * that its mass is kept; outside, where the field means nothing, they stay.
  * @param inverse  of supine_field_invert
+ * @param depth    NULL: densities are not scaled
  * @param labels   nearest voxel instead of linear
+ * @param moved    written; supine_image_free releases it
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_field_resample(const supine_field *inverse, bool labels, supine_image *image,
+supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
+                                    bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error);
 
 #endif

@@ -28,23 +28,13 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* The step in shares that takes the residual away: Cramer's rule; false where the field folds. */
-static bool newton(const double m[3][3], const double residual[3], double step[3]) {
-  double adjugate[3][3];
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const int p = (j + 1) % 3;
-      const int q = (j + 2) % 3;
-      const int r = (i + 1) % 3;
-      const int s = (i + 2) % 3;
-      adjugate[i][j] = m[p][r] * m[q][s] - m[p][s] * m[q][r];
-    }
+/* The step in shares that takes the residual away; false where the field folds. */
+static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
+  supine_image cell = {.origin = {0.0}}; /* where shares are coordinates */
+  for (size_t k = 0; k < 9; ++k) {
+    cell.step[k % 3][k / 3] = -slope[k / 3][k % 3];
   }
-  const double determinant =
-      m[0][0] * adjugate[0][0] + m[0][1] * adjugate[1][0] + m[0][2] * adjugate[2][0];
-  for (int i = 0; i < 3; ++i) {
-    step[i] = -supine_dot(adjugate[i], residual) / determinant;
-  }
+  supine_image_locate(&cell, residual, step);
   return isfinite(step[0] + step[1] + step[2]);
 }
 
@@ -87,13 +77,6 @@ typedef struct inversion {
   unsigned char *lost; /* of each row's nodes */
 } inversion;
 
-static void node_at(const supine_image *nodes, size_t i, size_t j, size_t k, double point[3]) {
-  for (int a = 0; a < 3; ++a) {
-    point[a] = nodes->origin[a] + (double)i * nodes->step[0][a] + (double)j * nodes->step[1][a] +
-               (double)k * nodes->step[2][a];
-  }
-}
-
 static void invert_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const inversion *work = context;
@@ -105,7 +88,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
       double y[3];
       double u[3];
       double x[3];
-      node_at(nodes, i, row % nodes->size[1], row / nodes->size[1], y);
+      supine_image_place(nodes, node, y);
       supine_field_at(work->field, y, u);
       for (int k = 0; k < 3; ++k) {
         x[k] = y[k] - u[k];
@@ -136,13 +119,12 @@ static void measure(const supine_field *field, const supine_field *inverse,
   size_t count = 0;
   double sum = 0.0;
   for (size_t node = 0; node < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++node) {
-    if (field->inside[node] == 0) {
+    if (!(((const float *)field->depth.values)[node] > 0.0F)) {
       continue;
     }
     double x[3];
     double back[3];
-    node_at(nodes, node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
-            node / nodes->size[0] / nodes->size[1], x);
+    supine_image_place(nodes, node, x);
     for (size_t k = 0; k < 3; ++k) {
       x[k] += (double)u[3 * node + k];
     }
@@ -164,17 +146,15 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
   supine_field made = {.nodes = *nodes};
   made.nodes.values = malloc(3 * count * sizeof(float));
-  made.inside = malloc(count);
   unsigned char *lost = malloc(count);
   supine_status status = SUPINE_OK;
   *residual = (supine_field_residual){0};
-  if (made.nodes.values == NULL || made.inside == NULL || lost == NULL) {
+  if (made.nodes.values == NULL || lost == NULL) {
     status =
         supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
     supine_field_free(&made);
   } else {
     inversion work = {field, &made, lost};
-    memcpy(made.inside, field->inside, count);
     supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, invert_rows, &work);
     for (size_t i = 0; i < count; ++i) {
       residual->lost += lost[i];

@@ -8,7 +8,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-#include "program/field/field.h"
+#include "program/field/cell.h"
 
 /* Voxels of a row that go through each step together, in vector units. */
 enum { RUN = 128 };
@@ -17,6 +17,8 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
+  const supine_image *depth; /* NULL: densities stay, and `inside` is empty */
+  supine_image inside;       /* the lungs, 1 of each of the image's voxels, else 0 */
   const supine_image *from;
   supine_image *to;
   bool labels;
@@ -115,16 +117,80 @@ INLINE void interpolate(const supine_image *image, const cells *in, double *valu
   }
 }
 
-/* Take the nearest voxels: labels have no means. */
-INLINE void take_nearest(const supine_image *image, cells *in, double *values) {
+/* Take nearest voxels: labels have no means. */
+INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   size_t stride = 1;
   for (size_t a = 0; a < 3; ++a) {
     for (size_t i = 0; i < RUN; ++i) {
-      in->first[i] += in->share[a][i] > 0.5 ? stride : 0; /* as rint has it */
+      in.first[i] += in.share[a][i] > 0.5 ? stride : 0; /* as rint has it */
     }
     stride *= image->size[a];
   }
-  supine_image_gather(image, 0, in->first, RUN, values);
+  supine_image_gather(image, 0, in.first, RUN, values);
+}
+
+/* Compute det(dv/dy + 1) at a voxel. */
+static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
+  double point[3];
+  double v[3];
+  double slope[3][3];
+  double edge[3][3];
+  supine_field_cell cell;
+  supine_image_place(image, index, point);
+  supine_field_find_cell(nodes, point, &cell);
+  supine_field_interpolate(nodes, &cell, v, slope);
+  for (size_t k = 0; k < 9; ++k) {
+    edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
+  }
+  return fmax(0.0, supine_triple(edge[0], edge[1], edge[2]) /
+                       supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
+}
+
+/* Interpolate densities over voxels on the same side of the lungs' surface as the nearest one, so
+ * that the wall lends the lungs no mass, and multiply those inside by the ratio of volumes.
+ * @param first  voxel that the run goes to */
+INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
+                                double *values) {
+  double weight[8][RUN];
+  double value[RUN];
+  double nearest[RUN];
+  double inside[RUN];
+  double sum[RUN] = {0.0};
+  size_t behind[8];
+  weigh_corners(work->from, in, weight, behind);
+  take_nearest(&work->inside, *in, nearest);
+  memset(values, 0, RUN * sizeof *values);
+  for (size_t corner = 0; corner < 8; ++corner) {
+    supine_image_gather(work->from, behind[corner], in->first, RUN, value);
+    supine_image_gather(&work->inside, behind[corner], in->first, RUN, inside);
+    for (size_t i = 0; i < RUN; ++i) {
+      const double part = inside[i] == nearest[i] ? weight[corner][i] : 0.0;
+      values[i] += part * (value[i] + 1000.0);
+      sum[i] += part;
+    }
+  }
+  for (size_t i = 0; i < RUN; ++i) {
+    const bool scaled = nearest[i] > 0.0;
+    values[i] = values[i] / sum[i] *
+                    (scaled ? volume_ratio(&work->inverse->nodes, work->from, first + i) : 1.0) -
+                1000.0;
+  }
+}
+
+/* Mark the voxels of rows that are inside the lungs. */
+static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const resampling *work = context;
+  unsigned char *inside = work->inside.values;
+  for (size_t i = begin * work->from->size[0]; i < end * work->from->size[0]; ++i) {
+    supine_field_cell cell;
+    double point[3];
+    double depth;
+    supine_image_place(work->from, i, point);
+    supine_field_find_cell(work->depth, point, &cell);
+    supine_field_interpolate(work->depth, &cell, &depth, NULL);
+    inside[i] = depth > 0.0;
+  }
 }
 
 /* Resample voxels `begin` to begin + RUN of a row; those past its end are not stored. */
@@ -146,7 +212,9 @@ SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_
   displace(&work->inverse->nodes, &in, point);
   find_cells(from, point, &in);
   if (work->labels) {
-    take_nearest(from, &in, values);
+    take_nearest(from, in, values);
+  } else if (work->depth != NULL) {
+    interpolate_density(work, &in, row * from->size[0] + begin, values);
   } else {
     interpolate(from, &in, values);
   }
@@ -163,18 +231,25 @@ static void resample_rows(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-supine_status supine_field_resample(const supine_field *inverse, bool labels, supine_image *image,
+supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
+                                    bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
-  supine_image moved = *image;
-  moved.values = malloc(count * supine_image_voxel_size(image->voxel));
-  if (moved.values == NULL) {
+  resampling work = {inverse, depth, *image, image, moved, labels};
+  work.inside.voxel = SUPINE_VOXEL_U8;
+  work.inside.values = depth == NULL ? NULL : malloc(count);
+  *moved = *image;
+  moved->values = malloc(count * supine_image_voxel_size(image->voxel));
+  if (moved->values == NULL || (depth != NULL && work.inside.values == NULL)) {
+    supine_image_free(moved);
+    supine_image_free(&work.inside);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for an image of %zu voxels",
                             count);
   }
-  resampling work = {inverse, image, &moved, labels};
+  if (depth != NULL) {
+    supine_parallel_for(image->size[1] * image->size[2], 1, 0, mark_rows, &work);
+  }
   supine_parallel_for(image->size[1] * image->size[2], 1, 0, resample_rows, &work);
-  free(image->values);
-  image->values = moved.values;
+  supine_image_free(&work.inside);
   return SUPINE_OK;
 }

@@ -16,7 +16,11 @@ range of vertices.
 from __future__ import annotations
 
 import ctypes
+import gzip
+import io
 import os
+import subprocess
+import tempfile
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
@@ -41,6 +45,8 @@ STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512", "vector128")
 _SUPINE = (0.0, 1.0, 0.0)
+_VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32", "uint32": "uint32",
+           "float32": "float", "float64": "double"}  # as NRRD names them
 
 
 def _three(gravity: Gravity) -> Any:
@@ -145,6 +151,7 @@ class _Owner:
 
     def __init__(self, source: Source, options: _c.Options) -> None:
         self.pointer = ctypes.c_void_p()
+        self.source = source
         if isinstance(source, (bytes, bytearray, memoryview)):
             self.bytes = np.frombuffer(source, np.uint8)  # held as long as the basis is
             _c.basis_open_memory(self.bytes.ctypes.data, self.bytes.size, options, self.pointer)
@@ -262,6 +269,53 @@ class Basis:
         and where they were seen [n, 3], mm, in any frame that the body is shifted to (and turned, where
         `rigid`). Without a volume it is found too."""
         return Location(self, vertices, positions, _state(state, volume), noise, rigid)
+
+    def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
+             origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "",
+             program: str = "supine") -> Any:
+        """Moves an image of the scan [z, y, x] into a state, or into each of a list of states, by the basis of a
+        grid (of `supine embed`) and `supine deform`, which has to be installed: the image on its own voxels, of
+        its own type; for a list, a list.
+
+        step     mm from voxel to voxel, (x, y, z), or a vector for each of the three, [3, 3], LPS
+        origin   of the first voxel's centre, mm, LPS
+        labels   takes the nearest voxel, for label maps
+        density  scales Hounsfield units by the change of volume, so that mass is kept
+        since    the state that the image is in, where it is not the scan
+        """
+        image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
+        if image.ndim != 3 or image.dtype.name not in _VOXELS:
+            raise ValueError(f"image must be [z, y, x], of {', '.join(_VOXELS)}")
+        wanted = [states] if isinstance(states, str) else list(states)
+        steps = np.asarray(step, np.float64)
+        with tempfile.TemporaryDirectory() as folder:
+            basis, scan, table = (os.path.join(folder, name) for name in ("basis", "scan.nrrd", "states.csv"))
+            source = self._owner.source
+            if isinstance(source, (bytes, bytearray, memoryview)):
+                with io.open(basis, "wb") as file:
+                    file.write(source)
+            else:
+                basis = os.path.abspath(os.fsdecode(source))
+            numbers = [f"({','.join(repr(float(x)) for x in row)})"
+                       for row in [*(np.diag(steps) if steps.ndim == 1 else steps), np.asarray(origin)]]
+            with io.open(scan, "wb") as file:
+                file.write(f"NRRD0004\ntype: {_VOXELS[image.dtype.name]}\ndimension: 3\nspace: left-posterior-superior\n"
+                           f"sizes: {' '.join(map(str, image.shape[::-1]))}\nspace directions: {' '.join(numbers[:3])}\n"
+                           f"space origin: {numbers[3]}\nendian: little\nencoding: raw\n\n".encode())
+                file.write(image.data)
+            with io.open(table, "w") as file:
+                file.writelines(["posture,output\n", *(f'"{state}",{i}.nrrd\n' for i, state in enumerate(wanted))])
+            done = subprocess.run([program, "deform", basis, "--states", table, "--labels" if labels else "--image", scan,
+                                   *(["--density"] if density else []), *(["--from", since] if since else [])],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+            if done.returncode != 0:
+                raise ArgumentError(done.stderr.strip())
+            moved = []
+            for i in range(len(wanted)):
+                with io.open(os.path.join(folder, f"{i}.nrrd"), "rb") as file:
+                    voxels = gzip.decompress(file.read().split(b"\n\n", 1)[1])
+                moved.append(np.frombuffer(voxels, image.dtype).reshape(image.shape).copy())
+        return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
         """The weights [K] of a pose: a view of it."""
