@@ -3,8 +3,12 @@ supine_test(equilibrium supine_precompute supine_lungs supine_mesh_io supine_gsl
 supine_test(inverse supine_precompute supine_lungs supine_mesh_io)
 supine_test(force supine_precompute supine_lungs supine_mesh_io)
 supine_test(lit_angles supine_precompute supine_lungs supine_mesh_io supine_gsl)
-supine_test(postures supine_precompute supine_lungs supine_mesh_io supine_gsl)
-target_sources(test_postures PRIVATE postures.c)
+# What turning and breathing do to real lungs, within the ranges that evidence.py prints.
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
+  add_test(NAME evidence COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/evidence.py --check
+    ${PROJECT_BINARY_DIR} ${SUPINE_LUNGS}/lungs ${SUPINE_LUNGS}/covid:RAS)
+  set_tests_properties(evidence PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+endif()
 supine_test(reference supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(lungs supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute supine_precompute supine_lungs supine_mesh_io umfpack)

@@ -14,7 +14,6 @@
 
 #include "precompute/lungs/phantom.h"
 
-#include "tests/postures.h"
 #include "tests/validation.h"
 
 static const char *folder = "validation";
@@ -329,106 +328,6 @@ static void resolution(void) {
   }
 }
 
-/* One row of what turning does, with what was published. n, spread: as in the sources' abstracts.
- */
-static void print_published(void) {
-  (void)puts(
-      "published, to set beside it (a miss is a miss):\n"
-      "  on the left: left lung 0 % (SD 44), right +25 % (SD 11), n 10 women, MRI: Little 2021\n"
-      "  share of a breath on the left 57.6 % to the left lung (SD 7.2), on the right 64.7 % to "
-      "the\n"
-      "    right (SD 6.7), n 10, impedance: Volk 2011\n"
-      "  turning prone moves lesions by up to 40 mm of depth below the carina and little above, n "
-      "20:\n"
-      "    Yankelevitz 1995 (depth from the skin of the back, not displacement)\n"
-      "  prone more even than supine: Amis 1984 (n 12, krypton), Shin 2020 (n 34 prone, 56 "
-      "supine,\n"
-      "    lobes: 0.98 to 1.06 against 0.61 to 0.94), Prisk 2007 (n 6, density +0.07 in front, "
-      "-0.11\n"
-      "    g/cm3 behind); as graded as supine: Kaneko 1966 (n 8), Musch 2002 (n 6), Verschakelen "
-      "1993\n"
-      "    (n 6); supine lowest third over uppermost 1.75: Sa 2010 (n 8)\n"
-      "  standing over supine at full inspiration +10.9 % (right +10.3, left +11.6), n 32: Yamada "
-      "2020;\n"
-      "    here the full volume is the same in every posture, and only rest differs");
-}
-
-/* Pairs at rest in six postures, from supine. */
-static void postures_at_rest(void) {
-  static const struct {
-    const char *name, *left, *right;
-    supine_axes axes;
-  } pairs[] = {{"adult", "lungs/chaste_left.ply", "lungs/chaste_right.ply", SUPINE_AXES_AUTO},
-               {"001", "covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS},
-               {"002", "covid/covid002_left.ply", "covid/covid002_right.ply", SUPINE_AXES_RAS},
-               {"005", "covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS}};
-  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
-  const supine_resting resting = supine_reference_resting_default();
-  FILE *csv = begin_csv("postures",
-                        "pair,posture,move mean mm,move max mm,lower half mm,upper third mm,left %,"
-                        "right %,turned over %,lowest over uppermost,left share of breath %");
-  (void)puts(
-      "at rest, from supine rest: moves in mm, each lung's volume, triangles turned over,\n"
-      "ventilation per volume of the lowest quarter of height over the uppermost, left lung's "
-      "breath");
-  for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) {
-    supine_mesh meshes[2] = {{0}};
-    supine_lungs lungs = {0};
-    supine_reference reference;
-    supine_error error = {0};
-    supine_basis *basis = NULL;
-    posture_figures figures[POSTURE_COUNT];
-    char path[1024];
-    const supine_mesh_load_options options = {.axes = pairs[i].axes};
-    const char *const names[2] = {pairs[i].left, pairs[i].right};
-    bool there = true;
-    for (int side = 0; side < 2 && there; ++side) {
-      (void)snprintf(path, sizeof path, "%s/%s", data, names[side]);
-      there = supine_mesh_load(path, &options, &meshes[side], NULL, NULL) == SUPINE_OK;
-    }
-    supine_precompute_options wanted = {.model = supine_physics_model(SUPINE_LAW_DEEP),
-                                        .reference = &reference,
-                                        .band = 23,
-                                        .modes = 16,
-                                        .held_out = 20};
-    supine_precompute_report report;
-    (void)snprintf(path, sizeof path, "%s/postures.safetensors", folder);
-    if (there) {
-      need(supine_lungs_create(meshes, 2, NULL, &lungs, &error) == SUPINE_OK &&
-               supine_reference_find(&lungs, &wanted.model, &full, &resting, &reference, &error) ==
-                   SUPINE_OK &&
-               supine_precompute(&lungs, &wanted, path, &report, &error) == SUPINE_OK &&
-               supine_basis_open(path, &basis, &error) == SUPINE_OK &&
-               postures_measure(basis, figures, &error) == SUPINE_OK,
-           error.message);
-    } else {
-      (void)printf("  %s: not there\n", pairs[i].name);
-    }
-    for (size_t p = 0; p < POSTURE_COUNT && there; ++p) {
-      const posture_figures *f = &figures[p];
-      (void)printf(
-          "  %-5s %-8s mean %4.1f max %4.1f  lower half %4.1f upper third %4.1f  left %+5.1f "
-          "%% right %+5.1f %%  over %.4f %%  %.2f  %.0f %%\n",
-          pairs[i].name, posture_figure_names[p], f->move_mean, f->move_max, f->move_base,
-          f->move_top, 100.0 * f->change[0], 100.0 * f->change[1], 100.0 * f->turned_over,
-          f->dependent, 100.0 * f->breath[0]);
-      (void)fprintf(csv, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.5f,%.4f,%.3f\n", pairs[i].name,
-                    posture_figure_names[p], f->move_mean, f->move_max, f->move_base, f->move_top,
-                    100.0 * f->change[0], 100.0 * f->change[1], 100.0 * f->turned_over,
-                    f->dependent, 100.0 * f->breath[0]);
-    }
-    supine_basis_close(basis);
-    supine_lungs_free(&lungs);
-    supine_mesh_free(&meshes[0]);
-    supine_mesh_free(&meshes[1]);
-    (void)unlink(path);
-  }
-  end_figure(csv, "postures",
-             "set style data histograms\nset ylabel 'mean move from supine rest, mm'\n"
-             "plot csv using 3:xtic(2)");
-  print_published();
-}
-
 int main(int argc, char **argv) {
   folder = argc > 1 ? argv[1] : folder;
   data = argc > 2 ? argv[2] : data;
@@ -443,6 +342,5 @@ int main(int argc, char **argv) {
   regional_ventilation(&lungs);
   supine_lungs_free(&lungs);
   resolution();
-  postures_at_rest();
   return EXIT_SUCCESS;
 }
