@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
@@ -20,19 +21,28 @@ static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
-  double centre[3]; /* of area */
-  double dipole[3]; /* sum of the triangles' normals times area */
-  double radius;    /* about the centre */
-  size_t begin, end;
-  size_t right; /* the other child; the first follows the node; 0: a leaf */
+  double area, centre[3]; /* of it */
+  double dipole[3];       /* sum of the triangles' normals times area */
+  double radius;          /* about the centre */
+  uint32_t begin, end;
+  uint32_t right; /* the other child; the first follows the node; 0: a leaf */
+  uint32_t leaf;  /* its boxes */
 } node;
+
+/* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
+typedef struct boxes {
+  float low[3][LEAF], high[3][LEAF];
+} boxes;
 
 struct supine_inside_surface {
   const double *vertices;
   const uint32_t *triangles;
-  size_t *order; /* triangles, leaf by leaf */
+  size_t triangle_count;
+  uint32_t *order; /* triangles, leaf by leaf */
   node *nodes;
-  size_t node_count;
+  uint32_t node_count;
+  boxes *leaves; /* of the triangles of each leaf */
+  uint32_t leaf_count;
 };
 
 static void subtract(const double a[3], const double b[3], double out[3]) {
@@ -49,59 +59,129 @@ static void corners(const supine_inside_surface *s, size_t triangle, const doubl
 
 typedef struct keyed {
   double key;
-  size_t triangle;
+  uint32_t triangle;
 } keyed;
 
-static int by_key(const void *a, const void *b) {
-  const double x = ((const keyed *)a)->key;
-  const double y = ((const keyed *)b)->key;
-  return (x > y) - (x < y);
+/* Sort by key; what is equal stays in order, as with the C library's merge sort, which calls a
+ * function for each comparison.
+ * @param space  [count / 2] */
+static void sort(keyed *item, size_t count, keyed *space) {
+  const size_t half = count / 2;
+  if (half == 0) {
+    return;
+  }
+  sort(item, half, space);
+  sort(item + half, count - half, space);
+  if (item[half - 1].key <= item[half].key) {
+    return;
+  }
+  memcpy(space, item, half * sizeof *item);
+  for (size_t i = 0, j = half, to = 0; i < half; ++to) {
+    const bool second = j < count && item[j].key < space[i].key;
+    item[to] = second ? item[j] : space[i];
+    j += second;
+    i += !second;
+  }
 }
 
-static void measure(const supine_inside_surface *s, node *n) {
-  double total = 0.0;
+static double least(double a, double b) {
+  return a < b ? a : b;
+}
+
+static double greatest(double a, double b) {
+  return a > b ? a : b;
+}
+
+/* The box of a triangle. */
+static void triangle_box(const supine_inside_surface *s, size_t triangle, double low[3],
+                         double high[3]) {
+  const double *p[3];
+  corners(s, triangle, p);
+  for (int k = 0; k < 3; ++k) {
+    low[k] = least(p[0][k], least(p[1][k], p[2][k]));
+    high[k] = greatest(p[0][k], greatest(p[1][k], p[2][k]));
+  }
+}
+
+/* Find the box of a node's triangles, and of a leaf each triangle's. */
+static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   for (int k = 0; k < 3; ++k) {
     n->low[k] = INFINITY;
     n->high[k] = -INFINITY;
-    n->centre[k] = n->dipole[k] = 0.0;
   }
   for (size_t i = n->begin; i < n->end; ++i) {
+    double low[3];
+    double high[3];
+    triangle_box(s, s->order[i], low, high);
+    for (int k = 0; k < 3; ++k) {
+      n->low[k] = least(n->low[k], low[k]);
+      n->high[k] = greatest(n->high[k], high[k]);
+      if (leaf != NULL) {
+        leaf->low[k][i - n->begin] = nextafterf((float)low[k], -INFINITY);
+        leaf->high[k][i - n->begin] = nextafterf((float)high[k], INFINITY);
+      }
+    }
+  }
+}
+
+/* Add a part, of which `centre` is the centre of area, to a node's dipole and centre times area. */
+static void add_part(node *n, double area, const double centre[3], const double dipole[3]) {
+  n->area += area;
+  for (int k = 0; k < 3; ++k) {
+    n->centre[k] += area * centre[k];
+    n->dipole[k] += dipole[k];
+  }
+}
+
+/* Find a node's dipole: a leaf's from its triangles, another's from its children's. */
+static void find_dipole(const supine_inside_surface *s, node *n) {
+  n->area = 0.0;
+  memset(n->centre, 0, sizeof n->centre);
+  memset(n->dipole, 0, sizeof n->dipole);
+  if (n->right != 0) {
+    const node *child[2] = {n + 1, &s->nodes[n->right]};
+    for (int i = 0; i < 2; ++i) {
+      add_part(n, child[i]->area, child[i]->centre, child[i]->dipole);
+    }
+  }
+  for (size_t i = n->begin; i < n->end && n->right == 0; ++i) {
     const double *p[3];
     double u[3];
     double v[3];
     double normal[3];
+    double centre[3];
     corners(s, s->order[i], p);
     subtract(p[1], p[0], u);
     subtract(p[2], p[0], v);
     supine_cross(u, v, normal);
-    const double area = 0.5 * sqrt(supine_dot(normal, normal));
-    total += area;
     for (int k = 0; k < 3; ++k) {
-      n->low[k] = fmin(n->low[k], fmin(p[0][k], fmin(p[1][k], p[2][k])));
-      n->high[k] = fmax(n->high[k], fmax(p[0][k], fmax(p[1][k], p[2][k])));
-      n->centre[k] += area * (p[0][k] + p[1][k] + p[2][k]) / 3.0;
-      n->dipole[k] += 0.5 * normal[k];
+      normal[k] *= 0.5;
+      centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3.0;
     }
+    add_part(n, sqrt(supine_dot(normal, normal)), centre, normal);
   }
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
-    n->centre[k] = total > 0.0 ? n->centre[k] / total : 0.5 * (n->low[k] + n->high[k]);
-    const double reach = fmax(n->high[k] - n->centre[k], n->centre[k] - n->low[k]);
+    n->centre[k] = n->area > 0.0 ? n->centre[k] / n->area : 0.5 * (n->low[k] + n->high[k]);
+    const double reach = greatest(n->high[k] - n->centre[k], n->centre[k] - n->low[k]);
     square += reach * reach;
   }
   n->radius = sqrt(square);
 }
 
 /* Builds the node of triangles order[begin..end) and those below it. */
-static void build(supine_inside_surface *s, keyed *space, size_t begin, size_t end) {
+static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32_t end) {
   node *n = &s->nodes[s->node_count++];
   n->begin = begin;
   n->end = end;
   n->right = 0;
-  measure(s, n);
   if (end - begin <= LEAF) {
+    n->leaf = s->leaf_count++;
+    find_box(s, n, &s->leaves[n->leaf]);
+    find_dipole(s, n);
     return;
   }
+  find_box(s, n, NULL);
   int axis = 0;
   for (int k = 1; k < 3; ++k) {
     axis = n->high[k] - n->low[k] > n->high[axis] - n->low[axis] ? k : axis;
@@ -111,38 +191,41 @@ static void build(supine_inside_surface *s, keyed *space, size_t begin, size_t e
     corners(s, s->order[i], p);
     space[i] = (keyed){p[0][axis] + p[1][axis] + p[2][axis], s->order[i]};
   }
-  qsort(space + begin, end - begin, sizeof *space, by_key);
+  sort(space + begin, end - begin, space + s->triangle_count);
   for (size_t i = begin; i < end; ++i) {
     s->order[i] = space[i].triangle;
   }
-  const size_t middle = begin + (end - begin) / 2;
+  const uint32_t middle = begin + (end - begin) / 2;
   build(s, space, begin, middle);
   n->right = s->node_count;
   build(s, space, middle, end);
+  find_dipole(s, n);
 }
 
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles,
                                            supine_inside_surface **surface, supine_error *error) {
   supine_inside_surface *s = calloc(1, sizeof *s);
-  keyed *space = malloc(count * sizeof *space);
+  keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
   if (s != NULL) {
     s->vertices = vertices;
     s->triangles = triangles;
+    s->triangle_count = count;
     s->order = malloc(count * sizeof *s->order);
     s->nodes = malloc(2 * count * sizeof *s->nodes); /* a binary tree of at most `count` leaves */
+    s->leaves = malloc((2 * count / LEAF + 1) * sizeof *s->leaves); /* each at least half full */
   }
-  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL) {
+  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL || s->leaves == NULL) {
     free(space);
     supine_inside_surface_destroy(s);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a tree of %zu triangles",
                             count);
   }
-  for (size_t i = 0; i < count; ++i) {
+  for (uint32_t i = 0; i < count; ++i) {
     s->order[i] = i;
   }
-  build(s, space, 0, count);
+  build(s, space, 0, (uint32_t)count);
   free(space);
   *surface = s;
   return SUPINE_OK;
@@ -152,6 +235,7 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   if (surface != NULL) {
     free(surface->order);
     free(surface->nodes);
+    free(surface->leaves);
     free(surface);
   }
 }
@@ -159,11 +243,16 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
 /* Weight of the second of two points, nearest to the first one's origin: -w.e / e.e in 0 to 1. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
-  return length > 0.0 ? fmin(fmax(supine_dot(offset, edge) / length, 0.0), 1.0) : 0.0;
+  const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
+  return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Barycentric coordinates of the triangle's point nearest to x: inside it, or on an edge. */
-static void nearest_in_triangle(const double *const p[3], const double x[3], double b[3]) {
+/* Barycentric coordinates of the triangle's point nearest to x: inside it, or on an edge; false
+ * where it is farther than the square `best`, as the distances from its plane and from the lines of
+ * its edges in the plane may tell. */
+static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
+                                double b[3]) {
+  static const double slender = 1e-4; /* of a triangle whose coordinates are not exact enough */
   double u[3];
   double v[3];
   double w[3];
@@ -180,9 +269,19 @@ static void nearest_in_triangle(const double *const p[3], const double x[3], dou
   b[2] = (uu * vw - uv * uw) / determinant;
   b[0] = 1.0 - b[1] - b[2];
   if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false where the triangle has no area */
-    return;
+    return true;
   }
-  double best = INFINITY;
+  const double ww = supine_dot(w, w);
+  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu};             /* squared edges */
+  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw); /* of it in the plane */
+  bool farther = false;
+  for (int k = 0; k < 3; ++k) {
+    farther |= b[k] < 0.0 && b[k] * b[k] * determinant > rest * opposite[k];
+  }
+  if (farther && determinant > slender * uu * vv) {
+    return false;
+  }
+  double least = INFINITY;
   for (int k = 0; k < 3; ++k) {
     const double *from = p[k];
     const double *to = p[(k + 1) % 3];
@@ -196,18 +295,20 @@ static void nearest_in_triangle(const double *const p[3], const double x[3], dou
       const double apart = offset[a] - t * edge[a];
       square += apart * apart;
     }
-    if (square < best) {
-      best = square;
+    if (square < least) {
+      least = square;
       b[k] = 1.0 - t;
       b[(k + 1) % 3] = t;
       b[(k + 2) % 3] = 0.0;
     }
   }
+  return true;
 }
 
 /* Square of the distance of two intervals, the point x and [low, high]. */
 static inline double gap_square(double low, double high, double x) {
-  const double apart = low > x ? low - x : x > high ? x - high : 0.0;
+  const double out = low - x > x - high ? low - x : x - high;
+  const double apart = out > 0.0 ? out : 0.0;
   return apart * apart;
 }
 
@@ -219,15 +320,13 @@ static double box_square(const node *n, const double x[3]) {
   return square;
 }
 
-/* That of a triangle's box. */
-static double triangle_box_square(const double *const p[3], const double x[3]) {
-  double square = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    const double low = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
-    const double high = p[0][k] < p[1][k] ? p[1][k] : p[0][k];
-    square += gap_square(p[2][k] < low ? p[2][k] : low, p[2][k] > high ? p[2][k] : high, x[k]);
+/* Those of a leaf's triangles. */
+SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], double *square) {
+  for (size_t i = 0; i < LEAF; ++i) {
+    square[i] = gap_square((double)leaf->low[0][i], (double)leaf->high[0][i], x[0]) +
+                gap_square((double)leaf->low[1][i], (double)leaf->high[1][i], x[1]) +
+                gap_square((double)leaf->low[2][i], (double)leaf->high[2][i], x[2]);
   }
-  return square;
 }
 
 /* The nearest triangle below node `at`, where it is nearer than the square *best. */
@@ -255,23 +354,27 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
     }
     return;
   }
+  double square[LEAF];
+  boxes_squares(&s->leaves[n->leaf], x, square);
   for (size_t i = n->begin; i < n->end; ++i) {
+    if (square[i - n->begin] >= *best) {
+      continue;
+    }
     const double *p[3];
     double b[3];
     double q[3];
     double apart[3];
     corners(s, s->order[i], p);
-    if (triangle_box_square(p, x) >= *best) {
+    if (!nearest_in_triangle(p, x, *best, b)) {
       continue;
     }
-    nearest_in_triangle(p, x, b);
     for (int k = 0; k < 3; ++k) {
       q[k] = b[0] * p[0][k] + b[1] * p[1][k] + b[2] * p[2][k];
     }
     subtract(x, q, apart);
-    const double square = supine_dot(apart, apart);
-    if (square < *best) {
-      *best = square;
+    const double apart_square = supine_dot(apart, apart);
+    if (apart_square < *best) {
+      *best = apart_square;
       place->triangle = s->order[i];
       memcpy(place->nearest, q, sizeof q);
       memcpy(place->barycentric, b, sizeof b);

@@ -22,7 +22,7 @@ typedef struct supine_inside_place {
 
 /** A tree of boxes over the triangles.
  * @param vertices   [., 3] mm, kept by the caller
- * @param triangles  [count, 3], count > 0, outwards; kept by the caller
+ * @param triangles  [count, 3], 0 < count < 2^31, outwards; kept by the caller
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles,
