@@ -137,9 +137,10 @@ supine_status supine_patient_validate_points(
     const double *from = own ? predicted : pairs->from;
     if (!fit_map(own ? map_of(moved) : (supine_patient_map)k, pairs->count, from, pairs->to, &by)) {
       free(space);
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the points determine no %s map: they lie in one plane",
-                              own ? "rigid" : supine_patient_map_names[k]);
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "the points determine no %s map: they lie in one plane, or memory is short",
+          own ? "rigid" : supine_patient_map_names[k]);
     }
     for (size_t i = 0; i < pairs->count; ++i) {
       double at[3];
@@ -244,7 +245,8 @@ supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved mo
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     if (!settle(own ? map_of(moved) : (supine_patient_map)k, n, own ? predicted : rest->vertices,
                 tree, space, at)) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the surface determines no %s map",
+      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the surface determines no %s map, or memory is short",
                                 own ? "rigid" : supine_patient_map_names[k]);
     } else {
       status = surface_distance(rest, at, state, tree, own ? nearest : NULL, &distance[k], error);
