@@ -87,7 +87,8 @@ static double move_between(const comparison *c, size_t from, size_t to, size_t n
 
 static void print_table(const comparison *c, size_t from, size_t to) {
   static const char *const ways[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
-  (void)printf("%s to %s:\n", c->postures->item[from].name, c->postures->item[to].name);
+  (void)printf("%s to %s:\n", supine_options_posture_label(c->postures->item[from].name),
+               supine_options_posture_label(c->postures->item[to].name));
   for (size_t name = 0; name < c->names.count; ++name) {
     double move[3];
     const double length = move_between(c, from, to, name, move);

@@ -31,3 +31,7 @@ int supine_options_posture_list_parse(const char *command, const char *text,
     at += length + 1;
   }
 }
+
+const char *supine_options_posture_label(const char *name) {
+  return strcmp(name, "left") == 0 ? "left side" : strcmp(name, "right") == 0 ? "right side" : name;
+}

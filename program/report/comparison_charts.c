@@ -33,7 +33,8 @@ static double down(double height) {
   return BOTTOM - (BOTTOM - TOP) * height / 100.0;
 }
 
-static json_t *profile(const supine_comparison *c, const char *title, slab_value *value) {
+static json_t *profile(const supine_comparison *c, const char *axis, bool of_breath,
+                       slab_value *value) {
   double low = 0.0;
   double high = 0.0;
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -69,15 +70,17 @@ static json_t *profile(const supine_comparison *c, const char *title, slab_value
     }
     (void)json_array_append_new(
         lines, json_pack("{s:s, s:s, s:b, s:o}", "line", supine_report_line(i), "name",
-                         c->postures.item[i].name, "dashed", (int)(i >= 7), "dots", dots));
+                         supine_options_posture_label(c->postures.item[i].name), "dashed",
+                         (int)(i >= 7), "dots", dots));
   }
-  return json_pack("{s:s, s:o, s:o, s:o}", "title", title, "heights", heights, "ticks", ticks,
+  return json_pack("{s:s, s:o, s:o, s:o, s:o}", "axis", axis, "title",
+                   supine_report_profile_finding(c, of_breath), "heights", heights, "ticks", ticks,
                    "lines", lines);
 }
 
 json_t *supine_report_profiles(const supine_comparison *c) {
-  return json_pack("[o, o]", profile(c, "regional expansion, %", expansion),
-                   profile(c, "share of the volume gained, %", share));
+  return json_pack("[o, o]", profile(c, "regional expansion, %", false, expansion),
+                   profile(c, "share of the volume gained, %", true, share));
 }
 
 /* RMS distance from supine in mm, or NaN where the volume cannot be reached. */
@@ -130,7 +133,7 @@ static json_t *map_cells(const supine_comparison *c) {
 }
 
 json_t *supine_report_map(const supine_comparison *c) {
-  static const char *const rolls[] = {"prone", "right", "supine", "left", "prone"};
+  static const char *const rolls[] = {"prone", "right side", "supine", "left side", "prone"};
   static const char *const tilts[] = {"inverted", "45°", "level", "45°", "upright"};
   json_t *across_names = json_array();
   json_t *down_names = json_array();
@@ -147,10 +150,10 @@ json_t *supine_report_map(const supine_comparison *c) {
     double x;
     double y;
     place(c->postures.item[i].gravity, &x, &y);
-    (void)json_array_append_new(dots,
-                                json_pack("{s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", x), "y",
-                                          json_sprintf("%.1f", y), "line", supine_report_line(i),
-                                          "name", c->postures.item[i].name));
+    (void)json_array_append_new(
+        dots, json_pack("{s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", x), "y",
+                        json_sprintf("%.1f", y), "line", supine_report_line(i), "name",
+                        supine_options_posture_label(c->postures.item[i].name)));
   }
   return json_pack("{s:o, s:o, s:o, s:o}", "cells", map_cells(c), "rolls", across_names, "tilts",
                    down_names, "dots", dots);

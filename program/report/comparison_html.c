@@ -25,36 +25,9 @@ static void set_statistics(json_t *row, const supine_distance_statistics *d) {
 }
 
 static json_t *named(const supine_comparison *c, size_t posture) {
-  return json_pack("{s:s, s:s}", "name", c->postures.item[posture].name, "line",
+  return json_pack("{s:s, s:s}", "name",
+                   supine_options_posture_label(c->postures.item[posture].name), "line",
                    supine_report_line(posture));
-}
-
-/* Where gravity points in the body, by its letters. */
-static json_t *points(const double g[3]) {
-  static const char *const ends[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
-  for (int axis = 0; axis < 3; ++axis) {
-    if (fabs(g[axis]) > 1.0 - 1e-6) {
-      return json_sprintf("to the %s", ends[axis][g[axis] < 0.0]);
-    }
-  }
-  return json_sprintf("L %.2f P %.2f H %.2f", g[0] + 0.0, g[1] + 0.0, g[2] + 0.0);
-}
-
-static json_t *postures(const supine_comparison *c) {
-  const supine_basis_info *info = supine_basis_get_info(c->basis);
-  json_t *list = json_array();
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    json_t *row = named(c, i);
-    json_t *gains = json_array();
-    for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-      (void)json_array_append_new(gains, json_sprintf("%+.1f", c->posture[i].gain[lung]));
-    }
-    (void)json_object_set_new(row, "gravity", points(c->postures.item[i].gravity));
-    (void)json_object_set_new(row, "gains", gains);
-    set_statistics(row, &c->posture[i].displacement);
-    (void)json_array_append_new(list, row);
-  }
-  return list;
 }
 
 static json_t *lungs(const supine_comparison *c) {
@@ -92,9 +65,23 @@ static json_t *matrix(const supine_comparison *c) {
                                     json_sprintf("%.2f", rms)));
     }
     (void)json_array_append_new(
-        rows, json_pack("{s:s, s:o}", "name", c->postures.item[i].name, "cells", cells));
+        rows, json_pack("{s:s, s:o}", "name",
+                        supine_options_posture_label(c->postures.item[i].name), "cells", cells));
   }
   return supine_report_parts(c, rows);
+}
+
+/* The two that differ most. */
+static json_t *matrix_title(const supine_comparison *c) {
+  const size_t count = c->postures.count;
+  size_t most = 0;
+  for (size_t i = 0; i < count * count; ++i) {
+    most = c->pair[i].rms > c->pair[most].rms ? i : most;
+  }
+  return json_sprintf("Of these, %s and %s differ most: %.1f mm RMS",
+                      supine_options_posture_label(c->postures.item[most / count].name),
+                      supine_options_posture_label(c->postures.item[most % count].name),
+                      c->pair[most].rms);
 }
 
 static json_t *pairs(const supine_comparison *c) {
@@ -221,7 +208,8 @@ static json_t *facts(const supine_comparison *c) {
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
   json_t *data = facts(c);
-  (void)json_object_set_new(data, "postures", postures(c));
+  (void)json_object_set_new(data, "postures", supine_report_postures(c));
+  (void)json_object_set_new(data, "findings", supine_report_findings(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
   (void)json_object_set_new(data, "surface", json_string(c->reference.name));
   (void)json_object_set_new(data, "map", supine_report_map(c));
@@ -231,7 +219,8 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   if (c->postures.count > 1) {
     (void)json_object_set_new(
         data, "matrix",
-        json_pack("{s:o, s:o, s:o}", "parts", matrix(c), "pairs", pairs(c), "between_bar",
+        json_pack("{s:o, s:o, s:o, s:o}", "title", matrix_title(c), "parts", matrix(c), "pairs",
+                  pairs(c), "between_bar",
                   supine_report_bar(SUPINE_COLOURS_DIFFERENCE, largest_pair(c), false,
                                     "RMS distance, mm")));
   }

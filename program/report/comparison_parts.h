@@ -32,13 +32,27 @@ json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const
  * numbers that commands take. */
 json_t *supine_report_direction(const double g[3]);
 
+/* The first sentences: what each posture changes. */
+json_t *supine_report_findings(const supine_comparison *comparison);
+
+/* {{postures}}: a row each, with volumes, changes, moves and what was published. */
+json_t *supine_report_postures(const supine_comparison *comparison);
+
+/* Regional expansion of the lowest over that of the uppermost three slabs of ten. */
+double supine_report_lowest_over_uppermost(const supine_comparison *comparison, size_t posture);
+
+/* A profile's title: what of a breath the lower half takes, or that ratio, in up to four postures.
+ */
+json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
+
 /* {{profiles}}: regional expansion and share of the volume gained, by height. */
 json_t *supine_report_profiles(const supine_comparison *comparison);
 
 /* {{map}}: distance from supine for every direction of gravity. */
 json_t *supine_report_map(const supine_comparison *comparison);
 
-/* {{pictures}} of each lung; NULL, and why in `error`, where none can be drawn. */
+/* {{pictures}}, {{parts}} from the front and {{sides}} of each lung; NULL, and why in `error`,
+ * where none can be drawn. */
 json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
 
 #endif

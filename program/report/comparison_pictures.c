@@ -88,7 +88,9 @@ static void set_gravity(supine_view view, const double g[3], json_t *shot) {
       seen[row] += axes[row][axis] * g[axis];
     }
   }
-  if (hypot(seen[0], seen[1]) > 0.35) {
+  if (hypot(seen[0], seen[1]) > 0.35) { /* turned so that it points down */
+    (void)json_object_set_new(
+        shot, "turn", json_sprintf("%.1f", 90 + atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));
     (void)json_object_set_new(shot, "along",
                               json_sprintf("%.1f", -atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));
   } else {
@@ -108,7 +110,8 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, co
   scene.line_step = supine_render_bar_step(largest);
   json_t *made = NULL;
   if (supine_render_png(renderer, &scene, &png, &size, error) == SUPINE_OK) {
-    made = json_pack("{s:s, s:o, s:o, s:o}", "name", c->postures.item[posture].name, "png",
+    made = json_pack("{s:s, s:o, s:o, s:o}", "name",
+                     supine_options_posture_label(c->postures.item[posture].name), "png",
                      encoded(png, size), "ends", ends(from->view), "points",
                      supine_report_direction(c->postures.item[posture].gravity));
     set_gravity(from->view, c->postures.item[posture].gravity, made);
@@ -166,7 +169,10 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
                  most > largest ? "; the last colour also shows what lies beyond" : "");
   pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));
-  (void)json_object_set_new(pictures, "parts", supine_report_parts(c, json_incref(rows)));
+  json_t *front = json_pack("[O]", json_array_get(rows, 0));
+  (void)json_array_remove(rows, 0);
+  (void)json_object_set_new(pictures, "parts", supine_report_parts(c, front));
+  (void)json_object_set_new(pictures, "sides", supine_report_parts(c, json_incref(rows)));
 cleanup:
   json_decref(rows);
   supine_render_destroy(renderer);

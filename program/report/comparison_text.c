@@ -9,7 +9,7 @@
 static int widest_name(const supine_comparison *c) {
   size_t width = strlen("posture");
   for (size_t i = 0; i < c->postures.count; ++i) {
-    const size_t length = strlen(c->postures.item[i].name);
+    const size_t length = strlen(supine_options_posture_label(c->postures.item[i].name));
     width = length > width ? length : width;
   }
   return (int)width;
@@ -39,15 +39,15 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
                 "RMS", "95 %", "largest");
   print_error_head(c, file);
   for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-    (void)fprintf(file, " %9s", info->lung_names[lung]);
+    (void)fprintf(file, " %6s lung", info->lung_names[lung]);
   }
   (void)fputc('\n', file);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file, "%-*s ", width, c->postures.item[i].name);
+    (void)fprintf(file, "%-*s ", width, supine_options_posture_label(c->postures.item[i].name));
     print_statistics(&c->posture[i].displacement, file);
     print_error(c, c->posture[i].expected_error, file);
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
-      (void)fprintf(file, " %9.2f", c->posture[i].volume[lung]);
+      (void)fprintf(file, " %11.2f", c->posture[i].volume[lung]);
     }
     (void)fputc('\n', file);
   }
@@ -60,8 +60,9 @@ static void print_pairs(const supine_comparison *c, int width, FILE *file) {
   (void)fputc('\n', file);
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
-      (void)fprintf(file, "%-*s  %-*s ", width, c->postures.item[i].name, width,
-                    c->postures.item[j].name);
+      (void)fprintf(file, "%-*s  %-*s ", width,
+                    supine_options_posture_label(c->postures.item[i].name), width,
+                    supine_options_posture_label(c->postures.item[j].name));
       print_statistics(&c->pair[i * c->postures.count + j], file);
       print_error(c, c->pair_error[i * c->postures.count + j], file);
       (void)fputc('\n', file);
@@ -75,13 +76,13 @@ static void print_gains(const supine_comparison *c, int width, FILE *file) {
   (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
                 supine_report_gain(c, 0), width, "posture");
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    (void)fprintf(file, " %9s", info->lung_names[lung]);
+    (void)fprintf(file, " %6s lung", info->lung_names[lung]);
   }
   (void)fputc('\n', file);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file, "%-*s", width, c->postures.item[i].name);
+    (void)fprintf(file, "%-*s", width, supine_options_posture_label(c->postures.item[i].name));
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      (void)fprintf(file, " %9.2f", c->posture[i].gain[lung]);
+      (void)fprintf(file, " %11.2f", c->posture[i].gain[lung]);
     }
     (void)fputc('\n', file);
   }
@@ -92,7 +93,7 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
               "the\nbreath, and share of the breath, %\n  height  ",
               file);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(file, " %15.15s", c->postures.item[i].name);
+    (void)fprintf(file, " %15.15s", supine_options_posture_label(c->postures.item[i].name));
   }
   (void)fputc('\n', file);
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {

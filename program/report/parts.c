@@ -19,7 +19,8 @@ json_t *supine_report_parts(const supine_comparison *c, json_t *rows) {
     size_t i;
     json_t *row;
     for (size_t j = begin; j < end; ++j) {
-      (void)json_array_append_new(columns, json_string(c->postures.item[j].name));
+      (void)json_array_append_new(
+          columns, json_string(supine_options_posture_label(c->postures.item[j].name)));
     }
     json_array_foreach(rows, i, row) {
       json_t *copy = json_copy(row);

@@ -56,6 +56,21 @@ assert.deepEqual(told(leaves({ energy: json.energy, sphere: json.sphere, area: j
 assert.equal(readFileSync(csv, 'utf8').split('\n')[0], '# postures at rest + 120 mL; displacement from supine at rest, mm');
 assert.equal(json.displacement_from, 'supine at rest');
 assert.ok(rows.some((row) => row[3] === `"${json.file}"`));
+
+/* The first table holds volumes, what they have gained since supine at rest, and moves. */
+const supineRest = JSON.parse(supine('compare', basis, '--postures', 'supine', '--json').replace(/^[^{]*/, '')).postures[0].volume_ml;
+const summary = await page.evaluate(() => [...document.querySelectorAll('.summary tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
+assert.deepEqual(summary.map(([name]) => name), postures.map((name) => ({ left: 'left side', right: 'right side' })[name] ?? name));
+json.postures.forEach(({ volume_ml: ml, displacement_mm: mm }, i) => {
+  ['left', 'right'].forEach((lung, j) => {
+    assert.ok(Math.abs(Number(summary[i][1 + j]) - ml[lung]) <= 0.5, `${summary[i]}`);
+    assert.ok(Math.abs(Number(summary[i][3 + j]) - (100 * ml[lung]) / supineRest[lung] + 100) <= 0.51, `${summary[i]}`);
+  });
+  assert.ok(Math.abs(Number(summary[i][5]) - mm.mean) <= 0.051 && Math.abs(Number(summary[i][6]) - mm.max) <= 0.051, `${summary[i]}`);
+});
+const findings = await page.evaluate(() => [...document.querySelectorAll('.finding')].map((e) => e.textContent));
+assert.equal(findings.length, 3);
+assert.match(findings[2], /^On the left side the right lung gains \d+ mL \(\+\d+ %\); the left lung /);
 for (const format of ['A4', 'Letter']) {
   const pdf = join(folder, `${format}.pdf`);
   await page.pdf({ path: pdf, format, preferCSSPageSize: false, printBackground: true });
@@ -121,9 +136,11 @@ if (shots.length > 0) {
     assert.ok(/<g|<circle/.test(gravity), alt);
   }
   const along = (alt) => Number(/rotate\(([-\d.]+)\)/.exec(shots.find((shot) => shot.alt === alt).gravity)?.[1]);
-  assert.equal(Math.abs(along('left, from the front')), 0);     // lying on the left: to the right of the picture
-  assert.equal(Math.abs(along('right, from the front')), 180);
+  assert.equal(Math.abs(along('left side, from the front')), 0);     // lying on the left: to the right of the picture
+  assert.equal(Math.abs(along('right side, from the front')), 180);
   assert.equal(along('upright, from the front'), 90); // down
+  const turns = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.shot')].map((shot) => [shot.querySelector('img').alt, (parseFloat(shot.style.getPropertyValue('--turn')) + 360) % 360])));
+  assert.deepEqual([turns['left side, from the front'], turns['right side, from the front'], turns['supine, left lung from the left']], [90, 270, 90]); // gravity is down then
   assert.equal(Math.abs(along('supine, left lung from the left')), 0);
 }
 assert.deepEqual(complaints, []);

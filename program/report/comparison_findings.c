@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What a comparison found, in sentences and in the first table. */
+#include <ctype.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/report/comparison_parts.h"
+
+/* What was measured of people, beside which a posture's row stands. */
+static const struct {
+  const char *posture, *words;
+} published[] = {
+    {"supine", "1.75"},
+    {"left", "0 and +25 %"},
+};
+
+/* Percent that each lung holds more than where displacements count from, and how many mL. */
+static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
+  double held[SUPINE_LUNGS_MAX];
+  supine_basis_volumes(c->basis, &c->reference.pose, held);
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    ml[lung] = c->posture[posture].volume[lung] - held[lung];
+    percent[lung] = 100 * ml[lung] / held[lung];
+  }
+}
+
+double supine_report_lowest_over_uppermost(const supine_comparison *c, size_t posture) {
+  double gain[2] = {0, 0};
+  double volume[2] = {0, 0};
+  for (size_t s = 0; s < 3; ++s) {
+    for (int end = 0; end < 2; ++end) {
+      const supine_slab *slab =
+          &c->posture[posture].slab[end == 0 ? s : SUPINE_COMPARISON_SLABS - 1 - s];
+      gain[end] += slab->gain;
+      volume[end] += slab->volume;
+    }
+  }
+  return gain[1] / volume[1] / (gain[0] / volume[0]);
+}
+
+/* "On the left side", "Prone," and so on. */
+static void print_where(const char *name, FILE *to) {
+  const char *label = supine_options_posture_label(name);
+  if (label != name) {
+    (void)fprintf(to, "On the %s", label);
+  } else if (isalpha((unsigned char)name[0])) {
+    (void)fprintf(to, "%c%s,", toupper((unsigned char)name[0]), name + 1);
+  } else {
+    (void)fprintf(to, "With gravity along %s,", name);
+  }
+}
+
+/* Each lung's change, the largest first, and the mean move. */
+static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  double percent[SUPINE_LUNGS_MAX];
+  double ml[SUPINE_LUNGS_MAX];
+  bool told[SUPINE_LUNGS_MAX] = {false};
+  print_where(c->postures.item[posture].name, to);
+  if (info->has_volume) {
+    find_changes(c, posture, percent, ml);
+  }
+  for (size_t i = 0; info->has_volume && i < info->lung_count; ++i) {
+    size_t most = info->lung_count;
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      if (!told[lung] && (most == info->lung_count || fabs(ml[lung]) > fabs(ml[most]))) {
+        most = lung;
+      }
+    }
+    told[most] = true;
+    (void)fprintf(to, "%s the %s lung ", i > 0 ? ";" : "", info->lung_names[most]);
+    if (fabs(percent[most]) < 1.5) {
+      (void)fprintf(to, "keeps its volume (%+.0f %%)", percent[most]);
+    } else {
+      (void)fprintf(to, "%s %.0f mL (%+.0f %%)", ml[most] < 0 ? "loses" : "gains", fabs(ml[most]),
+                    percent[most]);
+    }
+  }
+  (void)fprintf(to, "%s the surface moves %.1f mm on average, %.1f mm at most.",
+                info->has_volume ? ";" : "", c->posture[posture].displacement.mean,
+                c->posture[posture].displacement.max);
+}
+
+/* A text that `print` writes of a posture. */
+static json_t *printed(const supine_comparison *c, size_t posture,
+                       void (*print)(const supine_comparison *c, size_t posture, FILE *to)) {
+  char *text = NULL;
+  size_t size = 0;
+  FILE *to = open_memstream(&text, &size);
+  if (to == NULL) {
+    return json_null();
+  }
+  print(c, posture, to);
+  json_t *made = fclose(to) == 0 ? json_string(text) : json_null();
+  free(text);
+  return made;
+}
+
+json_t *supine_report_findings(const supine_comparison *c) {
+  enum { SENTENCES = 3 };
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
+    if (c->posture[i].displacement.max >= 0.05) { /* not what displacements count from */
+      (void)json_array_append_new(list, printed(c, i, print_finding));
+    }
+  }
+  return list;
+}
+
+/* Of every posture, what its chart shows most plainly: as the title's end. */
+static void print_ratios(const supine_comparison *c, size_t most, FILE *to) {
+  for (size_t i = 0; i <= most; ++i) {
+    (void)fprintf(to, "%s %s %.1f", i > 0 ? "," : "",
+                  supine_options_posture_label(c->postures.item[i].name),
+                  supine_report_lowest_over_uppermost(c, i));
+  }
+}
+
+static void print_shares(const supine_comparison *c, size_t most, FILE *to) {
+  for (size_t i = 0; i <= most; ++i) {
+    double gain = 0;
+    for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
+      gain += c->posture[i].slab[s].gain;
+    }
+    (void)fprintf(to, "%s %s %.0f %%", i > 0 ? "," : "",
+                  supine_options_posture_label(c->postures.item[i].name),
+                  100 * gain / supine_report_gain(c, i));
+  }
+}
+
+json_t *supine_report_profile_finding(const supine_comparison *c, bool share) {
+  const size_t last = (c->postures.count < 4 ? c->postures.count : 4) - 1;
+  json_t *end = printed(c, last, share ? print_shares : print_ratios);
+  json_t *title =
+      json_sprintf(share ? "Of a breath the lower half takes:%s"
+                         : "The lowest third expands so many times as much as the uppermost:%s",
+                   json_string_value(end));
+  json_decref(end);
+  return title;
+}
+
+json_t *supine_report_postures(const supine_comparison *c) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    json_t *lungs = json_array();
+    double percent[SUPINE_LUNGS_MAX] = {0};
+    double ml[SUPINE_LUNGS_MAX] = {0};
+    const char *words = "";
+    if (info->has_volume) {
+      find_changes(c, i, percent, ml);
+    }
+    for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+      (void)json_array_append_new(
+          lungs,
+          json_pack("{s:o, s:o, s:o}", "ml", json_sprintf("%.0f", c->posture[i].volume[lung]),
+                    "percent", json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]), "breath",
+                    json_sprintf("%+.1f", c->posture[i].gain[lung])));
+    }
+    for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
+      if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {
+        words = published[j].words;
+      }
+    }
+    (void)json_array_append_new(
+        list,
+        json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
+                  supine_options_posture_label(c->postures.item[i].name), "line",
+                  supine_report_line(i), "held", lungs, "mean",
+                  json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
+                  json_sprintf("%.1f", c->posture[i].displacement.max), "published", words, "ratio",
+                  info->has_volume ? json_sprintf("%.2f", supine_report_lowest_over_uppermost(c, i))
+                                   : json_string("")));
+  }
+  return list;
+}
