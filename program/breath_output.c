@@ -138,7 +138,7 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
  * prints; the triangles' are among them where each frame has them. */
 double supine_command_breath_output_size(const char *path, const breath_content *content) {
   const double each = supine_text_ends_in(path, ".safetensors") ? 12.0
-                      : supine_text_ends_in(path, ".vtp")       ? 20.0
+                      : supine_text_ends_in(path, ".vtp")       ? 23.0
                                                                 : 29.0;
   return each * (double)content->rest->vertex_count * (double)content->course->count;
 }

@@ -38,7 +38,7 @@ static const supine_option table[] = {
     {"output", 'o', "OUT",
      "NAME.vtp: one file for ParaView, the triangles once, whose time is the frame's number; "
      "NAME.pvd: "
-     "time in seconds, and a folder NAME with a VTP file a frame, half as large again. Both to "
+     "time in seconds, and a folder NAME with a VTP file a frame, a quarter larger. Both to "
      "1/256 "
      "mm, with normals, lungs, gravity and volumes. NAME.safetensors: one "
      "file with positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; "

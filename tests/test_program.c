@@ -207,6 +207,10 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   static char text[1 << 20];
   assert_true(take_file("breath/frame_00000.vtp", text, sizeof text) > 0);
   assert_non_null(strstr(text, "RAS"));
+  EXPECT(0, "frames", "breathe ras.safetensors --posture left --fps 0.2 -o breath.vtp");
+  assert_true(take_file("breath.vtp", text, sizeof text) >
+              0); /* one file or many: the same arrays */
+  assert_non_null(strstr(text, "Name=\"displacement_magnitude\""));
   EXPECT(1, "is for a series",
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
   EXPECT(2, "came in different axes", "solve ras.ply low.obj --posture left --as-scanned -o b.ply");

@@ -70,8 +70,6 @@ supine_status supine_mesh_vtp_begin(vtp *file) {
   *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset};
   if (writer->rest != NULL) {
     *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, put_displacement};
-  }
-  if (writer->rest != NULL && file->times == NULL) { /* VTK and ParaView find it by themselves */
     *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, put_magnitude};
   }
   if (writer->expected_error != NULL) {
