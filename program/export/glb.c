@@ -116,13 +116,21 @@ static json_t *materials(const export_source *source, bool inside) {
   return list;
 }
 
-/* Node 0, the patient, turns; node 1 takes millimetres LPS, or counts, to metres with y up. */
+/* Node 0, the patient, turns, about the lungs' middle where it is animated; node 1 takes
+ * millimetres LPS, or counts, to metres with y up. */
 static json_t *nodes(const glb *g) {
   const double half = sqrt(0.5);
   const double metres = 1e-3 * g->targets.count_mm;
-  return json_pack("[{s:s, s:[i]}, {s:s, s:i, s:[f,f,f,f], s:[f,f,f]}]", "name", "patient",
-                   "children", 1, "name", "lungs", "mesh", 0, "rotation", -half, 0.0, 0.0, half,
-                   "scale", metres, metres, metres);
+  double low[3];
+  double high[3];
+  double to[3];
+  supine_export_glb_bounds(g->source->vertices, g->source->info->vertex_count, false, low, high);
+  for (int axis = 0; axis < 3; ++axis) {
+    to[axis] = g->options->animate ? -1e-3 * (low[axis] + high[axis]) / 2 : 0;
+  }
+  return json_pack("[{s:s, s:[i]}, {s:s, s:i, s:[f,f,f,f], s:[f,f,f], s:[f,f,f]}]", "name",
+                   "patient", "children", 1, "name", "lungs", "mesh", 0, "rotation", -half, 0.0,
+                   0.0, half, "scale", metres, metres, metres, "translation", to[0], to[2], -to[1]);
 }
 
 /* A second mesh at node 2, beside the lungs', with their weights. */

@@ -179,11 +179,16 @@ async function checkAnimation(basis) {
     assert.ok(mesh.morphTargetInfluences.every((w) => w >= 0 && w <= 1));
     const down = new three.Vector3(...gravity).transformDirection(mesh.matrixWorld);
     assert.ok(down.distanceTo(new three.Vector3(0, -1, 0)) < 1e-5, 'gravity is not down');
+    const middle = new three.Box3().setFromPoints([...morphed(mesh)].flatMap((_, i, all) => (i % 3 ? [] : [new three.Vector3(all[i], all[i + 1], all[i + 2])]))).getCenter(new three.Vector3());
+    assert.ok(middle.length() < 60, `at ${seconds} s the lungs' middle is ${middle.length()} mm off the origin`); // they are smaller than at full
     gltf.scene.getObjectByName('patient').quaternion.identity();
+    const moved = [mesh, mesh.parent].filter((node) => node.name !== 'patient').map((node) => [node, node.position.clone()]);
+    for (const [node] of moved) node.position.set(0, 0, 0); // as the patient's own coordinates have them
     gltf.scene.updateMatrixWorld(true);
     const [truth] = evaluate(basis, [[gravity, 500]]);
     const off = largestDistance(morphed(mesh), truth.xyz);
     assert.ok(off < FLOAT_MM, `animation at ${seconds} s: ${off} mm off`);
+    for (const [node, place] of moved) node.position.copy(place);
   }
 }
 
@@ -196,7 +201,9 @@ async function checkInside(basis, words, tolerance, rigid = []) {
   supine('embed', basis, points, ball, ...rigid, '-o', inside);
   supine('export', basis, '--inside', inside, '-o', path, ...words);
   await validate(path);
-  const { meshes } = await open(path);
+  const { gltf, meshes } = await open(path);
+  gltf.scene.traverse((node) => { if (node.name !== 'patient') node.position.set(0, 0, 0); }); // the middle that animations turn about
+  gltf.scene.updateMatrixWorld(true);
   const named = Object.fromEntries(meshes.map((m) => [m.material.name, m]));
   assert.deepEqual(Object.keys(named), ['left', 'right', 'nodule', 'fiducial', 'ball']);
   assert.ok(named.left.material.transparent && named.left.material.opacity < 0.5);
