@@ -450,9 +450,13 @@ class Picture {
       [this.state(pane.origin).few, 3, 16, 0, 1], [this.state(pane.state).few, 3, 16, 0, 1]]);
     this.usePane(solid, pane);
     gl.uniform1f(solid.at.thick, pane.radius * 0.09);
-    gl.uniform4fv(solid.at.tint, pane.ink);
     gl.bindVertexArray(this.arrays[key]);
-    gl.drawArraysInstanced(gl.TRIANGLES, 0, this.arrow.count, this.fewCount);
+    for (const [order, alpha] of [[gl.GREATER, 0.35], [gl.LEQUAL, 1]]) { // outward moves end on the surface
+      gl.depthFunc(order);
+      gl.depthMask(order === gl.LEQUAL);
+      gl.uniform4fv(solid.at.tint, [...pane.ink.slice(0, 3), alpha]);
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.arrow.count, this.fewCount);
+    }
   }
 
   /** Gravity, seen through the lungs where they hide it. */
