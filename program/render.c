@@ -43,7 +43,8 @@ static int draw(const request *wanted, supine_renderer *renderer,
   supine_panel panel[SUPINE_PANELS_MAX];
   char label[128];
   for (size_t i = 0; i < postures->count; ++i) {
-    panel[i] = supine_command_drawn_panel(wanted, &states[i], postures->item[i].name,
+    panel[i] = supine_command_drawn_panel(wanted, &states[i],
+                                          supine_options_posture_label(postures->item[i].name),
                                           postures->item[i].gravity);
   }
   supine_picture picture =
@@ -196,7 +197,8 @@ static const supine_option table[] = {
      "what is inside, of 'supine embed' from the same basis, seen through the lungs: points and "
      "meshes by name, with how far they have moved",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {"opacity", 0, "SHARE", "of the lungs, 0.05 to 1: whole; default 1, with --inside 0.35",
+    {"opacity", 0, "SHARE",
+     "of the lungs, 0.05 to 1: whole; below, a grey shell; default 1, with --inside 0.35",
      SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1"},
     {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
      .standard = "light"},

@@ -28,6 +28,7 @@ supine_status supine_render_animation_open(size_t width, size_t height,
   }
   supine_animation *made = calloc(1, sizeof *made);
   if (made != NULL && WebPAnimEncoderOptionsInit(&options) && WebPConfigInit(&made->config)) {
+    options.kmax = 1; /* whole frames: differences of lossy ones add up to staircases of colour */
     made->config.quality = quality;
     made->config.method = EFFORT;
     made->width = width;

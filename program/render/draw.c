@@ -311,8 +311,8 @@ static float lambert(const float n[3], const float from[3]) {
   return fmaxf(0.0F, dot(n, to));
 }
 
-/* The colour of a triangle at a sample, 0 to 255. */
-static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgb[3]) {
+/* The colour of a triangle at a sample, 0 to 255, times how much it covers, which is last. */
+static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgba[4]) {
   static const float key[3] = {-0.55F, 0.75F, 0.8F};
   static const float fill[3] = {0.9F, -0.1F, 0.5F};
   const supine_scene *scene = c->scene;
@@ -341,6 +341,13 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
   light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darker towards the outline */
   light *= spacing > 0.0F ? 1.0F - 0.275F * contour(&f, x, y, value, spacing) : 1.0F;
+  if (scene->shell) {
+    const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);
+    rgba[3] = (unsigned char)lrintf(255.0F * cover);
+    memset(rgba, (int)lrintf(cover * (scene->dark ? 215.0F : 70.0F)), 3);
+    return;
+  }
+  rgba[3] = 255;
   const float shine = 0.08F * powf(lambert(n, half), 48.0F);
   const float rim = (scene->dark ? 1.0F : 0.0F) * powf(1.0F - facing, 3.0F);
   static const float rims[3] = {0.10F, 0.14F, 0.20F};
@@ -348,7 +355,7 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   const float *base = c->colours[(size_t)lrintf(t * SHADES)];
   for (int k = 0; k < 3; ++k) {
     const float lit = base[k] * light + shine + rim * rims[k];
-    rgb[k] = c->encode[(size_t)lrintf(fminf(1.0F, fmaxf(0.0F, lit)) * SHADES)];
+    rgba[k] = c->encode[(size_t)lrintf(fminf(1.0F, fmaxf(0.0F, lit)) * SHADES)];
   }
 }
 
@@ -361,13 +368,12 @@ static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
     const size_t row = OVERSAMPLE * y + sub / OVERSAMPLE;
     const size_t column = OVERSAMPLE * x + sub % OVERSAMPLE;
     const uint32_t triangle = c->nearest[row * c->width + column];
-    unsigned char rgb[3];
+    unsigned char rgba[4];
     if (triangle != NOTHING) {
-      shade(c, triangle, (float)column + 0.5F, (float)row + 0.5F, rgb);
-      for (int k = 0; k < 3; ++k) {
-        sum[k] += rgb[k];
+      shade(c, triangle, (float)column + 0.5F, (float)row + 0.5F, rgba);
+      for (int k = 0; k < 4; ++k) {
+        sum[k] += rgba[k];
       }
-      sum[3] += 255;
     }
   }
   return (sum[3] / COUNT) << 24 | (sum[0] / COUNT) << 16 | (sum[1] / COUNT) << 8 | sum[2] / COUNT;

@@ -194,13 +194,30 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
+/* Move a name down, below every earlier one that it would lie on. `box` is the left end, the line
+ * and the width of each, `count` of them placed. */
+static void place_name(double (*box)[3], size_t count, double line) {
+  double *own = box[count];
+  for (size_t i = 0; i < count; ++i) {
+    const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
+    if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
+      own[1] = box[i][1] + line;
+      i = SIZE_MAX; /* from the first again: i + 1 is 0 */
+    }
+  }
+}
+
 /* Discs and specks at what is inside, then the names, so that none is covered. Eight parameters:
  * where, what, and in which colours. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *look) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
-  if (pixel == NULL) {
+  double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
+  size_t placed = 0;
+  if (pixel == NULL || box == NULL) {
+    free(pixel);
+    free(box);
     return SUPINE_ERROR_MEMORY;
   }
   supine_render_project(renderer, scene, marks, pixel);
@@ -224,9 +241,12 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
         continue;
       }
       font(cr, size * 0.75, false);
-      const double beside = at[0] + size * 0.5;
-      const double room = (double)scene->width - text_width(cr, mark->label);
-      cairo.move_to(cr, x + fmax(0, fmin(beside, room)), y + at[1] - size * 0.3);
+      double *own = box[placed];
+      own[2] = text_width(cr, mark->label);
+      own[0] = fmax(0, fmin(at[0] + size * 0.5, (double)scene->width - own[2]));
+      own[1] = at[1] - size * 0.3;
+      place_name(box, placed++, size);
+      cairo.move_to(cr, x + own[0], y + own[1]);
       cairo.text_path(cr, mark->label);
       cairo.set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
       cairo.set_line_width(cr, size * 0.25);
@@ -236,6 +256,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
     }
   }
   free(pixel);
+  free(box);
   return SUPINE_OK;
 }
 
@@ -252,6 +273,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .colours = picture->colours,
                               .view = view,
                               .dark = picture->dark,
+                              .shell = picture->transparency > 0,
                               .width = (size_t)width,
                               .height = (size_t)height,
                               .extent = extent};
@@ -269,7 +291,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   if (status == SUPINE_OK) {
     cairo.surface_mark_dirty(image);
     cairo.set_source_surface(cr, image, floor(x), floor(y));
-    cairo.paint_with_alpha(cr, 1 - picture->transparency);
+    cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
+                                                         : 1);
     if (panel->marks != NULL) {
       status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
                           &themes[picture->dark ? 1 : 0]);

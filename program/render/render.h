@@ -65,6 +65,7 @@ typedef struct supine_scene {
   bool one_lung; /**< draw `lung` alone */
   size_t lung;
   bool dark;            /**< lit for a dark page */
+  bool shell;           /**< seen through: grey, its outline dark, without colours */
   size_t width, height; /**< pixels */
   const double *extent; /**< [4] of supine_render_extent, or NULL: this scene's own */
 } supine_scene;
