@@ -5,10 +5,12 @@ clean environment.
     test_python.py SOURCE_FOLDER LIBRARY SUPINE CC"""
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 
 source, library, supine, cc = sys.argv[1:5]
 for wanted in ("pip", "setuptools", "wheel", "numpy"):
@@ -20,7 +22,8 @@ with tempfile.TemporaryDirectory() as folder:
     # Modules of the user's own must not take the place of Debian's.
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PIP_"))}
     clean.update(SUPINE_LIBRARY=library, HOME=folder, PIP_CONFIG_FILE=os.devnull, PIP_NO_CACHE_DIR="1",
-                 PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_NO_INDEX="1", LD_LIBRARY_PATH=os.path.dirname(library))
+                 PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_NO_INDEX="1", LD_LIBRARY_PATH=os.path.dirname(library),
+                 PATH=os.path.dirname(supine) + os.pathsep + os.environ["PATH"])
 
     def run(*arguments, **keywords):
         done = subprocess.run(arguments, cwd=folder, env=clean, text=True, stdout=subprocess.PIPE,
@@ -40,9 +43,16 @@ with tempfile.TemporaryDirectory() as folder:
     run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", "wheels",
         "source/runtime/python")
     wheel, = os.listdir(os.path.join(folder, "wheels"))
+    # The tag states the newest glibc that a symbol of the library wants.
+    wanted = re.findall(r"GLIBC_2\.(\d+)", run("objdump", "-T", library))
+    assert f"-py3-none-manylinux_2_{max(map(int, wanted))}_" in wheel, wheel
+    with zipfile.ZipFile(os.path.join(folder, "wheels", wheel)) as opened:
+        about = opened.read(next(name for name in opened.namelist() if name.endswith("METADATA"))).decode()
+    for line in ("Author: The Supine authors", "Project-URL: Method", "Classifier: License :: OSI Approved :: MIT"):
+        assert line in about, about
     run(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", "clean")
     python = os.path.join(folder, "clean/bin/python")
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", os.path.join("wheels", wheel))
+    run(sys.executable, "-m", "pip", "--python", python, "install", os.path.join("wheels", wheel))
 
     run(cc, "-std=c17", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{source}/runtime/include",
         f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
@@ -60,6 +70,11 @@ with tempfile.TemporaryDirectory() as folder:
     with open(os.path.join(folder, "examples.txt"), "w", encoding="utf-8") as examples:
         examples.write(text)
     print(run(python, "-m", "doctest", "examples.txt"), "examples run")
+    with open(f"{source}/README.md", encoding="utf-8") as readme:
+        lines = re.search(r"```python\n(.*?)```", readme.read(), re.S)[1]
+    with open(os.path.join(folder, "readme.py"), "w", encoding="utf-8") as program:
+        program.write("import supine\n_ = supine.open('lungs.safetensors')\nvertices, faces = _.vertices, _.triangles\n" + lines)
+    print(run(python, "readme.py"))
     run(supine, "phantom", "-o", "small.ply", "--vertices", "500")
     run(supine, "precompute", "small.ply", "-o", "small.safetensors", "--band", "3")
     print(run(python, f"{source}/tests/bench/bench_python.py", "./reference", "small.safetensors", "2"))

@@ -35,9 +35,13 @@ class Build(build_py):
 
 
 class Wheel(bdist_wheel):
-    """One wheel for every Python of this system: nothing in it is compiled against Python."""
+    """One wheel for every Python: nothing in it is compiled against Python. On Linux its tag states the oldest glibc
+    that has every symbol that the library asks for."""
     def get_tag(self):
-        return "py3", "none", super().get_tag()[2]
+        platform = super().get_tag()[2]
+        with open(os.path.join(self.get_finalized_command("build_py").build_lib, "supine/libsupine_runtime.so"), "rb") as library:
+            asked = [int(minor) for minor in re.findall(rb"\0GLIBC_2\.(\d+)", library.read())]
+        return "py3", "none", platform.replace("linux_", f"manylinux_2_{max(17, *asked)}_") if asked else platform
 
 
 class Binary(Distribution):

@@ -5,10 +5,12 @@
 import ctypes
 import gc
 import os
+import shutil
 import subprocess
 import sys
 import threading
 import time
+import warnings
 
 import numpy as np
 
@@ -197,4 +199,61 @@ refused(supine.ArgumentError, "no grid", lungs.warp, image, "prone:rest", **fram
 refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
 refused(supine.ArgumentError, "mL from what", grid.warp, image, "500", **frame)
+
+# Bases made from arrays are the program's own, bit for bit; `path` was made with --band 3.
+parts = []
+made = supine.precompute(lungs.vertices, lungs.triangles, band=3, progress=parts.append)
+for name in ("vertices", "triangles", "coefficients", "modes", "volume_cubic"):
+    assert (made.tensor(name) == lungs.tensor(name)).all(), name
+assert parts and parts == sorted(parts) and 0 <= parts[0] and parts[-1] == 1
+assert "error against the full solve" in made.report and lungs.report == ""
+left, right = (slice(part.start, part.stop) for part in lungs.lungs.values())
+halves = [lungs.triangles[(lungs.triangles >= part.start).all(1) & (lungs.triangles < part.stop).all(1)] - part.start
+          for part in (left, right)]
+apart = supine.precompute((lungs.vertices[right], halves[1]), (lungs.vertices[left].tolist(), halves[0]), band=3,
+                          held_out=60, resting={"supine": "2600mL"}, output=path + ".made")
+assert apart.vertex_count == n and supine.open(path + ".made").metadata["resting_known"]
+assert "--held-out 60" in apart.metadata["made_by"]
+assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # faces as VTK has them
+with warnings.catch_warnings(record=True) as warned:
+    warnings.simplefilter("always")
+    supine.precompute(1.4 * lungs.vertices, lungs.triangles, band=3)
+assert warned and "an adult's" in str(warned[0].message) and warned[0].filename == __file__, warned
+refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.precompute, lungs.vertices,
+        lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
+refused(supine.MeshError, "names vertex", supine.precompute, lungs.vertices, lungs.triangles.astype(np.int64) + 2**32)
+refused(supine.ArgumentError, "no option '--colour'", supine.precompute, lungs.vertices, lungs.triangles, colour="red")
+refused(supine.ArgumentError, "mL from what?", supine.precompute, lungs.vertices, lungs.triangles, scanned="supine:500")
+refused(supine.ReadError, "nowhere.ply: cannot read", supine.precompute, "nowhere.ply")
+refused(ValueError, "[N, 3]", supine.precompute, lungs.vertices[:, :2], lungs.triangles)
+refused(ValueError, "integers", supine.precompute, lungs.vertices, lungs.vertices)
+refused(TypeError, "array", supine.precompute, lungs.vertices, lungs.triangles, expandability=np.ones(n))
+
+
+def interrupt(part):
+    raise KeyboardInterrupt
+
+
+try:
+    supine.precompute(lungs.vertices, lungs.triangles, progress=interrupt, output=path + ".stopped")
+    raise AssertionError("not interrupted")
+except KeyboardInterrupt:
+    assert not os.path.exists(path + ".stopped")
+
+# Inside: of a file and of memory, points by name or not, a mesh; a point on the surface moves with it.
+place = lungs.vertices[7].astype(float)
+for basis in (lungs, made):
+    inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})
+    assert set(inside.points) == {"on, the surface", "other"} and "2 points" in inside.report
+    moved = inside.deform(inside.pose("prone:rest"))[inside.points["on, the surface"]]
+    assert np.abs(moved - lungs.deform(lungs.pose("prone:rest"))[7]).max() < 0.05
+assert supine.embed(made, place).vertex_count == 1
+assert supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place])).vertex_count == n + 1
+assert supine.embed(made, grid=40, clamp=True).vertex_count > 100
+refused(supine.ArgumentError, "which content?", supine.embed, made)
+refused(ValueError, "points must be", supine.embed, made, [(1, 2)])
+program, os.environ["PATH"] = shutil.which("supine"), ""
+refused(supine.UnsupportedError, "neither on PATH nor beside", supine.precompute, lungs.vertices, lungs.triangles)
+os.symlink(program, os.path.join(os.path.dirname(supine.__file__), "supine"))
+assert supine.embed(made, place).vertex_count == 1
 print("all as in C")

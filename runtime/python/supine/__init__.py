@@ -27,10 +27,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library as _c
+from . import _program
 from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
                        OutOfMemoryError, ReadError, UnsupportedError)
 
-__all__ = ["open", "Basis", "Pose", "Location", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+__all__ = ["open", "precompute", "embed", "Basis", "Pose", "Location", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -182,7 +183,9 @@ class Basis:
     lungs         the vertices of each lung: name -> slice
     metadata      the file's own words: key -> text
     storage_error mm, the bound on what compact storage costs a breath of 500 mL
+    report        what the program said when `precompute` or `embed` made the basis
     """
+    report: str = ""
 
     def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> None:
         options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals)
@@ -432,3 +435,40 @@ def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: 
     normals  False leaves the normals out of memory
     """
     return Basis(source, storage=storage, simd=simd, normals=normals)
+
+
+def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
+    """Make a basis from lung surfaces by the program `supine`, beside this package or on PATH:
+
+        precompute(vertices, faces, scanned="supine:rest")      # both lungs, or one: [N, 3], [M, 3]
+        precompute((vertices, faces), (vertices, faces))        # a lung each
+        precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
+
+    The basis has the vertices of the left lung first, each in the order given. Options are those of `supine precompute
+    --help`: held_out=200 is --held-out 200, True a flag, a tuple one value of several numbers, a list the option once
+    for each. Without `output` the basis is in memory alone; warnings are Python's.
+
+    progress  called with the part that is done, 0 to 1; what it raises ends the program
+    """
+    if len(surfaces) == 2 and not isinstance(surfaces[0], (str, tuple, os.PathLike)):
+        surfaces = (surfaces,)
+    return _made("precompute", None, surfaces, options, progress)
+
+
+def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
+    """Make a basis of what is inside the lungs of a basis and moves with them:
+
+        embed(lungs, {"nodule": (-80, -120, -90)})              # points by name; or an array [n, 3]
+        embed(lungs, (vertices, faces), "airways.ply")          # meshes
+        embed(lungs, "labels.nii.gz", labels="7=nodule")        # and whatever `supine embed --help` has
+
+    Options, output and progress are as `precompute` has them."""
+    return _made("embed", lungs._owner.source, content, options, progress)
+
+
+def _made(command: str, lungs: Any, content: Sequence[Any], options: dict[str, Any],
+          progress: Optional[_program.Progress]) -> Basis:
+    source, report = _program.make(command, lungs, content, options, progress)
+    basis = Basis(source)
+    basis.report = report
+    return basis

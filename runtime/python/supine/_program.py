@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""The program `supine`, run for what the library cannot do: it makes bases."""
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import warnings
+from typing import Any, Callable, Mapping, Optional, Sequence, Union
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _library as _c
+
+Progress = Callable[[float], Any]
+_EXITS = {1: _c.ArgumentError, 2: _c.MeshError, 3: _c.UnsupportedError, 5: _c.NumericalError}
+
+
+def _find() -> str:
+    """The program beside this file, or on PATH."""
+    found = shutil.which("supine", path=os.path.dirname(__file__)) or shutil.which("supine")
+    if found is None:
+        raise _c.UnsupportedError("the program 'supine' is neither on PATH nor beside the package: install it, as "
+                                  "precompute and embed run it")
+    return found
+
+
+def _words(options: dict[str, Any]) -> list[str]:
+    """Options as the program takes them: held_out=200 is --held-out 200, True a flag, a tuple a,b,c, a dict a=b,c=d,
+    a list the option once for each."""
+    words: list[str] = []
+    for name, given in options.items():
+        for value in given if isinstance(given, list) else [given]:
+            if isinstance(value, np.ndarray):
+                raise TypeError(f"{name}: an array is no option's value: give a tuple, or a file")
+            if isinstance(value, dict):
+                value = tuple(f"{key}={part}" for key, part in value.items())
+            if isinstance(value, tuple):
+                value = ",".join(map(str, value))
+            if value is not None and value is not False:
+                words.append("--" + name.replace("_", "-"))
+                words += [] if value is True else [os.fspath(value) if isinstance(value, os.PathLike) else str(value)]
+    return words
+
+
+def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
+    """Write a surface as PLY: vertices [N, 3]; faces [M, 3], or 3, a, b, c, 3, ... as `Basis.faces` has them."""
+    points, corners = np.asarray(vertices, "<f8"), np.asarray(faces)
+    if corners.ndim == 1 and corners.size % 4 == 0 and (corners[::4] == 3).all():
+        corners = corners.reshape(-1, 4)[:, 1:]
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"vertices must be [N, 3], not {list(points.shape)}")
+    if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
+        raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
+    records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
+    records["count"] = 3
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # what is out of range stays so, and the program names it
+    with open(path, "wb") as file:
+        file.write(b"ply\nformat binary_little_endian 1.0\n"
+                   b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
+                   b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % (len(points), len(corners)))
+        file.write(points.tobytes() + records.tobytes())
+
+
+def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
+    """Write points [n, 3], or of each name one, as CSV."""
+    names = [[name] for name in points] if isinstance(points, Mapping) else None
+    places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
+    if places.size == 0 or places.shape[-1] != 3:
+        raise ValueError(f"points must be [n, 3], not {list(places.shape)}")
+    rows = places.reshape(-1, 3).tolist()
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["x", "y", "z", "name"] if names else ["x", "y", "z"])
+        writer.writerows([row + name for row, name in zip(rows, names)] if names else rows)
+
+
+def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
+    """What the program says on its terminal until it ends, without its progress, which goes to `progress`."""
+    said, line = "", b""
+    if progress is not None:
+        progress(0.0)
+    while True:
+        try:
+            byte = os.read(terminal, 4096)
+        except OSError:  # the other end is closed
+            byte = b""
+        *lines, line = re.split(b"[\r\n]+", line + byte.replace(b"\x1b[K", b""))
+        for text in (each.decode(errors="replace") for each in lines + ([] if byte else [line])):
+            done = re.match(rf"{command}: +(\d+) %", text)
+            if done is None:
+                said += text + "\n" if text else ""
+            elif progress is not None:
+                progress(int(done[1]) / 100)
+        if not byte:
+            return said
+
+
+def _run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
+        progress: Optional[Progress]) -> str:
+    """Run a command; what it reports. Warnings become Python's, errors exceptions with its text.
+
+    names  what files made from arrays are called there: path -> name"""
+    import pty  # which Windows has not
+
+    arguments = [_find(), command, *_words(options), "--", *operands]
+    terminal, other_end = pty.openpty()
+    with tempfile.TemporaryFile() as report, subprocess.Popen(
+            arguments, stdin=subprocess.DEVNULL, stdout=report, stderr=other_end) as process:
+        os.close(other_end)
+        try:
+            said = _listen(terminal, command, progress)
+        except BaseException:  # as Ctrl+C, or of `progress`
+            process.terminate()
+            raise
+        finally:
+            os.close(terminal)
+        status = process.wait()
+        report.seek(0)
+        text = report.read().decode(errors="replace")
+    for path, name in names.items():
+        said, text = said.replace(path, name), text.replace(path, name)
+    messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
+    for message in messages:
+        if "warning: " in message:
+            warnings.warn(message.replace("warning: ", "", 1), stacklevel=5)
+    if status != 0:
+        what = "\n".join(m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)).strip()
+        kind = _c.ReadError if "cannot read" in what else _EXITS.get(status, _c.Error)
+        raise kind(what or f"supine {command} ended with {status}")
+    if progress is not None:
+        progress(1.0)
+    return text
+
+
+def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, Any],
+         progress: Optional[Progress]) -> tuple[Any, str]:
+    """Run a command that makes a basis; the basis, bytes or a path, and what the program reports.
+
+    lungs    None, or a basis: its path, or its bytes
+    content  paths, (vertices, faces), points; arrays are written to a folder that goes afterwards"""
+    with tempfile.TemporaryDirectory(prefix="supine-") as folder:
+        operands: list[str] = []
+        names: dict[str, str] = {}
+
+        def new_file(name: str, ending: str) -> str:
+            operands.append(os.path.join(folder, name + ending))
+            names[operands[-1]] = name
+            return operands[-1]
+
+        if lungs is not None and not isinstance(lungs, (str, os.PathLike)):
+            with open(new_file("lungs", ".safetensors"), "wb") as copy:
+                copy.write(lungs)
+        elif lungs is not None:
+            operands.append(os.fspath(lungs))
+        for number, item in enumerate(content, 1):
+            if isinstance(item, (str, os.PathLike)):
+                operands.append(os.fspath(item))
+            elif isinstance(item, tuple) and len(item) == 2:
+                _write_mesh(new_file(f"surface {number}", ".ply"), *item)
+            else:
+                _write_points(new_file(f"points {number}", ".csv"), item)
+        kept = options.pop("output", None)
+        made = os.path.join(folder, "basis.safetensors") if kept is None else os.fspath(kept)
+        names[made] = "basis" if kept is None else made
+        report = _run(command, operands, {**options, "output": made}, names, progress)
+        if kept is not None:
+            return made, report
+        with open(made, "rb") as file:
+            return file.read(), report
