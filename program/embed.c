@@ -179,8 +179,7 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
   }
   (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
   if (report->rigid > 0) {
-    (void)printf("%zu %s: moved and turned, never deformed\n", report->rigid,
-                 report->rigid == 1 ? "rigid part" : "rigid parts");
+    (void)printf("rigid parts, moved and turned, never deformed: %zu\n", report->rigid);
   }
   if (shells->scan.gains[0][0] != 0.0) {
     (void)puts("given where the scan had it; the file holds it at full inflation");

@@ -105,8 +105,7 @@ static void print_content(const supine_basis *basis, const char *content) {
                info->has_volume ? "volumes are the lungs'" : "no volumes");
   const supine_tensor *rigid = supine_basis_tensor(basis, "rigid");
   if (rigid != NULL) {
-    (void)printf("  %zu rigid %s: moved and turned, never deformed\n", rigid->shape[0],
-                 rigid->shape[0] == 1 ? "part" : "parts");
+    (void)printf("  rigid parts, moved and turned, never deformed: %zu\n", rigid->shape[0]);
   }
 }
 

@@ -220,6 +220,26 @@ static void test_gate_duplicate_loose_reversed_triangles_mended(void **state) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
+/* More pieces than lobes, each too large for a speck: reported, as lungs may be among them. */
+static void test_gate_many_pieces_warned_of(void **state) {
+  (void)state;
+  supine_mesh mesh = phantom();
+  for (int side = 0; side < 6; ++side) {
+    double at[4][3];
+    for (int k = 0; k < 12; ++k) { /* 80 mm: 85 mL */
+      at[k / 3][k % 3] = (k % 3 == 2      ? 100.0 * (side / 2) - 100.0
+                          : side % 2 == 0 ? -300.0
+                                          : 300.0) +
+                         (k / 3 == k % 3 + 1 ? 80.0 : 0.0);
+    }
+    append(&mesh, 4, at[0], 4, tetrahedron[0], true);
+  }
+  outcome out = pass(&mesh, NULL);
+  expect_said(&out, "warning: 8 pieces; remove what is no lung");
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
 /* Two lungs that share one vertex are still two. */
 static void test_gate_lungs_that_touch_parted(void **state) {
   (void)state;
@@ -313,6 +333,7 @@ int main(void) {
       cmocka_unit_test(test_gate_axes_given_wrongly_right_ones_named),
       cmocka_unit_test(test_gate_single_lung_side_by_shape),
       cmocka_unit_test(test_gate_specks_dropped_and_told),
+      cmocka_unit_test(test_gate_many_pieces_warned_of),
       cmocka_unit_test(test_gate_duplicate_loose_reversed_triangles_mended),
       cmocka_unit_test(test_gate_lungs_that_touch_parted),
       cmocka_unit_test(test_gate_both_lungs_in_one_piece_refused),

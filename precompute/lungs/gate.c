@@ -56,6 +56,9 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         name, specks, plural(specks), 100.0 * speck_share, pieces,
                         pieces == 1 ? " is" : "s are");
   }
+  if (pieces > 6) { /* more than lobes */
+    supine_findings_add(findings, "%s: warning: %zu pieces; remove what is no lung", name, pieces);
+  }
   return SUPINE_OK;
 }
 
