@@ -59,8 +59,7 @@ with tempfile.TemporaryDirectory() as folder:
     run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
-    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors",
-                     supine))
+    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
 
     # The examples; VTK's where Debian's python has it.
     with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:

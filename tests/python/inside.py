@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What test_python.py runs inside the clean environment that the wheel was installed into.
 
-    inside.py REFERENCE BASIS SUPINE"""
+    inside.py REFERENCE BASIS"""
 import ctypes
 import gc
 import os
@@ -16,7 +16,7 @@ import numpy as np
 
 import supine
 
-reference, path, program = sys.argv[1:4]
+reference, path = sys.argv[1:3]
 
 
 def refused(kind, text, call, *arguments, **keywords):
@@ -181,21 +181,21 @@ low, high = lungs.vertices.min(0) - 20, lungs.vertices.max(0) + 20
 size = ((high - low) / [6, 7, 8]).astype(int)
 z, y, x = np.indices(size[::-1])
 image = (-800 + 100 * np.sin(x / 3) + 60 * np.cos(y / 2 + z / 4)).astype(np.int16)
-frame = {"step": (6, 7, 8), "origin": low, "program": program}
+frame = {"step": (6, 7, 8), "origin": low}
 assert (grid.warp(image, "scan", **frame) == image).all()
 moved, dense = (grid.warp(image, ["prone:rest", "left:rest+300"], **frame, density=d) for d in (False, True))
 assert all(m.shape == image.shape and m.dtype == np.int16 and (m != image).any() for m in moved)
 assert (moved[0] != moved[1]).any() and (dense[0] > moved[0]).any()
 assert (supine.open(open("grid.safetensors", "rb").read()).warp(image, "prone:rest", **frame) == moved[0]).all()
 turned = grid.warp(image.astype(">f8")[:, :, ::-1], "prone:rest", step=np.diag([-6, 7, 8]),
-                   origin=low + [6 * (size[0] - 1), 0, 0], program=program)
+                   origin=low + [6 * (size[0] - 1), 0, 0])
 assert abs(turned[:, :, ::-1] - moved[0]).max() < 0.51
 lobes = (x // 8).astype(np.uint8)
 assert set(np.unique(grid.warp(lobes, "prone:rest", **frame, labels=True))) <= set(np.unique(lobes))
 back = grid.warp(moved[0], "scan", **frame, since="prone:rest")
 inner = abs(back.astype(int) - image)[size[2] // 3:-size[2] // 3, size[1] // 3:-size[1] // 3]
 assert np.median(inner) < 20 < np.median(abs(moved[0].astype(int) - image)[size[2] // 3:-size[2] // 3]), np.median(inner)
-refused(supine.ArgumentError, "no grid", lungs.warp, image, "prone:rest", **frame)
+refused(supine.FormatError, "no grid", lungs.warp, image, "prone:rest", **frame)
 refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
 refused(supine.ArgumentError, "mL from what", grid.warp, image, "500", **frame)

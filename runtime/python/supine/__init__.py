@@ -19,7 +19,6 @@ import ctypes
 import gzip
 import io
 import os
-import subprocess
 import tempfile
 from typing import Any, Optional, Sequence, Union
 
@@ -274,10 +273,9 @@ class Basis:
         return Location(self, vertices, positions, _state(state, volume), noise, rigid)
 
     def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
-             origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "",
-             program: str = "supine") -> Any:
+             origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "") -> Any:
         """Moves an image of the scan [z, y, x] into a state, or into each of a list of states, by the basis of a
-        grid (of `supine embed`) and `supine deform`, which has to be installed: the image on its own voxels, of
+        grid (of `embed`) and the program, as `precompute`: the image on its own voxels, of
         its own type; for a list, a list.
 
         step     mm from voxel to voxel, (x, y, z), or a vector for each of the three, [3, 3], LPS
@@ -308,11 +306,8 @@ class Basis:
                 file.write(image.data)
             with io.open(table, "w") as file:
                 file.writelines(["posture,output\n", *(f'"{state}",{i}.nrrd\n' for i, state in enumerate(wanted))])
-            done = subprocess.run([program, "deform", basis, "--states", table, "--labels" if labels else "--image", scan,
-                                   *(["--density"] if density else []), *(["--from", since] if since else [])],
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
-            if done.returncode != 0:
-                raise ArgumentError(done.stderr.strip())
+            options = {"states": table, "labels" if labels else "image": scan, "density": density, "from": since or None}
+            _program.run("deform", [basis], options, {basis: "basis", scan: "image"}, None)
             moved = []
             for i in range(len(wanted)):
                 with io.open(os.path.join(folder, f"{i}.nrrd"), "rb") as file:

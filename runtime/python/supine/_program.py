@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from . import _library as _c
 
 Progress = Callable[[float], Any]
-_EXITS = {1: _c.ArgumentError, 2: _c.MeshError, 3: _c.UnsupportedError, 5: _c.NumericalError}
+_EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
 
 
 def _find() -> str:
@@ -100,7 +100,7 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
             return said
 
 
-def _run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
+def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
     """Run a command; what it reports. Warnings become Python's, errors exceptions with its text.
 
@@ -129,8 +129,12 @@ def _run(command: str, operands: Sequence[str], options: dict[str, Any], names: 
         if "warning: " in message:
             warnings.warn(message.replace("warning: ", "", 1), stacklevel=5)
     if status != 0:
-        what = "\n".join(m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)).strip()
-        kind = _c.ReadError if "cannot read" in what else _EXITS.get(status, _c.Error)
+        what = ([""] + [m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)])[-1]
+        kind = _EXITS.get(status, _c.Error)
+        if status == 2 and "cannot read" in what:
+            kind = _c.ReadError
+        elif status == 2 and command == "precompute":
+            kind = _c.MeshError
         raise kind(what or f"supine {command} ended with {status}")
     if progress is not None:
         progress(1.0)
@@ -167,7 +171,7 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
         kept = options.pop("output", None)
         made = os.path.join(folder, "basis.safetensors") if kept is None else os.fspath(kept)
         names[made] = "basis" if kept is None else made
-        report = _run(command, operands, {**options, "output": made}, names, progress)
+        report = run(command, operands, {**options, "output": made}, names, progress)
         if kept is not None:
             return made, report
         with open(made, "rb") as file:
