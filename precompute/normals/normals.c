@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_sort.h>
+
 #include "precompute/normals/polynomial.h"
 #include "precompute/normals/states.h"
 #include "precompute/projection/compression.h"
@@ -112,12 +114,6 @@ cleanup:
   free(product);
   free(vectors);
   return status;
-}
-
-static int compare_doubles(const void *left, const void *right) {
-  const double a = *(const double *)left;
-  const double b = *(const double *)right;
-  return a < b ? -1 : a > b;
 }
 
 /* Angle between two vectors, degrees. */
@@ -306,7 +302,8 @@ static supine_status measure_all(const supine_normals_surface *s,
                                  const supine_normals_states *states, supine_normals_modes *made) {
   const size_t terms = supine_normals_terms(s->mode_count);
   supine_status status = SUPINE_OK;
-  double *angles = malloc(s->lung_count * (2 * ROWS + 1) * (states->count + 1) * sizeof *angles);
+  const size_t most = s->lung_count * (2 * ROWS + 1) * (states->count + 1);
+  double *angles = malloc((most + most / 1000 + 3) * sizeof *angles); /* and the largest of them */
   double *across = malloc(3 * terms * HELD_OUT * sizeof *across);
   size_t found = 0;
   if (angles == NULL || across == NULL) {
@@ -328,9 +325,10 @@ static supine_status measure_all(const supine_normals_surface *s,
     for (size_t i = 0; i < found; ++i) {
       sum += angles[i];
     }
-    qsort(angles, found, sizeof *angles, compare_doubles);
+    const size_t above = found - (size_t)(0.999 * (double)(found - 1));
+    gsl_sort_largest(angles + most, above, angles, 1, found);
     made->mean = sum / (double)found;
-    made->p999 = angles[(size_t)(0.999 * (double)(found - 1))];
+    made->p999 = angles[most + above - 1];
   }
   free(angles);
   free(across);
