@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* PLY: vertices, faces and strips of triangles out of a body that may not hold what its header
+/* PLY: vertices and faces out of a body that may not hold what its header
  * promises. */
 #include <stdlib.h>
 
@@ -75,30 +75,6 @@ static bool take(ply_reader *in, const ply_type *type, double *value) {
                                           : take_binary(in, type, value);
 }
 
-/* Two corners of a strip, and how many triangles it has by now. */
-typedef struct strip {
-  double corner[2];
-  size_t length;
-} strip;
-
-/* (a, b, c, d): triangles abc, cbd, ...; -1 begins anew. */
-static supine_status take_strip_corner(ply_reader *in, strip *so_far, double value) {
-  if (value == -1.0) {
-    so_far->length = 0;
-    return SUPINE_OK;
-  }
-  supine_status status = SUPINE_OK;
-  if (so_far->length >= 2) {
-    const size_t odd = so_far->length % 2;
-    const double corners[3] = {so_far->corner[odd], so_far->corner[1 - odd], value};
-    status = supine_mesh_faces_add(&in->faces, corners, 3, in->error);
-  }
-  so_far->corner[0] = so_far->corner[1];
-  so_far->corner[1] = value;
-  ++so_far->length;
-  return status;
-}
-
 static supine_status cut_short(const ply_reader *in, const ply_element *element, uint64_t item) {
   static const char *const names[] = {"vertex", "face", "tristrips", "item"};
   return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
@@ -111,7 +87,6 @@ static supine_status cut_short(const ply_reader *in, const ply_element *element,
 static supine_status take_list(ply_reader *in, const ply_element *element, uint64_t item,
                                const ply_property *property) {
   double corners[MESH_CORNERS_MAX];
-  strip so_far = {.length = 0};
   double length = 0.0;
   if (!take(in, property->count, &length)) {
     return cut_short(in, element, item);
@@ -121,22 +96,16 @@ static supine_status take_list(ply_reader *in, const ply_element *element, uint6
                             in->file->path, length);
   }
   const uint64_t count = (uint64_t)length; /* below 2^63, and the file ends sooner */
-  const bool corner = property->role == PLY_CORNERS;
   for (uint64_t k = 0; k < count; ++k) {
     double value = 0.0;
     if (!take(in, property->type, &value)) {
       return cut_short(in, element, item);
     }
-    if (corner && element->kind == PLY_STRIPS) {
-      const supine_status status = take_strip_corner(in, &so_far, value);
-      if (status != SUPINE_OK) {
-        return status;
-      }
-    } else if (k < MESH_CORNERS_MAX) {
+    if (k < MESH_CORNERS_MAX) {
       corners[k] = value;
     }
   }
-  return corner && element->kind == PLY_FACES
+  return property->role == PLY_CORNERS && element->kind == PLY_FACES
              ? supine_mesh_faces_add(&in->faces, corners, (size_t)count, in->error)
              : SUPINE_OK;
 }
@@ -232,6 +201,11 @@ static supine_status begin(const mesh_file *file, ply_reader *in, supine_error *
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: element %zu of the PLY header has no property", file->path,
                               e + 1);
+    }
+    if (in->header.elements[e].kind == PLY_STRIPS && in->header.elements[e].count > 0) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: strips of triangles (tristrips) are not read; save triangles",
+                              file->path);
     }
   }
   return in->header.encoding == PLY_ASCII && !supine_mesh_guard_text(file, error)

@@ -35,9 +35,7 @@ static ply_role find_role(mesh_text name, ply_kind kind, bool is_list) {
   if (kind == PLY_VERTICES && !is_list) {
     return columns[index] == NULL ? PLY_NOTHING : (ply_role)index;
   }
-  return (kind == PLY_FACES || kind == PLY_STRIPS) && is_list && corners[index] != NULL
-             ? PLY_CORNERS
-             : PLY_NOTHING;
+  return kind == PLY_FACES && is_list && corners[index] != NULL ? PLY_CORNERS : PLY_NOTHING;
 }
 
 static bool read_format(mesh_text line, ply_header *header) {
