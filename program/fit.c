@@ -568,6 +568,7 @@ static void complete_state(supine_patient_record *record, size_t k) {
 }
 
 static void keep_states(const request *wanted, const evidence *of, supine_patient_record *record) {
+  record->from_surface = wanted->state_path != NULL;
   record->state[of->swapped ? 1 : 0] = wanted->rest;
   record->state[of->swapped ? 0 : 1] = wanted->state;
   for (size_t k = 0; k < 2; ++k) {
@@ -590,7 +591,7 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
   }
 }
 
-static void keep(const request *wanted, const evidence *of, const supine_patient_surface_fit *found,
+static void keep(const request *wanted, const supine_patient_surface_fit *found,
                  supine_patient_record *record) {
   const supine_patient_fit_report *report = &found->report;
   const supine_patient_scores *held = &report->held_out;
@@ -605,8 +606,7 @@ static void keep(const request *wanted, const evidence *of, const supine_patient
   record->expand = found->expand;
   record->applied = found->applied;
   record->reach = wanted->reach;
-  record->from_surface = wanted->state_path != NULL;
-  keep_states(wanted, of, record);
+
   record->force = supine_patient_force(
       &record->patient, wanted->has_gain ? wanted->gain : usual_gain, record->state[1].gravity);
   record->points = report->count;
@@ -628,6 +628,7 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
                                                      ? SUPINE_PATIENT_TRANSLATION
                                                      : SUPINE_PATIENT_STILL};
   evidence of = {0};
+  double gains[2][3];
   supine_status status = load_evidence(wanted, &of, error);
   if (status == SUPINE_OK) {
     status = order_states(wanted, &of, error);
@@ -635,11 +636,16 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   if (status == SUPINE_OK) {
     memcpy(options.gravity, of.swapped ? wanted->rest.gravity : wanted->state.gravity,
            sizeof options.gravity);
+    keep_states(wanted, &of, record);
+    supine_patient_path(record, gains);
+    for (size_t k = 0; k < 3; ++k) {
+      options.way[k] = gains[1][k] - gains[0][k];
+    }
     status = wanted->state_path != NULL ? fit_surfaces(wanted, &of, &options, found, error)
                                         : fit_landmarks(wanted, &of.pairs, &options, found, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, &of, found, record);
+    keep(wanted, found, record);
     if (wanted->count > 0) {
       status = find_gain(wanted, &of, record, error);
     }

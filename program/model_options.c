@@ -328,7 +328,8 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
     }
   }
   choice->stiffness = *stiffness;
-  status = supine_patient_field_find(record, lungs, state, *stiffness, &options->field, error);
+  status = supine_patient_field_find(record, &choice->resting, lungs, state, *stiffness,
+                                     &options->field, error);
   supine_patient_model(&options->field, &choice->model);
   return status;
 }

@@ -6,6 +6,8 @@
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
+#include <supine/volume.h>
+
 #include "precompute/patient/fit.h"
 #include "precompute/patient/gain.h"
 #include "precompute/patient/krige.h"
@@ -269,7 +271,7 @@ static void test_law_fit_free_constants_returns_them(void **state) {
   supine_patient_pairs pairs = scatter(200, 3);
   const supine_patient truth = known(&pairs);
   static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_patient_power shape = supine_patient_deep(supine);
+  const supine_patient_power shape = supine_patient_deep(supine, (const double[3]){0});
   supine_patient_row rows[600];
   supine_patient_power mean;
   supine_patient_power law;
@@ -523,7 +525,11 @@ static void test_scan_of_fitted_states_is_known(void **state) {
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_FULL);
   scan = supine_patient_scan(&record, 1, 2410.25, &resting);
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
-  assert_true(supine_patient_below_full(&record) == 0.0);
+  double gains[2][3];
+  supine_patient_path(&record, gains);
+  for (size_t k = 0; k < 3; ++k) { /* all of the way */
+    assert_true(gains[0][k] == 0.0 && fabs(gains[1][k] - 1.0) < 1e-12);
+  }
   /* Half a litre above rest: full inflation by the usual share. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
@@ -532,8 +538,14 @@ static void test_scan_of_fitted_states_is_known(void **state) {
   scan = supine_patient_scan(&record, 0, 2910.25, &resting);
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   assert_true(scan.state.volume.ml == 500.0);
-  const double above = (cbrt(full) - cbrt(2910.25)) / (cbrt(2910.25) - cbrt(2410.25));
-  assert_true(fabs(supine_patient_below_full(&record) - above) < 1e-9);
+  supine_patient_path(&record, gains);
+  const double sigma = (cbrt(full) - cbrt(2910.25)) / (cbrt(full) - cbrt(2410.25));
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
+  double expected[3];
+  supine_volume_bend(deep.bend, sigma, expected);
+  for (size_t k = 0; k < 3; ++k) {
+    assert_true(fabs(gains[0][k] - expected[k]) < 1e-9 && fabs(gains[1][k] - 1.0) < 1e-12);
+  }
   /* Volumes alone tell of no rest. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2910.25};
   record.state[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2410.25};
@@ -565,7 +577,7 @@ static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) 
   }
   /* Written as nine constants, the deep law keeps its force: base 0.9 and -0.2 along y. */
   supine_patient other = patient;
-  const supine_patient_power shape = supine_patient_deep(postures[0]);
+  const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   memcpy(other.powers, shape.powers, sizeof other.powers);
   const supine_force_law deep = supine_patient_force(&other, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);

@@ -66,7 +66,9 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   record.force = supine_patient_force(&patient, 0.4, supine_gravity);
   supine_model found = truth();
   supine_patient_field field = {0};
-  assert_int_equal(supine_patient_field_find(&record, &rest, 0, NULL, &field, &error), SUPINE_OK);
+  const supine_resting resting = supine_reference_resting_default();
+  assert_int_equal(supine_patient_field_find(&record, &resting, &rest, 0, NULL, &field, &error),
+                   SUPINE_OK);
   supine_patient_model(&field, &found);
   supine_solution solution = {0};
   assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),

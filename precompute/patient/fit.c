@@ -39,13 +39,13 @@ typedef struct study {
   supine_status *failed; /* [ITEMS] */
 } study;
 
-supine_patient_power supine_patient_deep(const double gravity[3]) {
+supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_patient_power law = {0};
   const double *g = supine_length(gravity) > 0.0 ? gravity : supine;
   for (size_t k = 0; k < 3; ++k) {
-    law.linear[k] = model.direction.c[2 * k];
+    law.linear[k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
     law.powers[k] = model.direction.c[2 * k + 1];
     /* Heights fall along Y and Z (lungs.h) where gravity is along +y and +z. */
     law.powers[3 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
@@ -60,7 +60,7 @@ static supine_status fit_rows(const study *s, const supine_patient_row *rows, si
                               supine_patient_power *law, supine_patient_krige **krige,
                               supine_error *error) {
   const supine_patient_fit_options *wanted = s->options;
-  const supine_patient_power shape = supine_patient_deep(wanted->gravity);
+  const supine_patient_power shape = supine_patient_deep(wanted->gravity, wanted->way);
   supine_status status = supine_patient_scale_fit(rows, count, wanted->moved, &shape, law, error);
   supine_patient_krige_options options =
       supine_patient_krige_prior(wanted->law, law, wanted->moved);

@@ -16,6 +16,7 @@ typedef struct supine_patient_fit_options {
   supine_patient_moved moved;
   bool uncorrected;  /**< leave the correction out */
   double gravity[3]; /**< of the emptier state; all 0: supine */
+  double way[3];     /**< between the states, as supine_patient_deep has it; all 0: 1 */
 } supine_patient_fit_options;
 
 /** Held-out or fitted errors, mm RMS, of a law and of what it is to be better than. */
@@ -41,9 +42,10 @@ typedef struct supine_patient_fit_report {
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;
 
-/** The deep law in the form of nine constants, for gravity along a unit vector (all 0:
- * supine). */
-supine_patient_power supine_patient_deep(const double gravity[3]);
+/** The deep law in the form of nine constants, for gravity along a unit vector (all 0: supine), its
+ * lengths as far as the way between two states is of that from full inflation to rest along x, y
+ * and z (all 0: 1). */
+supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
 
 /** Fit a law and its correction to rows, and hold blocks of 40 mm out.
  * @param frame    of the box coordinates

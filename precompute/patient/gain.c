@@ -20,7 +20,7 @@ enum { SEARCH_STEPS = 40, GRID = 20, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS 
 
 /* What is known of one point of a state: axis . (s now / then u + t) = value. */
 typedef struct point {
-  double u[3];         /* as fitted, in the fitted state */
+  double u[3];         /* from full inflation to rest, in the fitted posture */
   double parts[PARTS]; /* what the forces 1, X, Y, Z, and the heights then and now come to here */
   double axis[3], value, weight;
   size_t block;
@@ -36,11 +36,18 @@ typedef struct state {
 typedef struct problem {
   const supine_patient_record *record;
   bool moved;
-  double above; /* how far the fuller state is below full, of the way to the emptier one */
+  double gains[2][3]; /* of the fuller and the emptier state, by axis */
   state *states;
   size_t state_count;
   size_t without_state, without_block; /* left out; SIZE_MAX: none */
 } problem;
+
+/* Take a displacement between the two states to that from full inflation to rest. */
+static void lengthen(const problem *p, double u[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] /= p->gains[1][k] - p->gains[0][k];
+  }
+}
 
 static double ratio_at(const point *p, const supine_force_law *law) {
   double fixed = law->base * p->parts[0];
@@ -66,7 +73,10 @@ static double squares_of(const problem *problem_, size_t which, double gain, dou
     const point *p = &s->points[i];
     const double along = supine_dot(p->axis, p->u);
     const double row[UNKNOWNS] = {ratio_at(p, &law) * along, p->axis[0], p->axis[1], p->axis[2]};
-    const double value = p->value + problem_->above * along;
+    double value = p->value;
+    for (size_t a = 0; a < 3; ++a) {
+      value += problem_->gains[0][a] * p->axis[a] * p->u[a];
+    }
     if (which == problem_->without_state && p->block == problem_->without_block) {
       continue;
     }
@@ -168,6 +178,7 @@ static supine_status take_pairs(const problem *p, state *s, supine_error *error)
     to->parts[4] = frame_height(frame, p->record->state[1].gravity, place);
     to->parts[5] = frame_height(frame, s->other->gravity, place);
     supine_patient_displacement(&p->record->patient, pairs->from + 3 * (i / 3), place->side, to->u);
+    lengthen(p, to->u);
   }
   free(rows);
   return SUPINE_OK;
@@ -248,6 +259,7 @@ static supine_status take_surface(const problem *p, state *s, const supine_lungs
       supine_patient_displacement(&record->patient, rest->mesh.vertices + 3 * v,
                                   s->matching.rows[i].place.side, to->u);
     }
+    lengthen(p, to->u);
   }
   free(stiffness);
   free(caught);
@@ -265,7 +277,8 @@ static supine_status match_surface(const problem *p, state *s, double gain, cons
     const double ratio = ratio_at(&s->points[i], &law);
     for (size_t k = 0; k < 3; ++k) {
       m->moved[3 * i + k] = m->rest->mesh.vertices[3 * m->vertex[i] + k] +
-                            (unknowns[0] * ratio - p->above) * s->points[i].u[k] + unknowns[1 + k];
+                            (unknowns[0] * ratio - p->gains[0][k]) * s->points[i].u[k] +
+                            unknowns[1 + k];
     }
   }
   supine_patient_matching_find(m);
@@ -377,8 +390,15 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
                                       size_t count, supine_patient_gain *found,
                                       supine_error *error) {
   state states[SUPINE_PATIENT_OTHERS_MAX] = {{0}};
-  problem p = {record, moved, supine_patient_below_full(record), states, count, SIZE_MAX, SIZE_MAX};
+  problem p = {.record = record,
+               .moved = moved,
+               .states = states,
+               .state_count = count,
+               .without_state = SIZE_MAX,
+               .without_block = SIZE_MAX};
   supine_status status = SUPINE_OK;
+
+  supine_patient_path(record, p.gains);
   *found = (supine_patient_gain){.gain = record->force.gain};
   for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
     double apart = 0.0;

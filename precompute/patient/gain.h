@@ -12,8 +12,8 @@ typedef struct supine_patient_other {
   double gravity[3];
   const supine_patient_pairs *pairs; /**< or NULL */
   const supine_mesh *surface;        /**< where there are no pairs */
-  double scale;        /**< found: 1 where it is as far from the fuller state as the emptier one */
-  double left;         /**< found: mm RMS; of a surface along its normals */
+  double scale;                      /**< found: 1 where it is as far from full inflation as rest */
+  double left;                       /**< found: mm RMS; of a surface along its normals */
   double left_without; /**< found: the same at a gain of 0: all of the force fixed to the body */
 } supine_patient_other;
 
@@ -27,7 +27,8 @@ typedef struct supine_patient_gain {
 /** Move points [count, 3] of the emptier state to where they are in the fuller one. */
 void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
 
-/** Finds the gain from further states, with the law's field u as it was fitted:
+/** Finds the gain from further states, with the law's field u as it was fitted, over its part of
+ * the way from full inflation to rest (supine_patient_path):
  *
  *     u_j(p) = s_j f(g_j, p) / f(g, p) u(p) (+ t_j)      f of supine_patient_force at that gain,
  *                                                        of a surface what it comes to (its catch)

@@ -7,6 +7,7 @@
 #include "precompute/patient/patient_file.h"
 
 #include "precompute/physics/solve.h"
+#include "precompute/physics/volume_forms.h"
 #include "sh/base/parallel.h"
 
 enum { GRAIN = 64, SETTLE_STEPS = 60 };
@@ -20,6 +21,9 @@ static const double size_most[2] = {1.6, 1.25};
 
 /* Least force that a correction is divided by, of a mean of 1. */
 static const double force_least = 0.2;
+
+/* Least part of the way from full inflation to rest that two states are apart. */
+static const double part_least = 0.02;
 
 /* Range of what a resting lung holds of its full volume. */
 static const double share_least = 0.15, share_most = 0.95;
@@ -35,6 +39,55 @@ supine_force_law supine_patient_force(const supine_patient *patient, double gain
   law.box[2] = slope[2] + gain * gravity[2];
   law.base = 1.0 - 0.5 * gain - 0.5 * (law.box[0] + law.box[1] + law.box[2]);
   return law;
+}
+
+/* --- the way between the states --------------------------------------------------------------- */
+
+/* Full volume by one of the two states, mL; 0 where it does not tell. */
+static double full_volume(const supine_patient_record *record, size_t state, double volume,
+                          const supine_resting *resting) {
+  const supine_state *of = &record->state[state];
+  const double held = volume > 0.0 ? volume : record->volume[state];
+  return held <= 0.0 ? 0.0
+         : of->volume.kind == SUPINE_VOLUME_FULL
+             ? (held - of->volume.ml) / supine_reference_full_share(of->gravity)
+         : of->volume.kind == SUPINE_VOLUME_REST
+             ? (held - of->volume.ml) / supine_reference_resting_total(resting, of->gravity)
+             : 0.0;
+}
+
+static double full_of_either(const supine_patient_record *record, const supine_resting *resting) {
+  const double full = full_volume(record, 0, 0.0, resting);
+  return full > 0.0 ? full : full_volume(record, 1, 0.0, resting);
+}
+
+/* Parts of the way from full inflation, 0, to rest, 1. */
+static void find_parts(const supine_patient_record *record, double part[2]) {
+  supine_resting resting = supine_reference_resting_default();
+  supine_patient_resting(record, &resting);
+  const double full = full_of_either(record, &resting);
+
+  const double rest = full * supine_reference_resting_total(&resting, record->state[1].gravity);
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_volume *of = &record->state[k].volume;
+    part[k] = of->ml == 0.0 && of->kind == SUPINE_VOLUME_REST   ? 1.0
+              : of->ml == 0.0 && of->kind == SUPINE_VOLUME_FULL ? 0.0
+              : full > 0.0 && record->volume[k] > 0.0
+                  ? (cbrt(full) - cbrt(record->volume[k])) / (cbrt(full) - cbrt(rest))
+                  : (double)k;
+  }
+  if (part[1] - part[0] < part_least) {
+    part[0] = 0.0;
+    part[1] = 1.0;
+  }
+}
+
+void supine_patient_path(const supine_patient_record *record, double gains[2][3]) {
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
+  double part[2];
+  find_parts(record, part);
+  supine_volume_bend(deep.bend, part[0], gains[0]);
+  supine_volume_bend(deep.bend, part[1], gains[1]);
 }
 
 /* --- the model ------------------------------------------------------------------------------- */
@@ -108,8 +161,82 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   return status;
 }
 
+/* What the lungs would gain, mL, moved from the fuller state by `moved` over its way to full
+ * inflation (which 0) or rest (1). */
+static double gain_towards(const supine_volume_form *form, const double part[2], size_t which) {
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
+  double gains[2][3];
+  double towards[3];
+  supine_volume_bend(deep.bend, part[0], gains[0]);
+  supine_volume_bend(deep.bend, part[1], gains[1]);
+  for (size_t k = 0; k < 3; ++k) {
+    towards[k] = ((double)which - gains[0][k]) / (gains[1][k] - gains[0][k]);
+  }
+  return supine_volume_form_at(form, towards);
+}
+
+/* Find the ways of the three axes, at which the volumes of full inflation and rest are met. */
+static supine_status find_way(const work *w, const supine_resting *resting, double way[3],
+                              supine_error *error) {
+  enum { ROUNDS = 30 };
+  static const double step = 1e-4;
+  const supine_patient_record *record = w->record;
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
+  const size_t n = w->lungs.mesh.vertex_count;
+  const double held = 1e-3 * supine_mesh_volume(&w->lungs.mesh);
+  const double full = full_of_either(record, resting);
+  const double volume[2] = {
+      full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
+  double part[2];
+  double gains[2][3];
+  double *ones = malloc(n * sizeof *ones);
+
+  supine_volume_forms forms = {0};
+  supine_volume_form form = {{0.0}};
+  supine_status status = SUPINE_OK;
+  find_parts(record, part);
+
+  for (size_t i = 0; i < n && ones != NULL; ++i) {
+    ones[i] = 1.0;
+  }
+  if (ones == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  } else if (w->lungs.topology.closed && volume[0] > 0.0) {
+    status = supine_physics_volume_forms_create(&w->lungs, NULL, w->moved, ones, 1, &forms, error);
+  }
+
+  for (size_t lung = 0; lung < w->lungs.lung_count && forms.linear != NULL; ++lung) {
+    supine_volume_form part_of;
+    supine_physics_volume_forms_contract_lung(&forms, lung, ones, &part_of);
+    for (size_t i = 0; i < sizeof form.of / sizeof *form.of; ++i) {
+      form.of[i] += part_of.of[i];
+    }
+  }
+  for (int round = 0; round < ROUNDS && status == SUPINE_OK && forms.linear != NULL; ++round) {
+    const size_t k = (size_t)round % 2;
+    const supine_volume *of = &record->state[k].volume;
+
+    if (of->ml == 0.0 && of->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
+      continue; /* known */
+    }
+    const double off = gain_towards(&form, part, k) - (volume[k] - held);
+    part[k] += step;
+    const double slope = (gain_towards(&form, part, k) - (volume[k] - held) - off) / step;
+    part[k] -= step + (isfinite(off / slope) ? fmin(0.05, fmax(-0.05, off / slope)) : 0.0);
+  }
+  supine_volume_bend(deep.bend, part[0], gains[0]);
+  supine_volume_bend(deep.bend, part[1], gains[1]);
+  for (size_t k = 0; k < 3; ++k) {
+    way[k] = gains[1][k] - gains[0][k];
+  }
+  supine_physics_volume_forms_free(&forms);
+  free(ones);
+  return status;
+}
+
 supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_lungs *lungs, size_t state, double *stiffness,
+                                        const supine_resting *resting, const supine_lungs *lungs,
+                                        size_t state, double *stiffness,
                                         supine_patient_field *field, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   work w = {.record = record,
@@ -119,7 +246,7 @@ supine_status supine_patient_field_find(const supine_patient_record *record,
             .settle = state == 1};
   double *ratio = malloc(n * sizeof *ratio);
   supine_status status = SUPINE_OK;
-  *field = (supine_patient_field){record, w.moved};
+  *field = (supine_patient_field){.record = record, .moved = w.moved};
   w.ratio = ratio;
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
   if (w.moved == NULL || ratio == NULL || w.lungs.mesh.vertices == NULL) {
@@ -137,8 +264,10 @@ supine_status supine_patient_field_find(const supine_patient_record *record,
     }
     status = pass < 2 ? find_ratio(&w, stiffness, ratio, error) : SUPINE_OK;
   }
+
+  status = status == SUPINE_OK ? find_way(&w, resting, field->way, error) : status;
   for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-    w.moved[i] /= fmax(force_least, ratio[i / 3]);
+    w.moved[i] /= fmax(force_least, ratio[i / 3]) * field->way[i % 3];
   }
 cleanup:
   free(ratio);
@@ -175,7 +304,7 @@ void supine_patient_model(const supine_patient_field *field, supine_model *model
   model->direction =
       (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .correct = direct, .context = field};
   for (size_t k = 0; k < 3; ++k) {
-    model->direction.c[2 * k] = -record->patient.lengths[k];
+    model->direction.c[2 * k] = -record->patient.lengths[k] / field->way[k];
     model->direction.c[2 * k + 1] = record->patient.powers[k];
   }
 }
@@ -223,29 +352,6 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
     }
   }
   return SUPINE_OK;
-}
-
-/* Full volume by one of the two states, mL; 0 where it does not tell. */
-static double full_volume(const supine_patient_record *record, size_t state, double volume,
-                          const supine_resting *resting) {
-  const supine_state *of = &record->state[state];
-  const double held = volume > 0.0 ? volume : record->volume[state];
-  return held <= 0.0 ? 0.0
-         : of->volume.kind == SUPINE_VOLUME_FULL
-             ? (held - of->volume.ml) / supine_reference_full_share(of->gravity)
-         : of->volume.kind == SUPINE_VOLUME_REST
-             ? (held - of->volume.ml) / supine_reference_resting_total(resting, of->gravity)
-             : 0.0;
-}
-
-double supine_patient_below_full(const supine_patient_record *record) {
-  const supine_resting resting = supine_reference_resting_default();
-  const double *v = record->volume;
-  double full = full_volume(record, 0, 0.0, &resting);
-  full = full > 0.0 ? full : full_volume(record, 1, 0.0, &resting);
-  return v[0] > v[1] && v[1] > 0.0 && full > v[0]
-             ? (cbrt(full) - cbrt(v[0])) / (cbrt(v[0]) - cbrt(v[1])) /* lengths, not volumes */
-             : 0.0;
 }
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {

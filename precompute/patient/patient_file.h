@@ -72,15 +72,18 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
 /** How a person's law moves the vertices of a surface, by (15)-(17) and the correction. */
 typedef struct supine_patient_field {
   const supine_patient_record *record; /**< the caller's, to be kept */
-  double *moved;                       /**< [N, 3] mm, for a force of 1 that comes to 1 */
+  double way[3];                       /**< of that from full inflation to rest, by axis */
+  double *moved;                       /**< [N, 3] mm to rest, for a force of 1 that comes to 1 */
 } supine_patient_field;
 
 /** Find the displacement of every vertex between the two states that were fitted; free it.
+ * @param resting    shares at rest
  * @param state      that the surface shows: 0 the fuller, 1 the emptier
  * @param stiffness  optional [N]: E, relative, of a record that has one
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_lungs *lungs, size_t state, double *stiffness,
+                                        const supine_resting *resting, const supine_lungs *lungs,
+                                        size_t state, double *stiffness,
                                         supine_patient_field *field, supine_error *error);
 void supine_patient_field_free(supine_patient_field *field);
 
@@ -98,9 +101,10 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
 
-/** Compute how far the fuller state is below full inflation, as a share of the way from it to the
- * emptier one; 0 where that is not known. Of a scan at rest the usual share of full is assumed. */
-double supine_patient_below_full(const supine_patient_record *record);
+/** Compute the gains of the two states along x, y and z: 0 at full inflation, 1 at rest, on the
+ * deep law's path between them (supine_volume_bend), by their states or the cube roots of their
+ * volumes. Where neither tells, the fuller state counts as full and the emptier one as at rest. */
+void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
 /** Scale the shares at rest to the one that the two states show, where they show it. */
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);

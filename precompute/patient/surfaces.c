@@ -66,7 +66,7 @@ static supine_status refit(const matching *m, const supine_patient_fit_options *
                            supine_patient_krige_options *options, supine_patient *patient,
                            supine_error *error) {
   const size_t count = m->count + m->landmark_rows_count;
-  const supine_patient_power shape = supine_patient_deep(wanted->gravity);
+  const supine_patient_power shape = supine_patient_deep(wanted->gravity, wanted->way);
   supine_patient_krige *krige = NULL;
   supine_patient_power law;
   supine_status status;
