@@ -23,11 +23,11 @@ near() { # A B TOLERANCE
 vertices() { # FILE: x y z of its vertices
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
 }
-pairs() { # FROM TO NAME: every 71st vertex of two OBJ files, as landmarks
+pairs() { # FROM TO NAME: every 101st vertex of two OBJ files, as landmarks
   {
     echo x,y,z,to_x,to_y,to_z
     vertices "$1.obj" >from.csv
-    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 71 == 1'
+    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 101 == 1'
   } >"$3.csv"
 }
 surfaces() { # FILE: what validate says of its first state, mm RMS
@@ -35,7 +35,7 @@ surfaces() { # FILE: what validate says of its first state, mm RMS
 }
 
 # One person in several states, two meshings: a law far from the default.
-for mesh in p:14000 q:20000; do
+for mesh in p:20000 q:14000; do
   name=${mesh%:*}
   "$supine" phantom -o $name.ply --vertices ${mesh#*:} >/dev/null || fail phantom
   "$supine" precompute $name.ply --base 0.75 --gain 0.7 --constants 8,2.2,12,1.3,13,1.2 \
