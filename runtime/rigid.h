@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Rigid parts, which keep their size: the tensor `rigid` U32 [R, 2] of a basis file names their
- * vertices, begin <= i < end, each range in one lung. Such vertices are moved by the rigid motion
- * that fits best, in the mean square over them, where the field puts them. */
+ * Rigid parts, which keep their size (see supine_deform): each range of vertices is in one lung. */
 #ifndef SUPINE_RIGID_H
 #define SUPINE_RIGID_H
 

@@ -12,8 +12,7 @@
  * with q the surface's point nearest to x and s(q) its motion, linear in its triangle: what is on
  * the surface moves with it exactly, although the centres of b are some of its vertices.
  *
- * Rigid parts are in one lung, which most of their vertices are in, and are moved by the best rigid
- * motion of that field (runtime/rigid.h).
+ * Rigid parts go into the lung that most of their vertices are in (runtime/rigid.h).
  *
  * Content is given where the scan has it, and x, q are there. The file holds it at full inflation,
  * as it does every surface: x less u at the scan's weights and scale. */

@@ -213,6 +213,9 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
  *
  *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of i
  *
+ * Rigid parts (tensor `rigid` U32 [R, 2], ranges of vertices) are moved by the rigid motion that
+ * fits this best. Every function that places vertices has them so.
+ *
  * @param xyz  [N, 3], written, mm, LPS; any alignment of a float
  * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). Where positions
  * outgrow the cache they are stored past it, fastest where `xyz` is aligned to 64 bytes. */
