@@ -237,6 +237,9 @@ static json_t *describe(const page *p) {
                                      "error_p95_percent",
                                      "error_rms_mm",
                                      "error_volume_ml",
+                                     "expected_error_mm",
+                                     "resting_known",
+                                     "scan_state",
                                      "attribution",
                                      "made_by"};
   const supine_basis_info *info = p->source->info;

@@ -22,7 +22,7 @@ function told(posture, from) {
   supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', from, '-o', moved);
   const [columns, row] = readFileSync(moved, 'utf8').trim().split('\n').slice(-2).map((line) => line.split(','));
   const largest = /largest displacement ([\d.]+) mm from (.*?),/.exec(supine('deform', basis, '--posture', posture, '--volume', 'rest', '--from', from, '-o', vtp));
-  return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml };
+  return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml, error: report.postures[0].expected_error_mm };
 }
 
 /** What the page shows of it. */
@@ -31,7 +31,7 @@ async function shown(page, posture) {
   await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
   await settled(page);
   return page.evaluate(() => ({
-    finding: document.getElementById('finding').textContent, move: document.getElementById('finding-move').textContent,
+    finding: document.getElementById('finding').textContent, move: document.getElementById('finding-move').textContent, error: document.getElementById('finding-error').textContent,
     nodule: Number(document.querySelector('#inside-rows td:last-child').textContent), legend: document.getElementById('legend-title').textContent, table: document.getElementById('inside-text').textContent,
     held: window.supine.state.moment.held, lungs: window.supine.basis.lungNames,
   }));
@@ -55,6 +55,8 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     near(mean, program.mean, `${posture} from ${name}: the mean on the page and by compare`);
     near(largest, program.max, `${posture} from ${name}: the largest on the page and by compare`);
     near(program.largest, program.max, `${posture} from ${name}: the largest by deform and compare`);
+    if (from === 'supine:rest') near(Number(/^Expected error ([\d.]+) mm \(RMS\)/.exec(seen.error)[1]), program.error, `${posture}: the expected error on the page and by compare`);
+    else assert.equal(seen.error, '');
     seen.lungs.forEach((lung, i) => assert.ok(Math.abs(seen.held[i] - program.held[lung.replace(' lung', '')]) < 0.01, `${lung}: ${seen.held[i]}`));
     if (posture === 'left') assert.match(seen.finding, /^On the left side the (left|right) lung /);
   }

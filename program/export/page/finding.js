@@ -77,6 +77,39 @@ function findingOf(basis, moment, gravity, volume, stride) {
   return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, move.replace(/^t/, 'T')];
 }
 
+/** How far off the moves of one moment from `from` are expected to be, mm RMS over the vertices, as the
+ * library has it: sigma^2 = |u| min(constant, RMS of u), and where rest is a guess, 5 % of full inflation
+ * more. `fuller` are both moments with rest fuller by a hundredth of that; null where rest is known. */
+function expectedError(basis, now, from, fuller) {
+  const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
+  const more = fuller?.map((moment) => placesOf(basis, moment));
+  let [lengths, squares, slopes] = [0, 0, 0];
+  for (let i = 0; i < a.length; i += 3) {
+    let [square, slope] = [0, 0];
+    for (let k = i; k < i + 3; ++k) {
+      const u = a[k] - b[k];
+      square += u * u;
+      if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
+    }
+    lengths += Math.sqrt(square);
+    squares += square;
+    slopes += slope;
+  }
+  const n = a.length / 3;
+  return Math.sqrt((Math.min(Number(basis.metadata.expected_error_mm), Math.sqrt(squares / n)) * lengths + slopes * (0.05 / 0.01) ** 2) / n);
+}
+
+/** The same in words, of a posture `depth` mL above rest; empty where the basis states no error, or
+ * displacements do not count from supine at rest. */
+function errorWords(basis, moment, depth) {
+  const { metadata, from } = basis;
+  if (!metadata.expected_error_mm || !moment.held || from.name !== 'supine at rest') return '';
+  const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
+  const more = 0.01 * sumOf(basis.references);
+  const fuller = assumed ? [[moment.gravity, depth], [[0, 1, 0], 0]].map(([gravity, ml]) => momentFor(basis, gravity, ml + more)) : null;
+  return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
+}
+
 /** "L \u22121 %, R +18 %, 6.9 mm": the answer of a moment, as short as a card. */
 function answerOf(basis, moment) {
   const { mean, largest } = moveBetween(basis, moment, basis.from, 1);

@@ -39,6 +39,7 @@ function start() {
   const basis = readBasis();
   const state = new State(basis);
   takeLink(location.hash, state);
+  state.measure(); // a link may hold a deeper breath
   const canvas = $('picture');
   let picture = pictureOn(canvas, basis);
   const letters = new Letters($('letters'), 2);
@@ -334,6 +335,7 @@ function start() {
     const [finding, move] = findingOf(basis, state.moment, state.gravity, above, stride);
     writeFinding($('finding'), finding);
     write('finding-move', move);
+    write('finding-error', stride === 1 && move ? errorWords(basis, state.moment, state.depth) : '');
   }
 
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
@@ -739,6 +741,7 @@ function start() {
     const pixels = Math.min(2, window.devicePixelRatio || 1);
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * pixels));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * pixels));
+    if (state.moment && picture && !inHeadset) draw(); // what was there is gone, and this is before it is seen
     look();
   };
   new ResizeObserver(resize).observe(canvas);
