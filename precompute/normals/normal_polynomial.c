@@ -5,8 +5,9 @@
 #include <string.h>
 
 #include "precompute/normals/polynomial.h"
+#include "sh/base/clones.h"
 
-enum { SIDES = SUPINE_NORMALS_FIELD_MAX + 1 };
+enum { SIDES = SUPINE_NORMALS_FIELD_MAX + 1, PADDED = (SIDES + 7) / 8 * 8 };
 
 /* Two sides of a triangle, by axis: of the reference surface first, then by how much each mode
  * changes them. */
@@ -146,15 +147,39 @@ void supine_normals_rows_free(supine_normals_rows *rows) {
   *rows = (supine_normals_rows){0};
 }
 
+/* n_x += sum over k, l of full[l][k] (a_y[k] b_z[l] - b_y[k] a_z[l]), and so on. The columns k
+ * stand side by side for vector units: `columns` of them, a multiple of eight, zeros at the end. */
+SUPINE_CLONES static void add_mixed(const sides *t, size_t modes, size_t columns,
+                                    double (*full)[SIDES][PADDED], double n[3]) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const size_t y = (axis + 1) % 3;
+    const size_t z = (axis + 2) % 3;
+    double a[PADDED] = {0.0};
+    double b[PADDED] = {0.0};
+    for (size_t l = 0; l <= modes; ++l) {
+      const double az = t->a[z][l];
+      const double bz = t->b[z][l];
+      for (size_t k = 0; k < columns; ++k) {
+        a[k] += full[axis][l][k] * az;
+        b[k] += full[axis][l][k] * bz;
+      }
+    }
+    for (size_t k = 0; k <= modes; ++k) {
+      n[axis] += t->a[y][k] * b[k] - t->b[y][k] * a[k];
+    }
+  }
+}
+
 void supine_normals_mix(const supine_normals_surface *surface, size_t lung, const double *mix,
                         float *plane) {
   const size_t modes = surface->mode_count;
   const size_t terms = supine_normals_terms(modes);
-  double full[3][SIDES][SIDES];
+  const size_t columns = (modes + 8) / 8 * 8;
+  double full[3][SIDES][PADDED] = {{{0.0}}};
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t k = 0; k <= modes; ++k) {
       for (size_t l = 0; l <= modes; ++l) {
-        full[axis][k][l] = mix[axis * terms + term_of(modes, k, l)];
+        full[axis][l][k] = mix[axis * terms + term_of(modes, k, l)];
       }
     }
   }
@@ -166,19 +191,7 @@ void supine_normals_mix(const supine_normals_surface *surface, size_t lung, cons
     sides both;
     double n[3] = {0, 0, 0};
     read_sides(surface, corner, &both);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const size_t y = (axis + 1) % 3;
-      const size_t z = (axis + 2) % 3;
-      for (size_t k = 0; k <= modes; ++k) {
-        double a = 0.0;
-        double b = 0.0;
-        for (size_t l = 0; l <= modes; ++l) {
-          a += full[axis][k][l] * both.a[z][l];
-          b += full[axis][k][l] * both.b[z][l];
-        }
-        n[axis] += both.a[y][k] * b - both.b[y][k] * a;
-      }
-    }
+    add_mixed(&both, modes, columns, full, n);
     for (size_t v = 0; v < 3; ++v) {
       for (size_t axis = 0; axis < 3; ++axis) {
         plane[3 * (size_t)corner[v] + axis] += (float)n[axis];
