@@ -145,7 +145,9 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->model != NULL) {
-    add(list, "expected_error_mm", "%g", SUPINE_EXPECTED_ERROR_MM);
+    const double own = content->expected_error;
+    add(list, "expected_error_mm", "%g",
+        own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
   if (content->reference != NULL &&
       memcmp(&content->reference->resting, &usual, sizeof usual) != 0) {

@@ -24,6 +24,7 @@ typedef struct supine_basis_content {
   const supine_error_table *table;   /* optional */
   bool harmonics;                    /* the modes are the harmonics themselves */
   const char *patient;               /* a person's own law, JSON; optional */
+  double expected_error;             /* mm of square error per mm of displacement; 0: the law's */
   const char *patient_summary;       /* whose, and how well it held out */
   const char *assumed;               /* optional */
   const char *findings;              /* lines; NULL or "": none */

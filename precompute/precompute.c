@@ -286,6 +286,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,
+                                        .expected_error = p->options->expected_error,
                                         .made_by = p->options->made_by,
                                         .assumed = p->options->assumed,
                                         .findings = p->options->findings,

@@ -19,6 +19,7 @@ typedef struct supine_precompute_options {
   size_t held_out;             /**< directions that the error is measured on; 0: 100 to 1000 */
   const char *made_by;         /**< how it was made, for the file's metadata; optional */
   const char *patient;         /**< a person's own law (JSON), for the same; optional */
+  double expected_error;       /**< mm of square error per mm of displacement; 0: the law's */
   const char *patient_summary; /**< whose, and how well it held out; with the former */
   const char *assumed;         /**< what was assumed of the scan, likewise */
   const char *findings;        /**< what was found of the input, a line each; optional */

@@ -591,6 +591,26 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
   }
 }
 
+/* Warn where the two scans show another volume at rest than is assumed of healthy people. */
+static void warn_of_rest(const supine_patient_record *record) {
+  static const double apart_least = 0.07; /* of full: healthy people's standard deviation is 0.04 */
+  const supine_resting usual = supine_reference_resting_default();
+  const double *g = record->state[1].gravity;
+  supine_resting shown = usual;
+  supine_findings findings = {""};
+  supine_patient_resting(record, &shown);
+  const double share[2] = {supine_reference_resting_total(&usual, g),
+                           supine_reference_resting_total(&shown, g)};
+  if (fabs(share[1] - share[0]) > apart_least) {
+    supine_findings_add(&findings,
+                        "warning: at rest the lungs hold %.0f %% of full inflation by the two "
+                        "scans, where %.0f %% is assumed of healthy people. Is --rest right? "
+                        "'supine precompute --patient' takes what the scans show",
+                        100.0 * share[1], 100.0 * share[0]);
+    supine_options_say_findings(name, &findings);
+  }
+}
+
 static void keep(const request *wanted, const supine_patient_surface_fit *found,
                  supine_patient_record *record) {
   const supine_patient_fit_report *report = &found->report;
@@ -613,7 +633,9 @@ static void keep(const request *wanted, const supine_patient_surface_fit *found,
   record->held_out = held->corrected;
   record->held_out_baseline =
       wanted->landmarks.translation || wanted->landmarks.rigid ? held->translation : held->none;
-  record->expected = report->expected;
+  record->expected = report->components == 3 ? report->expected : report->expected_point;
+  record->expected_constant =
+      report->moved > 0.0 ? pow(record->expected, 2.0) / report->moved : 0.0;
   record->band = report->band;
   record->fitted = report->fitted.corrected;
   record->explained = report->explained;
@@ -637,6 +659,7 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
     memcpy(options.gravity, of.swapped ? wanted->rest.gravity : wanted->state.gravity,
            sizeof options.gravity);
     keep_states(wanted, &of, record);
+    warn_of_rest(record);
     supine_patient_path(record, gains);
     for (size_t k = 0; k < 3; ++k) {
       options.way[k] = gains[1][k] - gains[0][k];

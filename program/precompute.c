@@ -219,11 +219,14 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
   wanted->model.choice.law = SUPINE_LAW_DEEP; /* what the options below say of constants */
   wanted->basis.patient = *text;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
-                 "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained",
+                 "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
+                 "expected error %.1f mm RMS",
                  record->name, supine_patient_law_names[record->patient.law],
                  record->patient.correction.count > 0 ? " and kriging" : "", record->points,
-                 record->held_out, record->held_out_baseline, 100.0 * record->explained);
+                 record->held_out, record->held_out_baseline, 100.0 * record->explained,
+                 record->expected);
   wanted->basis.patient_summary = wanted->summary;
+  wanted->basis.expected_error = record->expected_constant;
   (void)printf("%s\n", wanted->summary);
   return SUPINE_OK;
 }

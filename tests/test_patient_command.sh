@@ -78,6 +78,8 @@ turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
 grep -q 'full inflation' fit.txt || fail "states are not told: $(head -3 fit.txt)"
 "$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held out' ||
   fail "info does not say whose: $("$supine" info points.safetensors)"
+"$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
+  fail "info does not state the fit's error"
 
 # Without another option, scans of two meshings: a basis of either lies on the other within 0.2 mm RMS,
 # and within 0.6 mm at four times the volume between them.
@@ -106,6 +108,11 @@ chain q_supine_full rest p 0.2 rest+2000 p 0.2
 "$supine" validate surface.safetensors --state q_supine_full.ply --json >valid.json ||
   fail "validate where nothing moved"
 grep -q '"explained_percent": null' valid.json || fail "explained of nothing"
+
+# A scan that is no more than said to be at rest contradicts what is assumed of rest.
+"$supine" fit p_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
+  fail "fit a fuller rest"
+grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning: $(cat note)"
 
 # What nothing knows is refused.
 "$supine" fit p_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \

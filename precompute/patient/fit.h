@@ -37,7 +37,7 @@ typedef struct supine_patient_fit_report {
       expected; /**< mm RMS, expected of held-out points (of a component, where one is measured) */
   double explained;        /**< share of the squared displacement, held out */
   double explained_fitted; /**< the same, of what was fitted */
-  double expected_point;   /**< mm RMS, expected of the fitted points in all three directions */
+  double expected_point;   /**< mm RMS, expected of points of the surface in all three directions */
   double moved;            /**< their mean displacement, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;

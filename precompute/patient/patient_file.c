@@ -152,6 +152,7 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   (void)json_object_set_new(root, "lengths_mm", numbers(patient->lengths, 3));
   (void)json_object_set_new(root, "powers", numbers(patient->powers, SUPINE_PATIENT_POWERS));
   (void)json_object_set_new(root, "correction", correction(&patient->correction));
+  (void)json_object_set_new(root, "expected_constant_mm", json_real(record->expected_constant));
   if (record->told_count > 0) {
     (void)json_object_set_new(root, "further_states", further(record));
   }
@@ -351,6 +352,7 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   record->held_out_baseline = number(root, "held_out_baseline_mm");
   record->expected = number(root, "expected_rms_mm");
   record->band = number(root, "band_95_percent_holds") / 100.0;
+  record->expected_constant = number(root, "expected_constant_mm");
   record->fitted = number(root, "fitted_rms_mm");
   record->explained = number(root, "explained_percent") / 100.0;
   return SUPINE_OK;

@@ -34,6 +34,7 @@ typedef struct supine_patient_record {
   bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
   size_t points;
   double held_out, held_out_baseline, fitted, explained; /**< mm RMS and share */
+  double expected_constant;            /**< mm: expected square error per mm of displacement */
   double expected, band;               /**< mm RMS expected, share within the 95 % band; held out */
   supine_patient_stiffness stiffness;  /**< counts 0: even */
   supine_patient_expand_report expand; /**< written, where it was tried; not read */
