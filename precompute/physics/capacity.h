@@ -4,8 +4,9 @@
  * be. Total lung capacity of adults by height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
  * 16, 1993): men 7.99 H - 7.08 L, women 6.60 H - 5.79 L, standard deviation 0.7 and 0.6 L; measured
  * upright, so less SUPINE_FULL_UPRIGHT_GAIN; and 0.86 L of tissue (Denison 1986, Thorax 41:620,
- * n 12: 431 mL in each lung). The paper of the ECSC was not at hand: its coefficients are those
- * commonly quoted. At 40 years they agree within 5 %, for men of 1.60 to 1.95 m and women of 1.50
+ * n 12: 431 mL in each lung). The paper of the ECSC was not at hand: an implementation of its table
+ * in R (getQuanjerPred, getQuanjerLLN; limits 1.15 and 0.99 L, 1.645 standard deviations) confirms
+ * the coefficients. At 40 years they agree within 5 %, for men of 1.60 to 1.95 m and women of 1.50
  * to 1.80 m, with the medians of Hall et al. (Eur Respir J 57: 2000289, 2021), splines left out. */
 #ifndef SUPINE_CAPACITY_H
 #define SUPINE_CAPACITY_H
