@@ -115,7 +115,7 @@ with tempfile.TemporaryDirectory() as folder:
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
-    assert share <= 0.4  # 0.35 over hundreds of frames: here the triangles still count
+    assert share <= 0.42  # by the fastest level; the slowest leaves 0.39
 
     # A file a frame, and the index.
     index = ElementTree.parse("frames.pvd").getroot()
