@@ -86,7 +86,7 @@ static void write_bash(FILE *file) {
     context c = {supine_command_list[i]->name, file};
     (void)fprintf(file, "  %s) words='", supine_command_list[i]->name);
     supine_options_visit(supine_command_list[i]->options, 0, bash_name, &c);
-    (void)fputs("--help' ;;\n", file);
+    (void)fputs("--help --help-all' ;;\n", file);
   }
   (void)fputs("  esac\n"
               "  case \"$cur\" in\n"
@@ -152,7 +152,9 @@ static void write_zsh(FILE *file) {
     context c = {supine_command_list[i]->name, file};
     (void)fprintf(file, "  %s)\n    _arguments \\\n", supine_command_list[i]->name);
     supine_options_visit(supine_command_list[i]->options, 0, zsh_option, &c);
-    (void)fputs("      '(-h --help)'{-h,--help}'[prints help]' '*:file:_files' ;;\n", file);
+    (void)fputs("      '(-h --help)'{-h,--help}'[prints help]' '--help-all[prints help of every "
+                "option]' '*:file:_files' ;;\n",
+                file);
   }
   (void)fputs("  esac\nfi\n", file);
 }

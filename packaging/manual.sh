@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make a manual page of every command from its --help: manual.sh PROGRAM FOLDER VERSION. Wants help2man.
+# Make a manual page of every command from its --help-all: manual.sh PROGRAM FOLDER VERSION. Wants help2man.
 set -eu
 mkdir -p "$2"
 out=$(cd "$2" && pwd)
@@ -10,7 +10,7 @@ program=./$(basename "$1")
 # page COMMAND SUMMARY: the page of a command, or of the program where COMMAND is empty.
 page() {
   name=supine${1:+-$1}
-  help2man --no-info --name="$2" --version-string="$3" --no-discard-stderr --help-option="${1:+$1 }--help" \
+  help2man --no-info --name="$2" --version-string="$3" --no-discard-stderr --help-option="${1:+$1 }--help${1:+-all}" \
     --section=1 --manual='User Commands' --source="supine $3" "$program" |
     sed "s/^\.TH SUPINE /.TH $(echo "$name" | tr '[:lower:]' '[:upper:]') /
       /^\.SH NAME/{n;s/^supine /$name /;}" >"$out/$name.1"

@@ -25,7 +25,7 @@ cd "$(dirname "$0")/.."
   echo '<a href="page.html">a page to turn them in</a> and <a href="report.html">a report</a>.'
   for command in $("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
     printf '\n## supine %s\n```{.unparsed}\n' "$command"
-    "$supine" "$command" --help
+    "$supine" "$command" --help-all
     echo '```'
     case $command in
     render) printf '![on the left and on the right, from before and from above](sides.png)\n' ;;

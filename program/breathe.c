@@ -37,44 +37,42 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as sup
 static const supine_option table[] = {
     {"output", 'o', "OUT",
      "NAME.vtp: one file for ParaView, the triangles once, whose time is the frame's number; "
-     "NAME.pvd: "
-     "time in seconds, and a folder NAME with a VTP file a frame, a quarter larger. Both to "
-     "1/256 "
-     "mm, with normals, lungs, gravity and volumes. NAME.safetensors: one "
-     "file with positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; "
-     "anything else: a folder with breath.pvd and the VTP files. A folder must be new or empty",
+     "NAME.pvd: time in seconds, and a folder NAME with a VTP file a frame, a quarter larger. Both "
+     "to 1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: one file with "
+     "positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; anything else: "
+     "a folder with breath.pvd and the VTP files. A folder must be new or empty",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
     {"turn", 0, "FROM:TO:SECONDS",
-     "turns gravity from one posture to another at constant speed, as supine:left:10s; to the "
-     "opposite posture over the left side. Rest turns with it",
+     "turn gravity from one posture to another at constant speed, as supine:left:10s; between "
+     "opposite postures, over the left side. The volume at rest follows the posture",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
-     "air of a breath above the posture's rest (above the scan where no rest is known), both lungs "
-     "together; default 500",
+     "tidal volume of both lungs, above rest in the posture (above the scan where rest is "
+     "unknown); default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
-    {"inhale", 0, "SHARE", "of the breath's time that is inhalation, between 0 and 1; default 1/3",
+    {"inhale", 0, "SHARE", "share of the breath that is inhalation, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
-     .wants = "a share between 0 and 1"},
+     .wants = "a share between 0 and 1", .more = true},
     {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
-     SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O"},
+     SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O", .more = true},
     {"course", 0, "NAME",
-     "how pressure rises and falls: cosine (default), ramp; or flow: the volume goes in straight "
-     "lines, whatever the pressure",
-     SUPINE_FILLS(request, breath.course), .choices = courses},
+     "pressure over time: cosine (default) or ramp; flow: constant flow in and out, whatever "
+     "the pressure",
+     SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {"step", 0, "ML",
-     "the paper's own breath instead: constant flow of this volume a frame, in and out; 1.5 takes "
-     "5 s to inhale 500 mL at 66.66 frames a second",
-     SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO},
+     "breath of Santhanam 2008 instead: constant flow of this volume per frame, in and out; "
+     "1.5 inhales 500 mL in 5 s at 66.66 frames a second",
+     SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames a second, one every 15 ms", SUPINE_FILLS(request, fps),
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
-    {"seconds", 0, "S", "how long; default: the turn, or one breath",
+    {"seconds", 0, "S", "duration; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
@@ -92,10 +90,11 @@ static int complete(request *wanted, size_t *count) {
   }
   const char *ending = strrchr(wanted->path, '.');
   if (wanted->as_scanned && ending != NULL && strcmp(ending, ".safetensors") == 0) {
-    return supine_options_usage(name, "--as-scanned is for a series: tensors are LPS and mm");
+    return supine_options_usage(name, "--as-scanned is for VTP files only (tensors are in LPS "
+                                      "and mm): leave it out");
   }
   if (wanted->turns && wanted->orientation.given) {
-    return supine_options_usage(name, "give --turn, or one posture, not both");
+    return supine_options_usage(name, "give --turn or one posture, not both");
   }
   if (!wanted->turns) {
     const int result =
@@ -109,8 +108,10 @@ static int complete(request *wanted, size_t *count) {
   seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
   const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
   if (!(frames <= FRAMES_MAX)) {
-    return supine_options_usage(name, "%g s at %g frames a second are more than %d frames", seconds,
-                                wanted->fps, FRAMES_MAX);
+    return supine_options_usage(name,
+                                "%g s at %g frames a second exceed %d frames: lower "
+                                "--seconds or --fps",
+                                seconds, wanted->fps, FRAMES_MAX);
   }
   *count = (size_t)frames;
   return SUPINE_EXIT_OK;
@@ -371,10 +372,9 @@ const supine_command supine_command_breathe = {
     "let a basis breathe, in one posture or turning",
     .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
     .about =
-        "Lets the lungs of a basis file breathe, in one posture or while the body turns, and "
-        "writes the surface of every frame. The volume follows the pressure-volume relation and "
-        "is exact in each frame. Prints how long computing a frame took, beside the 15 ms of a "
-        "display that must not wait.",
+        "Computes breathing lungs from a basis file, in one posture or during a turn, and "
+        "writes the surface of each frame. The volume follows the pressure-volume relation and "
+        "is exact in each frame. Prints the time per frame; a smooth display allows 15 ms.",
     .options = table,
     .notes = "Examples:\n"
              "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"

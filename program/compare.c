@@ -42,20 +42,19 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"postures", 0, "LIST", "which to compare", SUPINE_FILLS(request, postures),
+    {"postures", 0, "LIST", "postures to compare", SUPINE_FILLS(request, postures),
      .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
-    {"breath", 0, "ML", "air added to that volume, to see which heights ventilate",
+    {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
     {"rms", 0, "MM",
-     "root-mean-square displacement in every posture instead: for open surfaces, which have no "
-     "volume",
+     "root-mean-square displacement in each posture, instead of a volume: for open surfaces",
      SUPINE_FILLS(request, rms), SUPINE_SAYS_GIVEN(request, by_rms), .wants = "millimetres",
      .rivals = "breath"},
-    {"json", 0, NULL, "the same for programs, on standard output", SUPINE_FILLS(request, json)},
-    {"csv", 0, "FILE", "the same for spreadsheets, one number a row", SUPINE_FILLS(request, csv),
-     .file = SUPINE_FILE_OUT},
+    {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
+    {"csv", 0, "FILE", "also write a table for spreadsheets, one number per row",
+     SUPINE_FILLS(request, csv), .file = SUPINE_FILE_OUT},
     {"output", 'o', "FILE", ".html: a report of one file, with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.help = SUPINE_POSTURE_LIST_HELP},
@@ -107,7 +106,8 @@ static int compare(const char *path, const supine_basis *basis, const request *w
   if (supine_basis_metadata(basis, "content") != NULL) { /* of 'supine embed' */
     if (wanted->html != NULL || wanted->by_rms) {
       return supine_options_usage(name,
-                                  "what is inside has no surface: -o and --rms are for lungs");
+                                  "-o and --rms are for lungs, and this basis holds structures "
+                                  "inside: give the lungs' basis, or leave them out");
     }
     return supine_command_compare_content(name, basis, &comparison.postures, &comparison.state,
                                           wanted->json, wanted->csv);
@@ -139,23 +139,21 @@ const supine_command supine_command_compare = {
     "how far postures differ, and who ventilates where",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about =
-        "Says how far the lungs have moved in each posture since supine at rest and between every "
-        "two, how much each lung "
-        "holds, and which heights ventilate in a breath; then searches all directions of gravity "
-        "for the two that differ most and for the one that is farthest from supine. Of what is "
-        "inside ('supine embed') it says how far each named part moves between every two postures, "
-        "and where to.",
+        "Reports how far the lungs move from supine at rest to each posture and between every "
+        "two, how much each lung holds, and which heights ventilate in a breath; then finds "
+        "the two directions of gravity that differ most, and the one farthest from supine. For "
+        "structures inside ('supine embed'), reports how far and where each named part moves "
+        "between every two postures.",
     .options = table,
     .notes =
         "Averages are over the surface's area; 95 % of the area moves no farther than the number "
         "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
-        "equal "
-        "thickness across gravity. What the tissue of a slab gains is the volume that its part of "
-        "the surface sweeps, plus what crosses its lower cut, less what crosses its upper one; a "
-        "cut's motion is the plane fitted to its outline's. The slabs' gains sum to the volume "
-        "asked for; gain over volume is the regional expansion. Constant, odd and even are shares "
-        "of the squared displacement over all directions: odd parts turn over with gravity, so "
-        "without an even part prone is the exact reverse of supine about their mean.\n"
+        "equal thickness across gravity. What the tissue of a slab gains is the volume that its "
+        "part of the surface sweeps, plus what crosses its lower cut, less what crosses its upper "
+        "one; a cut's motion is the plane fitted to its outline's. The slabs' gains sum to the "
+        "volume asked for; gain over volume is the regional expansion. Constant, odd and even are "
+        "shares of the squared displacement over all directions: odd parts turn over with gravity, "
+        "so without an even part prone is the exact reverse of supine about their mean.\n"
         "\n"
         "Examples:\n"
         "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"

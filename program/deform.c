@@ -40,9 +40,8 @@ static const supine_option table[] = {
      .rivals = "output"},
     {"states", 0, "LIST",
      "many states in one call, for which the basis and the image are read once: a CSV file with "
-     "the "
-     "columns posture, volume and output, a file beside the list: surface, points, field, or what "
-     "--image or --labels moves",
+     "the columns posture, volume and output, a file beside the list: surface, points, field, or "
+     "what --image or --labels moves",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
@@ -103,7 +102,9 @@ static int find_pose(const supine_basis *basis, const request *wanted, const dou
   const double largest = largest_displacement(&reference, mesh);
   supine_mesh_free(&reference);
   if (!(largest > 0.0)) {
-    supine_options_say(name, "nothing moves in this direction: no scale gives %g mm",
+    supine_options_say(name,
+                       "nothing moves in this direction of gravity, so no --scale gives "
+                       "%g mm: give another posture",
                        wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
@@ -240,7 +241,8 @@ static int check_row(const char *basis, const request *rows, size_t count) {
   }
   for (size_t i = 0; i + 1 < count; ++i) {
     if (strcmp(rows[i].output, row->output) == 0) {
-      return supine_options_usage(name, "%s: two rows write %s", row->states, row->output);
+      return supine_options_usage(name, "%s: two rows write %s: give each its own file",
+                                  row->states, row->output);
     }
   }
   return supine_output_try(row->output, &error) == SUPINE_OK ? SUPINE_EXIT_OK
@@ -271,7 +273,8 @@ static int read_rows(const char *basis, const request *wanted, request **rows, s
   }
   supine_csv_close(&csv);
   return result == SUPINE_EXIT_OK && *count == 0
-             ? supine_options_usage(name, "%s: no row follows the header", wanted->states)
+             ? supine_options_usage(name, "%s: no row follows the header: add at least one",
+                                    wanted->states)
              : result;
 }
 
@@ -315,8 +318,8 @@ const supine_command supine_command_deform = {
     .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
              "BASIS --states LIST",
     .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
-             "writes the surface. This is what the run-time library does each frame. Each point "
-             "comes with its expected error, expected_error_mm: " SUPINE_EXPECTED_MEANING
+             "writes the surface, as the run-time library does in each frame. Each point carries "
+             "its expected error, expected_error_mm: " SUPINE_EXPECTED_MEANING
              ". " SUPINE_EXPECTED_SUPPORT,
     .options = table,
     .notes =

@@ -33,8 +33,7 @@ const supine_option supine_command_deform_content_options[] = {
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {"density", 0, NULL,
      "of --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
-     "of "
-     "volume, so that mass is kept; the file's header says so",
+     "of volume, so that mass is kept; the file's header says so",
      SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE", "label map to move, into -o: nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
@@ -54,10 +53,10 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
                                 wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {
-    return supine_options_usage(command, "--inverse is of --field-out FILE, which is missing");
+    return supine_options_usage(command, "--inverse changes --field-out FILE: give that too");
   }
   if (wanted->density && wanted->image == NULL) {
-    return supine_options_usage(command, "--density is of --image FILE, which is missing");
+    return supine_options_usage(command, "--density changes --image FILE: give that too");
   }
   return SUPINE_EXIT_OK;
 }

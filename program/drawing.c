@@ -21,8 +21,8 @@ int supine_command_drawn_find(const supine_basis *basis, const supine_compare *c
   supine_compare_distances(compare, &found->pose, NULL, found->value);
   supine_compare_statistics(compare, found->value, &statistics);
   if (!(statistics.max > 0.0)) {
-    supine_options_say(name, "nothing moves in %s: no scale gives %g mm", item->name,
-                       wanted->scale);
+    supine_options_say(name, "nothing moves in %s, so no --scale gives %g mm: give another posture",
+                       item->name, wanted->scale);
     return SUPINE_EXIT_NUMERICAL;
   }
   supine_pose_fill(&found->pose, wanted->scale / statistics.max);

@@ -173,8 +173,8 @@ int supine_command_drawing_turn(const supine_basis *basis, const supine_command_
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   int result = SUPINE_EXIT_OK;
   if (!(frames <= FRAMES_MAX)) {
-    return supine_options_usage(name, "a turn of %g s is more than %d frames", wanted->turn.seconds,
-                                FRAMES_MAX);
+    return supine_options_usage(name, "a turn of %g s exceeds %d frames: give a shorter one",
+                                wanted->turn.seconds, FRAMES_MAX);
   }
   t.count = frames < 2.0 ? 2 : (size_t)frames;
   float *values = malloc(n * sizeof *values);

@@ -69,8 +69,8 @@ static int read_labels(const char *command, const char *text, void *field) {
 }
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "basis of what is inside, a safetensors file",
-     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
+    {"output", 'o', "FILE", "basis of the structures (.safetensors)", SUPINE_FILLS(request, path),
+     .required = true, .file = SUPINE_FILE_OUT},
     {"grid", 0, "MM",
      "nodes this far apart over the lungs, for displacement fields; with an image as CONTENT, "
      "about as far, every n-th of its voxels",
@@ -86,8 +86,8 @@ static const supine_option table[] = {
      "others are deformed with it",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
-     "what lies outside the lungs moves as the nearest point of their surface, instead of as the "
-     "inside would if it went on",
+     "move structures outside the lungs as the nearest point of the surface; default: "
+     "extrapolate the motion inside",
      SUPINE_FILLS(request, clamp)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
@@ -237,8 +237,8 @@ static int run(void *chosen, const supine_arguments *given) {
   }
   if (given->count == 1 && !wanted->has_grid) {
     return supine_options_usage(
-        name, "which content? Name points (.csv, .fcsv, .mrk.json), meshes or an image, or "
-              "give --grid MM");
+        name, "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an image, or "
+              "--grid MM");
   }
   if (wanted->labels.given && (!image || wanted->has_grid)) {
     return supine_options_usage(name, image ? "--labels takes surfaces, --grid voxels: one of the "
@@ -268,16 +268,13 @@ const supine_command supine_command_embed = {
     "let points, meshes or a grid inside move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about =
-        "Makes a basis of what is inside the lungs of a basis: points (3D Slicer's .mrk.json or "
-        ".fcsv, or a CSV file with the columns "
-        "x, y, z and name), meshes (airways, vessels, nodules), the parts of a label map, or the "
-        "nodes of a grid, of its own or of an image (.nrrd, .nii, .nii.gz). It moves with the "
-        "lungs' own weights and breath, "
-        "through every command that reads a basis.\n"
-        "\n"
-        "Displacements inside are the biharmonic interpolation of the surface's, lung by lung: a "
-        "point on the surface moves with it, and an affine motion goes on inside.",
+    .about = "Makes a basis of structures inside the lungs of a basis: points (.mrk.json or .fcsv "
+             "of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+             "nodules), the parts of a label map, or the nodes of a grid, regular or of an image "
+             "(.nrrd, .nii, .nii.gz). They move with the weights and breath of the lungs, in every "
+             "command that reads a basis.\n\nTheir displacements are the biharmonic interpolation "
+             "of the surface's, lung by lung: points on the surface move with it, and an affine "
+             "motion continues inside.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"

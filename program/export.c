@@ -47,7 +47,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
     {"breath", 0, "ML",
-     "depth of the breath that is played, and up to which clamp-safe weights stay within 0 and 1",
+     "tidal volume of the breath played, and the largest for which clamp-safe weights stay "
+     "within 0 and 1",
      SUPINE_FILLS(request, volume), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
     {"scale", 0, "MM",
@@ -55,15 +56,15 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, largest), .standard = "10", SUPINE_ABOVE_ZERO,
      .wants = "millimetres above 0"},
     {"inside", 0, "FILE",
-     "what is inside, of 'supine embed' from the same basis: moves along, seen through the lungs, "
-     "points as balls of 4 mm. On a page each part has its name and how far it has moved, at the "
-     "pointer and in a table; in glTF each is a material of its name",
+     "structures from 'supine embed' with the same basis, shown through the lungs; points are "
+     "balls of 4 mm. On a page, each part shows its name and displacement at the pointer and "
+     "in a table; in glTF, each is a material of its name",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {.help = "Of a page:"},
+    {.help = "For a page:"},
     {"title", 0, "TEXT", "its title; default the name of the basis file",
      SUPINE_FILLS(request, title)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
-    {.help = "Of glTF:"},
+    {.help = "For glTF:"},
     {"profile", 0, "NAME",
      "raw: a target for each mode of the basis; weights of either sign (default)\n"
      "8: at most eight targets, for engines that promise no more: the best eight; says what they "
@@ -79,8 +80,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, glb.quantise), .alias = "quantize",
      SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
-     "adds an animation: the patient breathes, and turns from the back over the left side onto "
-     "the belly and on",
+     "add an animation: breathing while turning from supine over the left side to prone and on",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
@@ -180,7 +180,8 @@ static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
   wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other: .glb */
   if (wanted->page && wanted->glb_only) {
-    return supine_options_usage(name, "--profile, --quantise and --animate are for .glb");
+    return supine_options_usage(name, "--profile, --quantise and --animate need an output that "
+                                      "ends in .glb");
   }
   if (!wanted->page && (wanted->title != NULL || wanted->from.given)) {
     return supine_options_usage(name, "%s is for .html", wanted->from.given ? "--from" : "--title");
@@ -192,8 +193,8 @@ const supine_command supine_command_export = {
     name,
     "write a basis as a page or as glTF morph targets",
     .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
-    .about = "Writes a basis file in a form that other programs play; the ending of the name "
-             "chooses it.",
+    .about = "Writes a basis file in a form that other programs play; the ending of the "
+             "output's name selects it.",
     .options = table,
     .notes =
         "In the .glb, the mesh's extras name the targets and say how their weights follow from "

@@ -55,7 +55,9 @@ static int read_state(const char *command, const char *text, void *field) {
     return supine_options_usage(command, "%s", error.message);
   }
   return state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0
-             ? supine_options_usage(command, "'%s': rest, full or a volume of both lungs in mL",
+             ? supine_options_usage(command,
+                                    "'%s' is not a state here: give rest, full or a volume "
+                                    "of both lungs, as 2600mL",
                                     text)
              : SUPINE_EXIT_OK;
 }
@@ -82,45 +84,47 @@ static bool is_landmarks(const char *path) {
 #define FILLS(member) SUPINE_FILLS(request, member)
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "what was found (JSON), for 'supine precompute --patient'", FILLS(path),
-     .file = SUPINE_FILE_OUT},
+    {"output", 'o', "FILE", "patient model to write (JSON), for 'supine precompute --patient'",
+     FILLS(path), .file = SUPINE_FILE_OUT},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"rest", 0, "STATE",
-     "how the person lay in the first scan, and how full the lungs were: POSTURE, VOLUME or "
-     "POSTURE:VOLUME, with VOLUME rest, full, either with +ML or -ML, or what a CT shows, 2600mL",
+     "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME, where VOLUME is rest or "
+     "full, either with +ML or -ML, or the volume measured in a CT, as 2600mL",
      FILLS(rest), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
-     "the same of the other state; without a volume the surfaces tell. Which of the two is the "
-     "fuller one does not matter: the law counts from it",
+     "state of the second scan, in the same form; without a volume, that of the surfaces. "
+     "Either scan may be the fuller one",
      FILLS(state), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
-     "deep (default): the deep law, its size fitted; paper: the published law, c1 to c9 fitted. "
-     "What either leaves of this person is carried by kriging",
+     "deep (default): only its size is fitted; paper: the law of Santhanam 2008, c1 to c9 "
+     "fitted. Kriging interpolates the residual of either",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
-    {"name", 0, "TEXT", "whose lungs these are; default: the landmarks' file", FILLS(name)},
+    {"name", 0, "TEXT", "name of the person; default: the landmarks' file", FILLS(name),
+     .more = true},
     {"gain", 0, "G",
-     "how much of the force turns with gravity. Two scans in one posture cannot tell it from what "
-     "stays with the body; default 0.4, the 'deep' law's",
-     FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}},
+     "gravity-dependent part of the force, which two scans in one posture cannot determine; "
+     "default 0.4, as in the law deep",
+     FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}, .more = true},
     {"state", 0, "STATE:FILE",
-     "a further state, its surface or its landmarks from the first scan (.csv); may be repeated, "
-     "up to 8. In another posture than the fitted states it tells the gain, in the same one how "
-     "far that breath went; the law's other constants are those of the two states. Without "
-     "another state to fit to, the first is that",
+     "further state: its surface, or landmarks from the first scan (.csv); may be repeated, up "
+     "to 8. In a posture other than the fitted ones it determines --gain, else how far that "
+     "breath went; the other constants of the law stay those of the two states. Without a "
+     "second scan or landmarks, the first further state takes its place",
      .read = read_further, .alias = "third",
      .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
-     FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm"},
+     FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(load)},
     {"reach", 0, "MM",
-     "of surfaces: forces spread over this length, as 'precompute --reach' has it", FILLS(reach),
-     .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+     "for surfaces: length over which forces spread, as in 'supine precompute --reach'",
+     FILLS(reach), .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0",
+     .more = true},
     {"expandability", 0, NULL,
-     "of surfaces: finds how expandable which parts are, under the 'deep' law's force, in regions "
-     "some 45 mm apart, in place of kriging and with the paper's law, and says which it cannot "
-     "see; kept where held-out blocks come nearer",
-     FILLS(expandability)},
-    {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
+     "for surfaces: fit the expandability of regions about 45 mm wide, with the paper law and "
+     "the force of the law deep, instead of kriging; report the regions that cannot be "
+     "determined; keep the result only where it lowers the held-out residual",
+     FILLS(expandability), .more = true},
+    {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
 /* The deep law's: a lung's lowest parts are emptied about 1.5 times as far as its uppermost. */
@@ -133,8 +137,7 @@ static void print_row(const char *what, double fitted, double held_out, const ch
 static void print_scores(const supine_patient_fit_report *report, supine_patient_law law,
                          bool corrected) {
   char text[64];
-  (void)printf("what is left of the displacement, mm RMS:\n"
-               "                             fitted  held out\n");
+  (void)printf("residual displacement, mm RMS:\n                             fitted  held-out\n");
   print_row("nothing moved", report->fitted.none, report->held_out.none, "");
   print_row("translation", report->fitted.translation, report->held_out.translation, "");
   print_row("affine map", report->fitted.affine, report->held_out.affine, "");
@@ -143,19 +146,19 @@ static void print_scores(const supine_patient_fit_report *report, supine_patient
   if (corrected) {
     (void)snprintf(text, sizeof text, "law %s + kriging", supine_patient_law_names[law]);
     print_row(text, report->fitted.corrected, report->held_out.corrected, "   <- kept");
-    (void)printf("expected of held-out points %.2f mm RMS; %.0f %% of them lie within the 95 %% "
-                 "band\n",
+    (void)printf("expected error at held-out points %.2f mm RMS; %.0f %% of them lie within "
+                 "the 95 %% band\n",
                  report->expected, 100.0 * report->band);
   }
-  (void)printf("held out: %d folds of 40 mm blocks that the fit had not seen, %d times over\n",
-               SUPINE_PATIENT_FOLDS, SUPINE_PATIENT_SEEDS);
+  (void)printf("held-out: %d folds of blocks of 40 mm, repeated %d times\n", SUPINE_PATIENT_FOLDS,
+               SUPINE_PATIENT_SEEDS);
 }
 
 static void print_paper_law(const supine_patient *patient,
                             const supine_patient_fit_report *report) {
   double c[SUPINE_PATIENT_CONSTANTS];
   supine_patient_constants(patient, c);
-  (void)printf("the paper's law, force 1 at the box's centre (95 %% intervals):\n");
+  (void)printf("paper law, force 1 at the centre of the box (95 %% intervals):\n");
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
     const double half = 1.96 * report->error[k];
     (void)printf("  c%zu %8.3f   %8.3f to %8.3f\n", k + 1, c[k], c[k] - half, c[k] + half);
@@ -163,12 +166,13 @@ static void print_paper_law(const supine_patient *patient,
 }
 
 static void print_surface(const supine_patient_surface_report *surface, bool landmarks) {
-  (void)printf("surface: %zu vertices, %.0f %% of them matched; to the emptier surface, along its "
-               "normals,\n  %.2f mm RMS before, %.2f mm in the end\n",
+  (void)printf("surface: %zu vertices, %.0f %% of them matched; distance along the normals to "
+               "the emptier surface\n  %.2f mm RMS before, %.2f mm after the fit\n",
                surface->vertices, 100.0 * surface->matched, surface->before, surface->after);
   if (!landmarks) {
-    (void)puts("a small distance between surfaces does not prove the motion of what is in them:\n"
-               "  surfaces 5 mm apart have had points 14 mm off. Landmarks tell: --landmarks");
+    (void)puts("a small distance between surfaces does not prove the motion inside: points "
+               "have been off by\n  14 mm where surfaces were 5 mm apart. Give --landmarks to "
+               "measure it");
   }
 }
 
@@ -197,7 +201,7 @@ static void print_extreme(const supine_patient_stiffness *stiffness, const char 
 /* The regions that move too little, or along the surface, to tell how expandable they are. */
 static void print_unseen(const supine_patient_stiffness *stiffness,
                          const supine_patient_expand_report *expand) {
-  (void)printf("  not seen: %zu of %zu regions, which have their neighbours' values%s\n",
+  (void)printf("  not determined: %zu of %zu regions; they take their neighbours' values%s\n",
                expand->unseen, expand->regions, expand->unseen > 0 ? ":" : "");
   for (size_t side = 0; side < 2; ++side) {
     for (size_t k = 0; k < stiffness->count[side]; ++k) {
@@ -213,18 +217,18 @@ static void print_unseen(const supine_patient_stiffness *stiffness,
 static void print_expandability(const supine_patient_expand_report *expand,
                                 const supine_patient_stiffness *stiffness) {
   if (expand->tried) {
-    (void)printf("expandability: the surfaces come to %.2f mm RMS with it, %.2f without; held out "
+    (void)printf("expandability: surface residual %.2f mm RMS with it, %.2f without; held-out "
                  "%.2f and %.2f:\n  ",
                  expand->fitted[1], expand->fitted[0], expand->held_out[1], expand->held_out[0]);
     if (expand->kept) {
       (void)printf(
-          "kept; nine tenths of what is seen are %.2f to %.2f times as stiff as the mean\n",
+          "kept; 90 %% of the determined tissue has %.2f to %.2f times the mean stiffness\n",
           expand->softest, expand->stiffest);
       print_extreme(stiffness, "least", -1.0);
       print_extreme(stiffness, "most", 1.0);
       print_unseen(stiffness, expand);
     } else {
-      (void)puts("no nearer to what it had not seen, and so not kept: stiffness stays even");
+      (void)puts("not kept, as the held-out residual is not lower: stiffness stays uniform");
     }
   }
 }
@@ -297,8 +301,9 @@ static void print_text(const supine_patient_record *record, const supine_patient
   if (patient->law == SUPINE_PATIENT_PAPER) {
     print_paper_law(patient, report);
   }
-  (void)printf("it explains %.0f %% of the squared displacement%s held out (%.0f %% fitted)\n",
-               100.0 * report->explained, moved ? " about the motion between the scans" : "",
+  (void)printf("explained share of the squared displacement%s: %.0f %% held-out (%.0f %% "
+               "fitted)\n",
+               moved ? " about the motion between the scans" : "", 100.0 * report->explained,
                100.0 * report->explained_fitted);
 }
 
@@ -315,10 +320,10 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
                              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name")
                              : SUPINE_OK;
   for (char *path; status == SUPINE_OK && (path = strsep(&rest, ",")) != NULL;) {
-    status =
-        count == FILES_MAX
-            ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s': two lungs at most", operand)
-            : supine_mesh_load(path, &wanted->load, &meshes[count++], &report, error);
+    status = count == FILES_MAX
+                 ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                    "'%s': more than two lungs: give one or two", operand)
+                 : supine_mesh_load(path, &wanted->load, &meshes[count++], &report, error);
   }
   if (status == SUPINE_OK) {
     supine_findings findings = {""};
@@ -419,8 +424,8 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
   const int named = named_order(&wanted->rest, &wanted->state);
   if ((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the state that was named the fuller one holds %.0f %% of the other: "
-                            "are --rest and --other the wrong way round, or --reverse missing?",
+                            "the state named as the fuller one holds %.0f %% of the other: "
+                            "exchange --rest and --other, or give --reverse",
                             100.0 * (named > 0 ? growth : 1.0 / growth));
   }
   of->swapped = named > 0 || (named == 0 && growth > 1.0);
@@ -697,15 +702,16 @@ static int arrange(request *wanted, const supine_arguments *given) {
   }
   for (; next < given->count; ++next) { /* more in the same posture */
     if (wanted->count == SUPINE_PATIENT_OTHERS_MAX) {
-      return supine_options_usage(name, "more than %d further states", SUPINE_PATIENT_OTHERS_MAX);
+      return supine_options_usage(name, "more than %d further states: give fewer --state",
+                                  SUPINE_PATIENT_OTHERS_MAX);
     }
     wanted->further[wanted->count] = wanted->state;
     wanted->further[wanted->count].volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0.0};
     wanted->further_path[wanted->count++] = given->operand[next];
   }
   if (wanted->landmarks.path == NULL && wanted->state_path == NULL) {
-    return supine_options_usage(name, "what to fit to? Name --landmarks, or the surface at rest "
-                                      "and the one in the other state, or both");
+    return supine_options_usage(name, "nothing to fit to: give --landmarks, or the surfaces of "
+                                      "both states, or all three");
   }
   for (size_t k = 0; k < wanted->count; ++k) {
     if (!is_landmarks(wanted->further_path[k]) && wanted->rest_path == NULL) {
@@ -718,14 +724,15 @@ static int arrange(request *wanted, const supine_arguments *given) {
                                 wanted->state_path);
   }
   if (wanted->expandability && wanted->state_path == NULL) {
-    return supine_options_usage(name, "--expandability is of surfaces: name the one at rest and "
-                                      "the one in the other state");
+    return supine_options_usage(name, "--expandability needs surfaces: give those of both "
+                                      "states");
   }
   if (wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP) {
-    return supine_options_usage(name, "--expandability goes with the paper's law: leave --law out");
+    return supine_options_usage(name, "--expandability uses the paper law: leave --law out");
   }
   if (wanted->has_gain && wanted->count > 0) {
-    return supine_options_usage(name, "--gain or --state: further states tell the gain");
+    return supine_options_usage(name, "give --gain or --state, not both: further states "
+                                      "determine the gain");
   }
   return SUPINE_EXIT_OK;
 }
@@ -765,11 +772,10 @@ const supine_command supine_command_fit = {
     "a person's own law, from scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
              "SCAN SCAN... [--state STATE:FILE]... -o patient.json [OPTIONS]",
-    .about =
-        "Fits how one person's lungs move between two scans: a law, and by kriging what it leaves "
-        "of this person; and says how near held-out points come, and how near they were expected. "
-        "Landmarks tell most; surfaces alone do not show what slides along them. 'supine "
-        "precompute --patient' makes a basis of it, from either scan.",
+    .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
+             "interpolated by kriging. Reports the measured and the expected error at held-out "
+             "points. Landmarks determine most; surfaces alone do not show sliding along them. "
+             "'supine precompute --patient' makes a basis from the model and either scan.",
     .options = table,
     .notes =
         "Example:\n"

@@ -314,7 +314,7 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"json", 0, NULL, "the same for programs", SUPINE_FILLS(request, json)}, {.name = NULL}};
+    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)}, {.name = NULL}};
 
 static int run(void *chosen, const supine_arguments *given) {
   const request *wanted = chosen;
@@ -362,9 +362,8 @@ const supine_command supine_command_info = {
         "with, and its error, measured against the full solve on directions that no grid used.\n"
         "\n"
         "Energy per band is the share of the squared displacement, over the surface and all "
-        "orientations, that the harmonics of each band l carry. Odd bands change sign when "
-        "gravity does; the even bands beyond l = 0 are what makes prone more than the reverse of "
-        "supine.",
+        "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity "
+        "does; the even bands beyond l = 0 are what makes prone more than the reverse of supine.",
     .options = table,
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

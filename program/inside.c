@@ -17,8 +17,8 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
                     memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
   return same ? SUPINE_OK
               : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                 "%s: not of this basis: make it with 'supine embed' from the very "
-                                 "basis that is shown",
+                                 "%s: not made from this basis: make it with 'supine embed' "
+                                 "from the basis that is shown",
                                  path);
 }
 

@@ -36,10 +36,10 @@ static const supine_option table[] = {
      "frame of the observations, with the expected error of each point",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
      .endings = ".vtp, .ply or .csv"},
-    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP "; default: found from the points",
+    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP "; default: fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
-     "find a rotation too, from three points or more; default: a translation alone",
+     "also fit a rotation, from three points or more; default: a translation alone",
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
@@ -199,22 +199,23 @@ const supine_command supine_command_locate = {
     name,
     "from a few observed points to the whole lung",
     .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
-    .about = "Finds the lungs from a few points that were observed inside them, as a navigation "
-             "system collects them: the volume, the shift between the frames, and what the law "
-             "misses near the points. OBSERVED.csv has the columns name,x,y,z in mm; the names are "
-             "those that 'supine embed' was given. Every position comes with its expected error.",
+    .about = "Fits the lungs to a few points observed inside them, as a navigation system "
+             "collects them: the volume, the translation between the frames, and the residual "
+             "of the law near the points. OBSERVED.csv has the columns name,x,y,z, in mm, with "
+             "the names given to 'supine embed'. Each position has its expected error.",
     .options = table,
-    .notes = "An expected error is the root mean square of the distance in space: half of all "
-             "points lie within 0.9 of theirs, 95 % within 1.8. " SUPINE_EXPECTED_SUPPORT
-             " Points seldom determine the posture: give --posture. Without it six are tried, and "
-             "the error holds what they differ by.\n"
-             "\n"
-             "Examples:\n"
-             "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"
-             "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
-             "supine -o found.vtp\n"
-             "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
-             "left --volume rest --rigid -o found.csv",
+    .notes =
+        "The expected error is the root mean square of the distance in 3-D: half of all points "
+        "lie within 0.9 times theirs, 95 % within 1.8. " SUPINE_EXPECTED_SUPPORT
+        " A few points seldom determine the posture: give --posture. Without it six are "
+        "tried, and the error includes the differences between them.\n"
+        "\n"
+        "Examples:\n"
+        "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"
+        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
+        "supine -o found.vtp\n"
+        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
+        "left --volume rest --rigid -o found.csv",
     .operands_least = 2,
     .operands_most = 2,
     .operands_missing = "name a basis file and a CSV file of observed points",

@@ -23,9 +23,9 @@ static int read_law(const char *command, const char *text, void *field) {
   }
   if (strcasecmp(text, "tidal") == 0 || strcasecmp(text, "cohort") == 0) {
     return supine_options_usage(command,
-                                "--law %s is no more: 'deep', the default, takes its place, for "
-                                "scans at rest too. Leave --law out and say what the scan shows, "
-                                "as --scanned supine:rest",
+                                "--law %s was removed; the default law 'deep' replaces it, "
+                                "also for scans at rest. Leave --law out and name the state of "
+                                "the scan, as --scanned supine:rest",
                                 text);
   }
   return SUPINE_OPTION_MISFIT;
@@ -159,106 +159,105 @@ const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"midline", 0, "X",
-     "x of the sagittal plane between the lungs, mm; default: the middle of the box of two lungs, "
-     "the inner face of a single lung's",
+     "x of the sagittal plane between the lungs, mm; default: the middle of the bounding box "
+     "of two lungs, or the medial side of a single lung",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
-     .wants = "an x in mm"},
-    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) in place of surfaces: one map, a mask a "
-             "file, or the folder of masks that TotalSegmentator writes:"},
+     .wants = "an x in mm", .more = true},
+    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask "
+             "per file, or the folder of masks that TotalSegmentator writes:"},
     {"labels", 0, "WHICH",
-     "which labels are lungs; default: by those that are there, where they leave no doubt. "
-     "lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), totalsegmentator (10 to 14), "
-     "totalsegmentator-v1 (13 to 17), one (all but 0; both lungs, parted), or any, as "
-     "left=10+11,right=12+13+14; one lung alone: left=2",
+     "labels of the lungs: lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), "
+     "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
+     "left and right are separated), or your own, as left=10+11,right=12+13+14, or left=2 for one "
+     "lung. Default: recognised from the labels present, where they are unambiguous",
      FILLS(source.labels.labels)},
-    {"edge", 0, "MM", "about this far from vertex to vertex; default 2", FILLS(source.labels.edge),
-     .range = {0.2, 20.0}, .wants = "0.2 to 20 mm"},
+    {"edge", 0, "MM", "edge length of the surface; default 2", FILLS(source.labels.edge),
+     .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
     {"close", 0, "MM",
-     "first close gaps and channels narrower than twice this, as vessels leave them; default 0",
+     "close gaps and channels narrower than twice this, which vessels leave in masks; default 0",
      FILLS(source.labels.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
-    {"surfaces-out", 0, "FILE", "keep the surfaces: " SUPINE_MESH_ENDINGS,
-     FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
+    {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
+     FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
+     .more = true},
     {.help = "The scan and the law:"},
     {"scanned", 0, "STATE",
-     "what the surfaces show: full (a breath-hold at full inflation, the default; then the posture "
-     "hardly matters), POSTURE:rest (the end of a quiet expiration), either with +ML or -ML of the "
-     "lungs together (supine:rest+300, full-2000), or none (nothing is known: breaths are added to "
-     "the scan, and turning alone moves nothing). Lungs have one shape at full inflation in every "
-     "posture, and all that gravity does is below it; from a scan in another state that shape is "
-     "found first",
+     "state of the lungs in the scan: full (TLC, a breath-hold at full inflation; the default), "
+     "POSTURE:rest (FRC, the end of a quiet expiration), either with +ML or -ML for both lungs "
+     "together (supine:rest+300, full-2000), or none (unknown: breaths are added to the scan, and "
+     "a change of posture alone moves nothing). The model counts from full inflation, where the "
+     "shape is the same in every posture; from another state it is computed first",
      FILLS(choice), .read = read_scan,
      .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
-    {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of it",
-     FILLS(choice.law), .read = read_law, .choices = supine_physics_law_names},
+    {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
+     FILLS(choice.law), .read = read_law, .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST|FILE",
-     "volume at rest by posture, where it is known of the patient: POSTURE=2600mL, gas and tissue "
-     "of the lungs together, as a CT at rest shows them (a lung-function test's FRC is gas alone, "
-     "and seated: add some 0.9 L of tissue and say upright; postures not named keep their "
-     "proportion to those in mL); or a share of the full volume, POSTURE=0.43, or "
-     "POSTURE=0.42/0.44 of the left and the right lung's; or a CSV file with the columns "
-     "posture,share. Default: healthy people's, supine 0.418/0.440, prone 0.464/0.475, left "
+     "volume at rest (FRC) in each posture, where it is known for the patient: POSTURE=2600mL, "
+     "gas and tissue of both lungs, as measured in a CT at rest (lung-function tests give the "
+     "gas alone, seated: add about 0.9 L of tissue and give it as upright; other postures keep "
+     "their proportion to those named); POSTURE=0.43, a share of the volume at full inflation; "
+     "POSTURE=0.42/0.44, shares of the left and the right lung; or a CSV file with the columns "
+     "posture,share. Default, from healthy people: supine 0.418/0.440, prone 0.464/0.475, left "
      "0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
      FILLS(choice), .read = read_resting, .file = SUPINE_FILE_NONE,
      .wants = "POSTURE=2600mL or POSTURE=SHARE,... or a CSV file with the columns posture,share"},
     {"height", 0, "CM",
-     "of the person, and --sex: what full lungs should hold is then told beside the scan's volume "
-     "(ECSC 1993, less 10 % as lying, plus 0.86 L of tissue); default: adults' range",
-     FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm"},
-    {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes},
-    {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z, with h its height along "
-             "gravity (0 uppermost, 1 lowermost) and X, Y, Z its place in the box (from the "
-             "midline outwards, from the back, from the apex; 0 to 1):"},
-    {"base", 0, "B", "default by the law:" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base)},
-    {"gain", 0, "G", "default:" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain)},
-    {"box-force", 0, "X,Y,Z", "cx, cy, cz: fixed to the body; default:" SUPINE_LAWS(LAW_BOX),
-     FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ"},
+     "height of the person, to report with --sex the expected volume at TLC beside the scan's "
+     "volume (ECSC 1993, less 10 % for lying, plus 0.86 L of tissue); default: the range of adults",
+     FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
+    {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes, .more = true},
+    {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z: h is its height along "
+             "gravity (0 uppermost, 1 lowermost); X, Y, Z are its coordinates in the bounding "
+             "box (0 to 1, from the midline outwards, from the back, from the apex):",
+     .more = true},
+    {"base", 0, "B", "base; default by law:" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base),
+     .more = true},
+    {"gain", 0, "G", "default:" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain),
+     .more = true},
+    {"box-force", 0, "X,Y,Z",
+     "cx, cy and cz, fixed to the body; default by law:" SUPINE_LAWS(LAW_BOX),
+     FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
-     "dependent tissue is more expandable: a exp(S (h - mean)), h its height along gravity, 0 to "
-     "1; "
-     "default 0. Needs a reach",
-     FILLS(choice.model.force.soften)},
-    {.help = "Direction of displacement:"},
+     "make dependent tissue more expandable: a is multiplied by exp(S (h - mean h)); default "
+     "0. Not with the spread over links of the paper law: give --reach",
+     FILLS(choice.model.force.soften), .more = true},
+    {.help = "Direction of displacement:", .more = true},
     {"direction", 0, "WHAT",
-     "box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\n"
-     "FILE: any vectors: CSV with the columns dx,dy,dz, mm, a row a vertex in the order that "
-     "'supine solve' writes",
+     "box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\nFILE: a vector per "
+     "vertex: CSV with the columns dx,dy,dz in mm, in the vertex order of 'supine solve'",
      FILLS(choice), .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
-     .file = SUPINE_FILE_IN},
+     .file = SUPINE_FILE_IN, .more = true},
     {"constants", 0, "C1,...,C6",
-     "of the box model; default:" SUPINE_LAWS(
-         LAW_CONSTANTS) ". Fits to landmarks: paper's of ten 4-D CTs (DIR-Lab), deep's of ten full "
-                        "breaths (DIR-Lab COPDgene). The paper's own are lost",
-     FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6"},
-    {.help = "Tissue. Expandability a is how readily a part gives way; stiffness is E = 1/a. Only "
-             "ratios count: a = 2 beside a = 1 is twice as expandable, doubling all of them "
-             "changes nothing."},
+     "constants of the box model; default by law:" SUPINE_LAWS(
+         LAW_CONSTANTS) ". Fitted to landmarks: paper to ten 4-D CTs (DIR-Lab), deep to ten "
+                        "full breaths (DIR-Lab COPDgene). The constants that the paper used "
+                        "are lost",
+     FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+    {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios "
+             "between the parts of the lungs count: doubling every a changes nothing."},
     {"expandability", 0, "WHAT",
-     "uniform (default)\n"
-     "linear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a goes from FROM to TO in a straight line, or by "
-     "equal ratios, along AXIS: x from the midline outwards, y from the back to the front, z from "
-     "the apex to the base; linear:z:0.5:1.5 expands most at the base\n"
-     "FILE: a of every vertex, CSV: a header line, then one value a line in the order of the "
-     "vertices (left lung first, each as its file first names them: the order that 'supine solve' "
-     "writes), or vertex,value counted from 0",
+     "uniform (default)\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO "
+     "linearly or exponentially along AXIS: x from the midline outwards, y from back to front, "
+     "z from apex to base; linear:z:0.5:1.5 expands most at the base\nFILE: a for every "
+     "vertex: CSV with a header line, then one value per line in the vertex order of 'supine "
+     "solve' (left lung first), or vertex,value with vertices from 0",
      FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
-              "above 0, or a file"},
+              "above 0, or a file",
+     .more = true},
     {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
-     "a tumour at X,Y,Z (mm, LPS) multiplies E by FACTOR up to half of RADIUS (mm), less and less "
-     "from there, and not at all from RADIUS on. Above 1 stiffens: it moves less; 1 changes "
-     "nothing. May be repeated",
+     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm), by less "
+     "farther out, and by 1 from RADIUS on. A FACTOR above 1 stiffens: the tissue moves less. "
+     "May be repeated",
      FILLS(choice), .read = read_lesion,
      .wants = "(at most 64) X,Y,Z,RADIUS,FACTOR, the last two above 0"},
     {"lung", 0, "SIDE:SHARE",
-     "left or right lung collapsed (pneumothorax): its resting volume, and what it takes of a "
-     "breath, are SHARE (0 to 1) of what they were; a breath's volume stays exact, the other lung "
-     "takes the rest",
+     "collapsed lung (pneumothorax), left or right: its volume at rest and its share of a breath "
+     "are multiplied by SHARE (0 to 1); the other lung takes the rest of the breath's volume",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {"reach", 0, "MM",
-     "forces spread over this length along the surface, whatever the mesh (about exp(-r/MM)); "
-     "default: 10; paper: over a few links, so that a finer mesh spreads less and "
-     "may look torn",
-     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0"},
+     "length over which a force spreads along the surface, about exp(-r/MM); default 10; "
+     "paper: over a few links of the mesh, so that finer meshes spread less and may tear",
+     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 
 /* Print what a label map holds. */
@@ -285,8 +284,8 @@ static void print_map(const char *path, const supine_source *source) {
                  lung->surface - lung->mask, lung->farthest);
   }
   if (source->axes_hold) {
-    (void)printf("narrow at the head, deepest at the back, the heart on the left, as in people: "
-                 "the header's axes hold\n");
+    (void)printf("the lungs' shape confirms the axes in the header: narrow at the head, "
+                 "deepest at the back, the heart on the left\n");
   }
 }
 
@@ -311,13 +310,12 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
     choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
     if (state == 1 && !choice->scan.known) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this is the emptier of the two scans that were fitted, and nothing "
-                              "tells how far it is from full inflation: name its state, as "
-                              "--scanned supine:rest, or take the fuller scan");
+                              "this is the emptier of the two scans that were fitted, and its "
+                              "volume below TLC is unknown: name its state, as --scanned "
+                              "supine:rest, or use the fuller scan");
     }
     supine_findings_add(&options->findings,
-                        "note: taken as the %s of the two states that were fitted; --scanned says "
-                        "otherwise",
+                        "note: assumed to be the %s of the two fitted states; --scanned changes it",
                         state == 0 ? "fuller" : "emptier");
   }
   if (supine_patient_is_uneven(record)) {

@@ -58,7 +58,10 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   for (size_t i = 0; i < n; ++i) {
     if (names->part[i] >= names->count) {
       supine_command_names_close(names);
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "point %zu of the basis has no name", i);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "point %zu of the basis has no name: make it again "
+                              "with 'supine embed BASIS POINTS.csv'",
+                              i);
     }
   }
   if (!sort_by_name(names, n)) {

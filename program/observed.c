@@ -25,7 +25,8 @@ static supine_status find_vertex(const supine_csv *csv, const char *text,
   }
   if (found > 1) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s, line %zu: '%s' has %zu vertices; observe points, each of one name",
+                            "%s, line %zu: '%s' has %zu vertices, so it is not a point: give "
+                            "names of points",
                             csv->path, csv->line, text, found);
   }
   const char *nearest =
@@ -104,7 +105,7 @@ supine_status supine_command_observed_names(const char *path, const supine_basis
     }
   }
   if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points; give 1 to %d", path, count,
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points: give 1 to %d", path, count,
                             (int)SUPINE_LOCATE_POINTS_MAX);
   }
   list->count = count;

@@ -15,9 +15,9 @@ typedef struct request {
 static const supine_option table[] = {
     {"output", 'o', "FILE", SUPINE_MESH_ENDINGS, SUPINE_FILLS(request, path), .required = true,
      .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
-    {"vertices", 0, "N", "about so many in all, up to 20 million", SUPINE_FILLS(request, vertices),
-     .standard = "20000"},
-    {"volume", 0, "ML", "volume of both lungs together, an adult's at full inflation",
+    {"vertices", 0, "N", "approximate number of vertices of both lungs, up to 20 million",
+     SUPINE_FILLS(request, vertices), .standard = "20000"},
+    {"volume", 0, "ML", "volume of both lungs; the default is an adult's at full inflation",
      SUPINE_FILLS(request, volume), .standard = "6000", .wants = "millilitres"},
     {.name = NULL}};
 
@@ -46,8 +46,8 @@ const supine_command supine_command_phantom = {
     name,
     "make a pair of lungs, at any resolution",
     .usage = "-o FILE [OPTIONS]",
-    .about = "Makes a pair of lungs to try things with: two closed surfaces, smooth, of the shape "
-             "of one adult's, so that no scan is needed.",
+    .about = "Makes synthetic lungs for trials without a scan: two closed, smooth surfaces of "
+             "the shape of an adult's.",
     .options = table,
     .notes = "Example:\n  supine phantom -o lungs.ply --vertices 100000",
     .request_size = sizeof(request),

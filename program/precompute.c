@@ -37,32 +37,35 @@ static int read_modes(const char *command, const char *text, void *field) {
 static const char *const kinds[] = {"vector", "scalar", NULL};
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "basis file (safetensors)", SUPINE_FILLS(request, path),
+    {"output", 'o', "FILE", "basis file to write (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"band", 0, "L", "highest spherical-harmonic band, 0 to 64", SUPINE_FILLS(request, basis.band),
-     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX}},
+     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
+     .more = true},
     {"modes", 0, "K|harmonics",
-     "functions of orientation, and so multiplications per vertex, at run time: the best K of the "
-     "band (fewer where fewer do), or the (L+1)^2 harmonics themselves. The paper's form is --band "
-     "3 --modes harmonics",
+     "number of functions of orientation, and so of multiplications per vertex at run time: "
+     "the best K of the band (or all, where the band has fewer), or its (L+1)^2 harmonics. "
+     "Santhanam 2008 used --band 3 --modes harmonics",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
-     .wants = "1 to 64 or 'harmonics'"},
-    {"held-out", 0, "N", "directions that the error is measured on; default 100 to 1000",
-     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}},
+     .wants = "1 to 64 or 'harmonics'", .more = true},
+    {"held-out", 0, "N",
+     "number of held-out directions on which the error is measured; default: 100 to 1000",
+     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
-     "a person's own law, as 'supine fit' found it, in place of the directions and the force below",
+     "patient's model, made by 'supine fit', instead of --law and its constants",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
-    {.help = "Instead of the built-in physics, fields that another simulator computed:"},
+    {.help = "Instead of the built-in physics, displacements from another simulator:",
+     .more = true},
     {"fields", 0, "LIST",
-     "CSV with the columns gx,gy,gz,file: directions of gravity and the same surface deformed; or "
-     "a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the rest surface. "
-     "The highest band that the directions determine and cross-validation favours is taken, "
-     "unless --band names one",
-     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions"},
+     "CSV with the columns gx,gy,gz,file: directions of gravity and the surface deformed in "
+     "each; or a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the "
+     "reference surface. Without --band, cross-validation chooses the band among those that "
+     "the directions determine",
+     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {"kind", 0, "vector|scalar",
-     "keep three components, or magnitude x best direction, a third of the size, with the loss "
-     "stated",
-     SUPINE_FILLS(request, kind), .choices = kinds, .standard = "vector"},
+     "vector: three components a vertex; scalar: one magnitude along the best direction of "
+     "each vertex, a third of the size; the loss is reported",
+     SUPINE_FILLS(request, kind), .choices = kinds, .standard = "vector", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -85,8 +88,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
                options->band, report->mode_count, options->modes == 0 ? "harmonics" : "modes");
   (void)printf("assumed: %s\n", options->assumed);
-  (void)printf("error against the full solve, on %zu directions that no grid used:\n"
-               "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n",
+  (void)printf("error against the full solve, on %zu held-out directions:\n  %.3g %% RMS, %.3g "
+               "%% 95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, 100.0 * accuracy->relative_rms,
                100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
   if (accuracy->volume > 0.0) {
@@ -94,13 +97,13 @@ static void report_result(const char *path, const supine_lungs *lungs,
                  accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
   }
   if (report->turned_over > turned_over_limit) {
-    (void)printf("the surface looks torn: %.3g %% of its triangles turn over at %s in the worst of "
-                 "six\npostures. %s\n",
+    (void)printf("the surface looks torn: %.3g %% of its triangles turn over at %s in the "
+                 "worst of six\npostures. %s\n",
                  100.0 * report->turned_over, state,
                  options->model.reach == 0.0
-                     ? "The paper's forces spread over a few links, however short they are;\n"
-                       "--reach 10 spreads them over 10 mm and leaves next to none"
-                     : "A longer --reach spreads forces further");
+                     ? "The paper law spreads forces over a few links of any length: give "
+                       "--reach 10"
+                     : "Give a longer --reach");
   }
 }
 
@@ -117,14 +120,14 @@ static void report_fit(const char *path, const supine_fields *fields, const supi
     (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
                  band == fit->band ? "  <- taken" : "");
   }
-  (void)printf("condition of the harmonics at these directions: %.3g\n", fit->condition);
+  (void)printf("condition number of the harmonics at these directions: %.3g\n", fit->condition);
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
-    (void)printf("the error still falls there: detail beyond band %zu is not carried; some %zu\n"
-                 "directions, evenly spread, would reach band %zu\n",
+    (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
+                 "missing: about\n%zu evenly spread directions would determine band %zu\n",
                  highest, 2 * (highest + 2) * (highest + 2), highest + 1);
   }
   if (scalar) {
-    (void)printf("one direction a vertex loses %.3g %% RMS of the displacement\n",
+    (void)printf("keeping one direction per vertex loses %.3g %% RMS of the displacement\n",
                  100.0 * fit->scalar_loss);
   }
   (void)printf("error of the basis, each direction predicted from the others:\n"
@@ -253,7 +256,7 @@ static int check_patient(const request *wanted) {
   for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
     if (brought[i].given) {
       return supine_options_usage(
-          name, "--patient brings its own law and force: leave --%s out%s", brought[i].option,
+          name, "--patient has its own law and force: leave --%s out%s", brought[i].option,
           strcmp(brought[i].option, "gain") == 0 || strcmp(brought[i].option, "reach") == 0
               ? ", or give it to 'supine fit'"
               : "");
@@ -270,7 +273,7 @@ static int run(void *chosen, const supine_arguments *given) {
   static supine_patient_record record; /* some 40 kB */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_options_usage(
-        name, "%s: that is a mesh's name; a basis file ends in .safetensors", wanted->path);
+        name, "%s: this name is a mesh's: give a name that ends in .safetensors", wanted->path);
   }
   int result = wanted->fields != NULL    ? check_fields(wanted->fields, wanted->path)
                : wanted->patient != NULL ? check_patient(wanted)
@@ -297,12 +300,11 @@ const supine_command supine_command_precompute = {
     "turn lung surfaces into a basis file (offline)",
     .usage = "MESH... -o FILE [OPTIONS]\n"
              "LABELS... -o FILE [OPTIONS]",
-    .about =
-        "Solves the physics of one or two lungs for every direction of gravity at once and writes "
-        "a basis file, which 'supine deform' and the run-time library turn into deformed lungs in "
-        "real time. Both lungs may be in one file or in two; any surface that assimp reads will do "
-        "(PLY, OBJ, STL, OFF, ...), or the label map of a segmenter (NRRD, NIfTI). Closed surfaces "
-        "can be asked for exact volumes later.",
+    .about = "Solves the physics of one or two lungs for all directions of gravity and writes a "
+             "basis file, from which 'supine deform' and the run-time library compute deformed "
+             "lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, OFF, ...), "
+             "with both lungs in one file or one lung a file; LABELS is the label map of a "
+             "segmentation (NRRD, NIfTI, MetaImage). Only closed surfaces have a volume.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"

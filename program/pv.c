@@ -148,7 +148,8 @@ static int run_show(const char *path, const request *chosen) {
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
   const double steps = (high - low) / chosen->step;
   if (!(steps < ROWS_MAX)) {
-    return supine_options_usage(command, "--step is too small for this range");
+    return supine_options_usage(command, "--step is too small for this range of pressures: give "
+                                         "a larger one");
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
@@ -166,7 +167,7 @@ static int run(void *chosen, const supine_arguments *given) {
   const char *file = given->count > 1 ? given->operand[1] : NULL;
   if (strcmp(verb, "fit") == 0) {
     return file != NULL ? run_fit(file, chosen)
-                        : supine_options_usage(command, "fit takes one file of samples");
+                        : supine_options_usage(command, "fit takes one file of samples: give one");
   }
   return strcmp(verb, "show") == 0 ? run_show(file, chosen)
                                    : supine_options_usage(command, "fit or show, not '%s'", verb);

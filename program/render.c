@@ -150,7 +150,7 @@ static int read_views(const char *command, const char *text, void *field) {
                                   nearest != NULL ? nearest : "anterior");
     }
     if (wanted->view_count == SUPINE_VIEWS_MAX) {
-      return supine_options_usage(command, "more than %d views", SUPINE_VIEWS_MAX);
+      return supine_options_usage(command, "more than %d views: name fewer", SUPINE_VIEWS_MAX);
     }
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
@@ -169,14 +169,15 @@ static int read_turn(const char *command, const char *text, void *field) {
 static const char *const themes[] = {"light", "dark", NULL};
 
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "up to 8; --postures is the same", SUPINE_FILLS(request, postures),
-     .alias = "postures"},
+    {"posture", 0, "LIST", "postures to draw, up to 8; --postures is the same",
+     SUPINE_FILLS(request, postures), .alias = "postures"},
     {"turn", 0, "FROM:TO:SECONDS",
-     "instead: an animation in which gravity turns from one posture to another at constant speed, "
-     "as supine:left:5s, rests there for a second, and begins again",
+     "draw an animation instead: gravity turns from one posture to another at constant speed, "
+     "as supine:left:5s, rests for a second, and starts again",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "MM", "largest displacement in each posture instead: for open surfaces",
+    {"scale", 0, "MM",
+     "largest displacement in each posture, instead of a volume: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .rivals = "breath"},
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
@@ -190,19 +191,21 @@ static const supine_option table[] = {
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
-     "end of the colour bar; default: what 95 % of the surface does not exceed, rounded up; a "
-     "pointed end says that some values lie beyond",
-     SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0"},
+     "end of the colour bar; default: the 95th percentile over the surface, rounded up; a "
+     "pointed end marks values beyond it",
+     SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
+     .more = true},
     {"inside", 0, "FILE",
-     "what is inside, of 'supine embed' from the same basis, seen through the lungs: points and "
-     "meshes by name, with how far they have moved",
+     "structures from 'supine embed' with the same basis, seen through the lungs: points and "
+     "meshes, with their names and displacements",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"opacity", 0, "SHARE",
-     "of the lungs, 0.05 to 1: whole; below, a grey shell; default 1, with --inside 0.35",
-     SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1"},
+     "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
+     SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1",
+     .more = true},
     {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
-     .standard = "light"},
-    {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title)},
+     .standard = "light", .more = true},
+    {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title), .more = true},
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
@@ -225,7 +228,8 @@ static int check(const request *wanted, supine_posture_list *postures) {
   }
   return postures->count <= SUPINE_PANELS_MAX
              ? SUPINE_EXIT_OK
-             : supine_options_usage(name, "at most %d postures in one picture", SUPINE_PANELS_MAX);
+             : supine_options_usage(name, "a picture holds at most %d postures: name fewer",
+                                    SUPINE_PANELS_MAX);
 }
 
 static void begin(void *chosen) {
@@ -264,18 +268,16 @@ const supine_command supine_command_render = {
     .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about =
-        "Draws the lungs, off screen, in each posture side by side: coloured by displacement, "
-        "with lines at the ticks of the colour bar and a ball that shows the body's axes (left, "
-        "right, anterior, posterior, head, feet) and where gravity points (the arrow; a cross "
-        "points away from you).",
+        "Draws the lungs in each posture, side by side and off screen: coloured by "
+        "displacement, with contour lines at the ticks of the colour bar, and a ball that "
+        "shows the body's axes (left, right, anterior, posterior, head, feet) and gravity (the "
+        "arrow; a cross points away from you).",
     .options = table,
     .notes =
         "Examples:\n"
-        "  supine render lungs.safetensors --posture supine,prone,left,right -o "
-        "postures.png\n"
+        "  supine render lungs.safetensors --posture supine,prone,left,right -o postures.png\n"
         "  supine render lungs.safetensors --turn supine:left:5s -o turn.webp\n"
-        "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone "
-        "\\\n"
+        "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone \\\n"
         "      -o inside.png\n"
         "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
         "      --view anterior,lateral,posterior --theme dark -o prone.png",

@@ -31,18 +31,19 @@ static const supine_option table[] = {
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP, SUPINE_FILLS(request, state),
      .read = supine_options_read_volume, .rivals = "breath"},
     {"scale", 0, "MM",
-     "largest displacement instead, mm; negative: the other way. Default where no rest is known: F "
-     "d as it is, F what a vertex catches of the force, d in mm",
+     "largest displacement instead of a volume, mm; negative: reversed. Default where rest is "
+     "unknown: F d, with F the share of the force on a vertex and d its direction in mm",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
     {"unit-force", 0, "VERTEX",
-     "instead of a posture: the response of every vertex to a unit force on this one (from 0), a "
-     "column of the transfer matrix T, as CSV",
-     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex"},
+     "instead of a posture: write as CSV the response of every vertex to a unit force on this "
+     "one (numbered from 0), a column of the transfer matrix T",
+     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex",
+     .more = true},
     {"pitcher-catcher", 0, NULL,
-     "iterates as the paper does, always from the node that holds most, prints what is still held "
-     "and how far the result is from the direct solve; slow, for small meshes. Needs --law paper",
-     SUPINE_FILLS(request, pitcher_catcher)},
+     "iterate as Santhanam 2008 does, always from the node with the largest remaining force; print "
+     "that force and the distance from the direct solve. Slow: for small meshes. Needs --law paper",
+     SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
@@ -132,9 +133,10 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   if (wanted->has_scale) {
     const double largest = supine_physics_solution_largest(solution);
     fill(gains, wanted->scale / largest);
-    return largest > 0.0
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "nothing moves in this direction");
+    return largest > 0.0 ? SUPINE_OK
+                         : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                            "nothing moves in this direction of gravity: give "
+                                            "another, or another --law");
   }
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
@@ -151,8 +153,8 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
         volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
             ? supine_volume_scale(solution->cubic, volume->ml - held, &scale, error)
             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                               "rest and full are unknown of a scan taken as it is: give scan+ML "
-                               "or an absolute volume, as 2600mL");
+                               "rest and full are unknown for a scan taken as it is (--scanned "
+                               "none): give scan+ML or an absolute volume, as 2600mL");
     fill(gains, scale);
     return status;
   }
@@ -192,7 +194,7 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   supine_status status = SUPINE_OK;
   if (model->reach > 0.0 || model->lesions != NULL) {
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--pitcher-catcher is the paper's transfer over links, without "
+                              "--pitcher-catcher computes the transfer over links, without "
                               "lesions: give --law paper and leave --reach and --lesion out");
   } else if (force == NULL || caught == NULL ||
              supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=
@@ -307,7 +309,8 @@ static int run(void *chosen, const supine_arguments *given) {
   }
   if (result == SUPINE_EXIT_OK && wanted->as_scanned &&
       wanted->model.made_from.frame.millimetres_per_unit == 0.0) {
-    supine_options_say(name, "--as-scanned: the surfaces came in different axes");
+    supine_options_say(name, "--as-scanned needs surfaces in the same axes and units: convert "
+                             "them, or leave it out");
     result = SUPINE_EXIT_INPUT;
   }
   if (result == SUPINE_EXIT_OK) {
@@ -324,8 +327,8 @@ const supine_command supine_command_solve = {
     "full physics for one posture: the reference",
     .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
              "LABELS... --posture NAME -o FILE [OPTIONS]",
-    .about = "Runs the full physics for one direction of gravity, without any harmonics, and "
-             "writes the deformed surface: the reference that a basis is measured against.",
+    .about = "Solves the full physics for one direction of gravity, without harmonics, and "
+             "writes the deformed surface: the reference against which a basis is measured.",
     .options = table,
     .notes = "Examples:\n"
              "  supine solve left.ply right.ply --posture prone --volume rest+500 -o prone.vtp\n"

@@ -44,76 +44,78 @@ static const supine_option table[] = {
      "waits for peers there; a port alone is reached from this machine only; 0: any that is free. "
      "18944, the protocol's own, unless --connect is given",
      SUPINE_FILLS(request, listen)},
-    {"connect", 0, "HOST:PORT", "goes to a peer that waits: a tracker's server, 3D Slicer",
+    {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
      SUPINE_FILLS(request, connect)},
-    {"device", 0, "NAME", "whose poses are followed; default: any", SUPINE_FILLS(request, device)},
+    {"device", 0, "NAME", "device whose poses are followed; default: any",
+     SUPINE_FILLS(request, device)},
     {.help = "Where gravity points:"},
-    {"world-down", 0, "X,Y,Z", "where things fall, in the tracker's world",
-     SUPINE_FILLS(request, down), .standard = "0,0,-1"},
+    {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
+     SUPINE_FILLS(request, down), .standard = "0,0,-1", .more = true},
     {"body-from-tracker", 0, "W,X,Y,Z",
-     "the rotation from the tracked marker's axes to the body's (left, back, head), as a "
-     "quaternion; 0,0,0,1 where the marker's are right, front, head",
-     SUPINE_FILLS(request, body), .standard = "1,0,0,0"},
-    {"smooth", 0, "MS", "steadies a trembling tracker; a turning body is shown so much later",
-     SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms"},
-    {.help = "Points inside the lungs that are observed, as by 'supine locate':"},
+     "rotation from the marker's axes to the body's (left, back, head), as a quaternion; "
+     "0,0,0,1 where the marker's axes are right, front, head",
+     SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
+    {"smooth", 0, "MS",
+     "time constant of smoothing, for a noisy tracker; a turning body is shown later by as much",
+     SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
+     .more = true},
+    {.help = "Observed points inside the lungs, as in 'supine locate':"},
     {"points", 0, "FILE",
-     "where the scan has them, made by 'supine embed BASIS'. A TRANSFORM whose device is a point's "
-     "name, or a POINT list, says where they are, in the axes of --space; from then on surfaces "
-     "and points are sent where the points show them, with the attribute expected_error_mm. The "
-     "volume is found too unless --volume or a message fixes it",
+     "the points in the scan, made by 'supine embed BASIS'. Their observed positions come as a "
+     "TRANSFORM with the point's name as its device, or as a POINT list, in the axes of "
+     "--space. From then on surfaces and points are sent in the frame of the observations, "
+     "with the attribute expected_error_mm. The volume is also determined, unless --volume or "
+     "a message fixes it",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
-     .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
-    {.help = "How full the lungs are:"},
+     .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres", .more = true},
+    {.help = "Volume and breathing:"},
     {"volume", 0, "VOLUME",
-     "instead of breathing, always: " SUPINE_VOLUME_HELP
-     ". A STRING of device VOLUME sets it too, and an NDARRAY of one number, mL above rest",
+     "fixed volume, instead of breathing: " SUPINE_VOLUME_HELP
+     ". A STRING of device VOLUME also sets it, as does an NDARRAY of one number, mL above rest",
      SUPINE_FILLS(request, volume), .read = supine_options_read_volume,
      SUPINE_SAYS_GIVEN(request, has_volume)},
-    {"tidal", 0, "ML", "air of a breath; default 500", SUPINE_FILLS(request, breath.tidal),
+    {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, breath.tidal),
      SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
     {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
-     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
-    {.help = "What is sent:"},
+     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
+    {.help = "Output:"},
     {"send", 0, "WHAT",
-     "to peers that have not chosen: weights, an NDARRAY of the K weights and each lung's three "
-     "gains; "
-     "surface, a POLYDATA of points and strips of triangles; points, one whose triangles come "
-     "once. A "
-     "peer chooses by a STRING of "
-     "device SEND that says one of these words",
+     "what peers receive unless they choose: weights, an NDARRAY of the K weights and the "
+     "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
+     "POLYDATA whose triangles are sent once. A peer chooses with a STRING of device SEND that "
+     "holds one of these words",
      SUPINE_FILLS(request, send), .choices = sends, .standard = "weights"},
-    {"space", 0, "NAME", "of the points: lps (left, back, head), or ras as 3D Slicer has them",
+    {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
-    {"name", 0, "NAME", "device name of what is sent", SUPINE_FILLS(request, called),
-     .standard = "SUPINE"},
-    {"fps", 0, "N", "most frames a second", SUPINE_FILLS(request, fps), .range = {1.0, 1000.0},
-     .standard = "200"},
-    {"peers", 0, "N", "most peers, and most viewers of the page, at a time",
-     SUPINE_FILLS(request, peers), .range = {1.0, 1000.0}, .standard = "64"},
-    {.help = "A page that follows:"},
+    {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, called),
+     .standard = "SUPINE", .more = true},
+    {"fps", 0, "N", "largest number of frames a second", SUPINE_FILLS(request, fps),
+     .range = {1.0, 1000.0}, .standard = "200", .more = true},
+    {"peers", 0, "N", "largest number of peers, and of viewers of the page, at a time",
+     SUPINE_FILLS(request, peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
+    {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
-     "serves the basis as a page that shows each moment, to any number of viewers; a phone that "
-     "looks at it may send its own tilt. A port alone is reached from this machine only",
+     "serve a page that shows the lungs live, to any number of viewers; a phone that shows it "
+     "can send its own tilt. A port without an address is reached from this machine only",
      SUPINE_FILLS(request, web)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
-     "and --key: serves it encrypted; browsers ask for that before they give a phone's tilt to "
-     "another machine",
-     SUPINE_FILLS(request, certificate), .file = SUPINE_FILE_IN},
+     "certificate, with --key, to serve the page encrypted, which browsers require before they "
+     "send a phone's tilt to another machine",
+     SUPINE_FILLS(request, certificate), .file = SUPINE_FILE_IN, .more = true},
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
-     .file = SUPINE_FILE_IN},
-    {.help = "Poses kept:"},
-    {"record", 0, "POSES.csv", "writes each pose that was followed, when it ends",
+     .file = SUPINE_FILE_IN, .more = true},
+    {.help = "Recording:"},
+    {"record", 0, "POSES.csv", "write the poses followed, at the end of the run",
      SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
     {"replay", 0, "POSES.csv",
-     "follows these, from when the first peer or viewer is there, and ends",
+     "follow recorded poses instead, from the first peer or viewer on, then stop",
      SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
-    {"seconds", 0, "S", "how long it runs; default: until it is interrupted",
-     SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {"seconds", 0, "S", "duration; default: until interrupted", SUPINE_FILLS(request, seconds),
+     SUPINE_ABOVE_ZERO, .more = true},
     {.name = NULL}};
 
 static void begin(void *chosen) {
@@ -177,7 +179,7 @@ static void report(const supine_stream_server *server, const request *wanted) {
     }
   }
   if (wanted->smooth > 0.0) {
-    (void)printf("smoothing shows a steady turn %.0f ms later on top of that\n", wanted->smooth);
+    (void)printf("smoothing shows a steady turn %.0f ms later in addition\n", wanted->smooth);
   }
 }
 
@@ -344,13 +346,14 @@ static int run(void *chosen, const supine_arguments *given) {
     options.listen = "18944";
   }
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
-    return supine_options_usage(name, "--certificate and --key belong together");
+    return supine_options_usage(name, "give --certificate and --key together");
   }
   const double size = sqrt(wanted->body[0] * wanted->body[0] + wanted->body[1] * wanted->body[1] +
                            wanted->body[2] * wanted->body[2] + wanted->body[3] * wanted->body[3]);
   if (!(size > 1e-6) || supine_stream_gravity_down(&options.setup, wanted->down, options.setup.down,
                                                    &why) != SUPINE_STREAM_EXACT) {
-    return supine_options_usage(name, "--world-down and --body-from-tracker must not be zero");
+    return supine_options_usage(name, "--world-down or --body-from-tracker is zero: give a "
+                                      "direction and a rotation, as 0,0,-1 and 1,0,0,0");
   }
   const double unit[4] = {wanted->body[0] / size, wanted->body[1] / size, wanted->body[2] / size,
                           wanted->body[3] / size};
@@ -383,9 +386,8 @@ const supine_command supine_command_stream = {
         "any number of peers, by OpenIGTLink (headers of version 1 and 2). Poses are TRANSFORM, "
         "QTDATA or POSITION messages, or a tilt sensor's: an NDARRAY [3], where things fall, or a "
         "SENSOR [3], an accelerometer at rest. The newest pose wins: nothing queues, and a slow "
-        "peer "
-        "misses frames instead of holding up the others. In the end it says how long it took from "
-        "pose received to frame sent.",
+        "peer misses frames instead of holding up the others. In the end it says how long it took "
+        "from pose received to frame sent.",
     .options = table,
     .notes =
         "Examples:\n"

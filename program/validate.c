@@ -283,10 +283,10 @@ static int run(void *chosen, const supine_arguments *given) {
   supine_error error;
   int result = SUPINE_EXIT_OK;
   if (wanted->count == 0 && wanted->landmarks.path == NULL) {
-    return supine_options_usage(name, "against what? Name --state or --landmarks");
+    return supine_options_usage(name, "nothing to compare with: give --state or --landmarks");
   }
   if (wanted->path != NULL && wanted->count == 0) {
-    return supine_options_usage(name, "-o shows the way to a --state: name one");
+    return supine_options_usage(name, "-o draws the error against a --state: give one");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
     result = supine_options_check_output(name, wanted->path, wanted->state[i].path);
@@ -296,8 +296,8 @@ static int run(void *chosen, const supine_arguments *given) {
   }
   if (supine_text_ends_in(path, ".json")) {
     return supine_options_usage(name,
-                                "%s is a law without a surface: make a basis of it first, by "
-                                "'supine precompute --patient'",
+                                "%s is a patient model without a surface: make a basis from it "
+                                "first with 'supine precompute --patient'",
                                 path);
   }
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID

@@ -117,8 +117,8 @@ static supine_status find_gains(const supine_command_subject *s, const supine_co
     supine_pose_fill(&outcome->pose, state->scale);
   } else if (!outcome->has_millilitres) {
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "how full is the other state? Landmarks do not tell: --volume, or "
-                              "--scale");
+                              "the volume of the other state is unknown, and landmarks do not "
+                              "give it: give --volume, or --scale");
   } else {
     status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
   }
@@ -301,8 +301,8 @@ static supine_status check_points(const supine_command_subject *s,
   return 2 * outside <= pairs->count
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%zu of %zu landmarks lie outside of the basis's box: another "
-                                "frame, unit or person; or --reverse",
+                                "%zu of %zu landmarks lie outside the basis's bounding box: "
+                                "check their frame, unit and person, or give --reverse",
                                 outside, pairs->count);
 }
 

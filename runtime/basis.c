@@ -80,7 +80,8 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *version = supine_safetensors_metadata(c->file, "version");
   const char *kind = supine_safetensors_metadata(c->file, "kind");
   if (format == NULL || strcmp(format, "supine-basis") != 0) {
-    return refuse(c, "a safetensors file, but not a Supine basis: make one with supine precompute");
+    return refuse(c, "a safetensors file, but not a Supine basis: make one with 'supine "
+                     "precompute'");
   }
   if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
     return refuse(c, "basis version %.16s; this program reads versions 1 to 3",
@@ -88,7 +89,7 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
-    return refuse(c, "its kind is neither scalar nor vector");
+    return refuse(c, "the kind in the file is neither scalar nor vector");
   }
   info->vector = strcmp(kind, "vector") == 0;
   return supine_safetensors_verify(c->file, c->error);
@@ -428,7 +429,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   supine_simd simd = options->simd;
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
-    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "no such storage or code: %d, %d",
+    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "unknown storage or code: %d, %d",
                             (int)storage, (int)simd);
   }
   basis->kernels = supine_kernels_choose(&simd);

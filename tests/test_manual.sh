@@ -13,9 +13,9 @@ fail() {
 commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
 
-# Every option of --help is in the command's page and both completions.
+# Every option of --help-all is in the command's page and both completions.
 for command in $commands; do
-  for option in $("$supine" "$command" --help | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
+  for option in $("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
     sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
     grep -A60 "^  $command)$" _supine | sed '/;;/q' | grep -q -- "$option" || fail "_supine: $command $option"
   done

@@ -38,7 +38,7 @@ refused() {
   for name in "input$ending" "./input$ending" "hard$ending" "soft$ending" "$work/input$ending"; do
     "$supine" "$@" -o "$name" >said 2>&1
     code=$?
-    [ $code -eq 1 ] && grep -q 'must not replace an input' said || fail "$* -o $name: $code, $(cat said)"
+    [ $code -eq 1 ] && grep -q 'is also an input' said || fail "$* -o $name: $code, $(cat said)"
     cmp -s "before$ending" "input$ending" || fail "$* -o $name: the input is not what it was"
   done
   rm -f "before$ending" "input$ending" "hard$ending" "soft$ending"
@@ -68,7 +68,7 @@ cmp -s lungs.safetensors same.csv || fail "compare --csv replaced its basis"
 cp lungs.ply field.safetensors
 printf 'gx,gy,gz,file\n0,1,0,lungs.ply\n0,-1,0,field.safetensors\n' >fields.csv
 "$supine" precompute rest.ply --fields fields.csv -o field.safetensors >said 2>&1
-grep -q 'must not replace an input' said || fail "a field of --fields as output: $(cat said)"
+grep -q 'is also an input' said || fail "a field of --fields as output: $(cat said)"
 cmp -s lungs.ply field.safetensors || fail "a field of --fields was replaced"
 "$supine" precompute lungs.ply -o basis.stl >said 2>&1
 [ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"

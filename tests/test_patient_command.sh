@@ -119,7 +119,7 @@ grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning
   >fit.txt || fail "fit volumes alone"
 "$supine" precompute p_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
   fail "an emptier scan of unknown state"
-grep -q 'or take the fuller scan' out || fail "emptier scan: $(cat out)"
+grep -q 'or use the fuller scan' out || fail "emptier scan: $(cat out)"
 "$supine" precompute q_supine_full.ply --patient known.json -o known.safetensors >out 2>&1 ||
   fail "precompute volumes alone: $(cat out)"
 for volume in rest full; do
@@ -144,7 +144,7 @@ grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain 
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   >fit.txt || fail "fit a lesion"
-grep -q 'kept; nine tenths of what is seen' fit.txt || fail "no expandability kept"
+grep -q 'kept; 90 % of the determined tissue' fit.txt || fail "no expandability kept"
 grep -q 'least expandable: left lung' fit.txt || fail "not told: $(cat fit.txt)"
 grep -q 'not seen: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
 grep -q 'correlation with height along gravity \(0.99\|1.00\);.* leaves [0-3] %' fit.txt || # what was made
@@ -236,15 +236,15 @@ refused() { # CODE WORDS COMMAND...
   [ $got -eq "$code" ] || fail "exit code $got of $*: $(cat out)"
   grep -q -- "$words" out || fail "'$words' is not in: $(cat out)"
 }
-refused 1 'against what' validate points.safetensors
-refused 1 'make a basis of it first' validate points.json --landmarks full.csv
-refused 1 'Landmarks do not tell' validate points.safetensors --landmarks full.csv
-refused 1 'what to fit to' fit rest.ply
-refused 1 'tell the gain' fit --landmarks full.csv --gain 0.3 --state prone:rest:prone.csv
+refused 1 'nothing to compare with' validate points.safetensors
+refused 1 'make a basis from it first' validate points.json --landmarks full.csv
+refused 1 'landmarks do not give it' validate points.safetensors --landmarks full.csv
+refused 1 'nothing to fit to' fit rest.ply
+refused 1 'determine the gain' fit --landmarks full.csv --gain 0.3 --state prone:rest:prone.csv
 refused 1 'name that of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
-refused 2 'the wrong way round' fit p_supine_full.ply p_supine_rest.ply --other supine:full
-refused 2 'the wrong way round' fit --landmarks empty.csv --other supine:full
+refused 2 'exchange --rest and --other' fit p_supine_full.ply p_supine_rest.ply --other supine:full
+refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine:full
 refused 2 'the same as the one at rest' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--direction normal' '--reach 10'; do
@@ -253,14 +253,14 @@ for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--consta
 done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
   --expandability linear:z:0.5:1.5 -o x.safetensors
-refused 1 'is of surfaces' fit --landmarks full.csv --expandability
-refused 1 "goes with the paper's law" fit rest.ply stiff.ply --law deep --expandability
+refused 1 'needs surfaces' fit --landmarks full.csv --expandability
+refused 1 "uses the paper law" fit rest.ply stiff.ply --law deep --expandability
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
   full.csv >far.csv
 "$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
 refused 2 'another frame, unit or person' precompute p.ply --patient far.json -o x.safetensors
-refused 2 'another frame, unit or person' validate points.safetensors --volume full --landmarks far.csv
+refused 2 'check their frame, unit and person' validate points.safetensors --volume full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"
 echo passed

@@ -80,7 +80,7 @@ refused 2 'no pairs of points' --landmarks none.csv
 sed '1s/,to_z//' good.csv >header.csv
 refused 2 'no column "to_z"' --landmarks header.csv
 refused 2 'No such file' --landmarks absent.csv
-refused 1 'what to fit to' --name nobody
+refused 1 'nothing to fit to' --name nobody
 refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
 
 # Surfaces: a made lung of each side, and what breathing makes of it.
@@ -126,7 +126,7 @@ sed '5s/[-0-9.e]*$/nan/' state.obj >broken.obj
 refused 2 'broken.obj' rest.obj broken.obj
 refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
-refused 1 'two lungs at most' rest.obj,other.obj,state.obj state.obj
+refused 1 'more than two lungs' rest.obj,other.obj,state.obj state.obj
 refused 1 'name that of the first scan as well' --state prone:state.obj
 refused 2 'find a further state' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj

@@ -100,14 +100,14 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(1, "rest+500", "deform lungs.safetensors --posture left --volume 500 -o b.ply");
   EXPECT(1, "not both",
          "deform lungs.safetensors --posture left --volume scan+3 --scale 4 -o b.ply");
-  EXPECT(5, "lungs hold 10 to 120 %",
+  EXPECT(5, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
-  EXPECT(5, "lungs hold 10 to 120 %",
+  EXPECT(5, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume full+1300 -o b.ply");
   EXPECT(1, "name them all", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
-  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL): lungs hold 10 to 120 %",
+  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL): outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
   EXPECT(5, "left: 7915 mL are 132 % of", /* at the breath's end */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
@@ -119,7 +119,7 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
          "-o a.safetensors");
   EXPECT(0, "7915 mL are 132 % of",
          "compare lungs.safetensors --postures left --breath 5000 --allow-folds");
-  EXPECT(0, "lungs hold 10 to 120 %",
+  EXPECT(0, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
@@ -211,9 +211,10 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   assert_true(take_file("breath.vtp", text, sizeof text) >
               0); /* one file or many: the same arrays */
   assert_non_null(strstr(text, "Name=\"displacement_magnitude\""));
-  EXPECT(1, "is for a series",
+  EXPECT(1, "is for VTP files",
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
-  EXPECT(2, "came in different axes", "solve ras.ply low.obj --posture left --as-scanned -o b.ply");
+  EXPECT(2, "the same axes and units",
+         "solve ras.ply low.obj --posture left --as-scanned -o b.ply");
   EXPECT(1, "full-2000", "precompute low.ply --scanned supine:-2000 -o b.safetensors");
   EXPECT(1, "beyond full", "precompute low.ply --scanned full+200 -o b.safetensors");
   EXPECT(1, "mesh has its volume", "precompute low.ply --scanned 4000mL -o b.safetensors");
@@ -232,8 +233,8 @@ static void test_scanned_state_and_frame_come_back(void **state) {
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
   EXPECT(0, "deep law; scan supine at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
-  EXPECT(1, "'deep', the default", "precompute low.ply --law tidal -o b.safetensors");
-  EXPECT(1, "'deep', the default", "precompute low.ply --law cohort -o b.safetensors");
+  EXPECT(1, "default law 'deep'", "precompute low.ply --law tidal -o b.safetensors");
+  EXPECT(1, "default law 'deep'", "precompute low.ply --law cohort -o b.safetensors");
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
          "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
@@ -254,7 +255,7 @@ static void test_orientation_bad_values_refused(void **state) {
   EXPECT(1, "four finite numbers", "deform lungs.safetensors --quaternion 0,0,0,0 -o c.ply");
   EXPECT(1, "degrees", "deform lungs.safetensors --posture supine --tilt up -o c.ply");
   EXPECT(1, "give one of", "deform lungs.safetensors --posture supine --gravity 0,1,0 -o c.ply");
-  EXPECT(1, "where does gravity point", "deform lungs.safetensors -o c.ply");
+  EXPECT(1, "the direction of gravity is missing", "deform lungs.safetensors -o c.ply");
   assert_int_equal(count_files("c."), 0);
   EXPECT(0, "note: gravity has length 5", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
 }

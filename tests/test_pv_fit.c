@@ -320,7 +320,7 @@ static void test_fit_bad_samples_name_the_line(void **state) {
   for (size_t count = 8; count <= SAMPLES; count += 25) { /* few and many */
     model_sample(count, p, v);
     p[5] = p[4];
-    expect_format(count, p, v, "s.csv:105", "repeats the pressure");
+    expect_format(count, p, v, "s.csv:105", "repeats the one before");
     model_sample(count, p, v);
     p[5] = p[3];
     expect_format(count, p, v, "s.csv:105", "turns back");

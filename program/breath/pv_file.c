@@ -20,8 +20,8 @@ static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_l
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s:%zu: limb \"%s\" is neither inhale nor exhale", csv->path, csv->line,
-                          text);
+                          "%s:%zu: limb \"%s\" is unknown: give inhale or exhale", csv->path,
+                          csv->line, text);
 }
 
 static supine_status grow(void **array, size_t count, size_t size) {
@@ -201,8 +201,8 @@ static supine_status parameters_add(const supine_csv *csv, supine_pv *pv, bool *
     return status;
   }
   if (seen[limb]) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a second row for %s", csv->path,
-                            csv->line, supine_breath_limb_name(limb));
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a second row for %s: keep one",
+                            csv->path, csv->line, supine_breath_limb_name(limb));
   }
   seen[limb] = true;
   supine_pv_curve *curve = &pv->limb[limb];
@@ -234,7 +234,8 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
     return status;
   }
   if (!seen[SUPINE_PV_INHALE] && !seen[SUPINE_PV_EXHALE]) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no row of parameters", path);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: no row of parameters: make the file with 'supine pv fit'", path);
   }
   if (!seen[SUPINE_PV_INHALE]) {
     found.limb[SUPINE_PV_INHALE] = found.limb[SUPINE_PV_EXHALE];

@@ -139,7 +139,9 @@ supine_status supine_breath_fit(size_t count, const double *pressures, const dou
   static const double allowed_share = 0.15;
   static const double allowed_sigmas = 7.0;
   if (!(confidence > 0.0 && confidence < 1.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "confidence %g is not between 0 and 1",
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "confidence %g is not between 0 and 1: give "
+                            "--confidence 0.95, for example",
                             confidence);
   }
   const pv_origin origin = {name, lines, count, pressures, volumes};
@@ -171,7 +173,8 @@ supine_status supine_breath_fit(size_t count, const double *pressures, const dou
     (void)supine_error_set(error, status, "%s: %s", name != NULL ? name : "samples",
                            status == SUPINE_ERROR_MEMORY
                                ? "out of memory"
-                               : "no pressure-volume curve fits; look for a sample out of place");
+                               : "no pressure-volume curve fits: look for an outlier and "
+                                 "remove it");
     goto cleanup;
   }
   if (count >= TELLING) {

@@ -30,19 +30,20 @@ supine_status supine_breath_samples_check(const pv_origin *origin, supine_error 
   if (origin->count <= SUPINE_PV_UNKNOWNS) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: %zu samples in a limb; a fit has %d unknowns and needs at least %d", name,
+        "%s: %zu samples in a limb are too few for %d unknowns: give at least %d", name,
         origin->count, (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
   }
   const double *p = origin->pressures;
   for (size_t j = 0; j < origin->count; ++j) {
     if (!isfinite(p[j]) || !isfinite(origin->volumes[j])) {
-      return sample_fail(origin, j, error, "pressure or volume is not finite");
+      return sample_fail(origin, j, error, "pressure or volume is not finite: remove the sample");
     }
   }
   for (size_t j = 1; j < origin->count; ++j) {
     if (p[j] == p[j - 1]) {
       return sample_fail(origin, j, error,
-                         "repeats the pressure before it: keep one of the samples, or their mean");
+                         "the pressure repeats the one before: keep one of the samples, or "
+                         "their mean");
     }
     if ((p[j] > p[j - 1]) != (p[1] > p[0])) {
       return sample_fail(origin, j, error,

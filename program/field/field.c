@@ -19,8 +19,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   const supine_tensor *deep = supine_basis_tensor(basis, "depth");
   if (grid == NULL || size == NULL || of == NULL || deep == NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis is of no grid: make one with 'supine embed BASIS --grid MM' "
-                            "or 'supine embed BASIS IMAGE'");
+                            "the basis holds no grid: make one with 'supine embed BASIS --grid "
+                            "MM' or 'supine embed BASIS IMAGE'");
   }
   bool well = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
               grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
@@ -47,7 +47,9 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
     supine_image_locate(nodes, axes, axes); /* not finite where the steps are no frame */
   }
   if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "the basis's grid is malformed");
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the grid in the basis is malformed: make it again "
+                            "with 'supine embed'");
   }
   *part = of->data;
   *depth = deep->data;

@@ -7,7 +7,7 @@
 
 const supine_option supine_options_as_scanned[] = {
     {"as-scanned", 0, NULL,
-     "in the axes and units that the scan came in, to lie on top of it; default LPS and mm",
+     "write in the axes and units of the scan, to overlay it; default LPS and mm",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
@@ -28,7 +28,8 @@ int supine_options_basis_frame(const supine_basis *basis, const char *command, b
   if (axes == NULL || unit == NULL ||
       !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
       !(save->millimetres_per_unit > 0.0) || !supine_mesh_axes_parse(axes, &save->axes)) {
-    supine_options_say(command, "the file does not say in which axes and units its scan came");
+    supine_options_say(command, "the basis does not state the axes and units of its scan: "
+                                "leave --as-scanned out, or make the basis again from the scan");
     return SUPINE_EXIT_INPUT;
   }
   return SUPINE_EXIT_OK;

@@ -61,10 +61,21 @@ static void help_text(const supine_option *option, char *text, size_t size) {
                  option->standard != NULL ? option->standard : "");
 }
 
+typedef struct printing {
+  FILE *file;
+  bool all;
+  size_t hidden; /* options that --help-all adds */
+} printing;
+
 static void print_row(void *context, const supine_option *option, size_t base) {
-  FILE *file = context;
+  printing *p = context;
+  FILE *file = p->file;
   char text[2048];
   (void)base;
+  if (option->more && !p->all) {
+    p->hidden += option->name != NULL;
+    return;
+  }
   if (option->name == NULL) {
     (void)fputc('\n', file);
     print_text(option->help, 0, 0, file);
@@ -80,7 +91,8 @@ static void print_row(void *context, const supine_option *option, size_t base) {
   print_text(text, TEXT_COLUMN, TEXT_COLUMN, file);
 }
 
-void supine_options_print_help(const supine_command *command, FILE *file) {
+void supine_options_print_help(const supine_command *command, bool all, FILE *file) {
+  printing p = {file, all, 0};
   const char *lead = "Usage:";
   for (const char *usage = command->usage; *usage != '\0'; lead = "      ") {
     const size_t length = strcspn(usage, "\n");
@@ -90,7 +102,11 @@ void supine_options_print_help(const supine_command *command, FILE *file) {
   (void)fputc('\n', file);
   print_text(command->about, 0, 0, file);
   (void)fputc('\n', file);
-  supine_options_visit(command->options, 0, print_row, file);
+  supine_options_visit(command->options, 0, print_row, &p);
+  if (p.hidden > 0) {
+    (void)fprintf(file, "\nMore: %zu further options, shown by 'supine %s --help-all'.\n", p.hidden,
+                  command->name);
+  }
   if (command->notes != NULL) {
     (void)fputc('\n', file);
     print_text(command->notes, 0, 0, file);

@@ -10,7 +10,7 @@
 
 #include "program/options/command.h"
 
-enum { ROWS_MAX = 64, FIRST_LONG = 256 }; /* long options are FIRST_LONG + row */
+enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* long options are FIRST_LONG + row */
 
 typedef struct row {
   const supine_option *option;
@@ -183,11 +183,12 @@ static int say_unknown(const reading *r, int result, const char *given) {
              : supine_options_usage(r->command->name, "no option '%s'", given);
 }
 
-enum { HELP_WANTED = -2 };
+enum { HELP_WANTED = -2, HELP_ALL_WANTED = -3 };
 
-/* Reads argv into the request; SUPINE_EXIT_OK, HELP_WANTED or an exit code after a message. */
+/* Reads argv into the request; SUPINE_EXIT_OK, HELP_WANTED, HELP_ALL_WANTED or an exit code
+ * after a message. */
 static int read_options(reading *r, int argc, char **argv) {
-  struct option names[2 * ROWS_MAX + 2] = {{0}};
+  struct option names[2 * ROWS_MAX + 3] = {{0}};
   char letters[2 * ROWS_MAX + 4] = ":h";
   size_t n = 0;
   for (size_t i = 0; i < r->count; ++i) {
@@ -202,13 +203,14 @@ static int read_options(reading *r, int argc, char **argv) {
       (void)strcat(letters, letter);
     }
   }
-  names[n] = (struct option){"help", no_argument, NULL, 'h'};
+  names[n++] = (struct option){"help", no_argument, NULL, 'h'};
+  names[n] = (struct option){"help-all", no_argument, NULL, HELP_ALL};
   optind = 0; /* begin anew; options and operands in any order */
   opterr = 0;
   for (int got; (got = getopt_long(argc, argv, letters, names, NULL)) != -1;) {
     size_t i = got >= FIRST_LONG ? (size_t)(got - FIRST_LONG) : 0;
-    if (got == 'h') {
-      return HELP_WANTED;
+    if (got == 'h' || got == HELP_ALL) {
+      return got == 'h' ? HELP_WANTED : HELP_ALL_WANTED;
     }
     if (got == '?' || got == ':') {
       return say_unknown(r, got, argv[optind - 1]);
@@ -242,7 +244,7 @@ static bool has_ending(const char *path, const char *endings) {
 static int check_given(const reading *r, size_t operands, char **argv) {
   const supine_command *command = r->command;
   if (operands > command->operands_most && command->operands_most == 0) {
-    return supine_options_usage(command->name, "no argument '%s' is expected", argv[optind]);
+    return supine_options_usage(command->name, "unexpected argument '%s': remove it", argv[optind]);
   }
   if (operands < command->operands_least || operands > command->operands_most) {
     return supine_options_usage(command->name, "%s", command->operands_missing);
@@ -271,7 +273,8 @@ int supine_options_check_output(const char *command, const char *output, const c
   struct stat read;
   const bool same = stat(output, &old) == 0 && stat(input, &read) == 0 && S_ISREG(old.st_mode) &&
                     old.st_dev == read.st_dev && old.st_ino == read.st_ino;
-  return same ? supine_options_usage(command, "%s: an output must not replace an input (%s)",
+  return same ? supine_options_usage(command,
+                                     "%s: this output is also an input (%s): choose another name",
                                      output, input)
               : SUPINE_EXIT_OK;
 }
@@ -291,8 +294,9 @@ static int check_output(const reading *r, const row *output, const supine_argume
     if (other->option->file == SUPINE_FILE_IN) {
       result = supine_options_check_output(name, output->value, other->value);
     } else if (other < output && strcmp(output->value, other->value) == 0) {
-      result = supine_options_usage(name, "--%s and --%s name the same file", other->option->name,
-                                    output->option->name);
+      result =
+          supine_options_usage(name, "--%s and --%s name the same file: give them different names",
+                               other->option->name, output->option->name);
     }
   }
   supine_error error;
@@ -313,7 +317,8 @@ static int check_outputs(const reading *r, const supine_arguments *given) {
   for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
     if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
         supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard()) {
-      result = supine_options_usage(r->command->name, "standard output is closed");
+      result = supine_options_usage(r->command->name,
+                                    "standard output is closed: give a file instead of -");
     }
   }
   return result;
@@ -340,8 +345,8 @@ int supine_options_run(const supine_command *command, int argc, char **argv) {
   if (result == SUPINE_EXIT_OK) {
     result = read_options(&r, argc, argv);
   }
-  if (result == HELP_WANTED) {
-    supine_options_print_help(command, stdout);
+  if (result == HELP_WANTED || result == HELP_ALL_WANTED) {
+    supine_options_print_help(command, result == HELP_ALL_WANTED, stdout);
     result = supine_options_finish(command->name);
   } else if (result == SUPINE_EXIT_OK) {
     const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};

@@ -75,6 +75,7 @@ typedef struct supine_option {
   const char *alias;          /* another long name, not shown */
   const char *rivals;         /* of options with the same word here one at most is given, once */
   bool required;
+  bool more; /* shown by --help-all, not by --help */
   supine_option_file file;
   const char *endings;               /* that a file's name must have one of: ".ply, .obj or .stl" */
   const struct supine_option *table; /* a shared table; its fields count from `offset` */
@@ -137,6 +138,7 @@ typedef void supine_option_visit(void *context, const supine_option *option, siz
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-void supine_options_print_help(const supine_command *command, FILE *file);
+/* Prints the help of a command: every option for --help-all, else those without `more`. */
+void supine_options_print_help(const supine_command *command, bool all, FILE *file);
 
 #endif

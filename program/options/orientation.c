@@ -41,10 +41,11 @@ static int read_gravity(const char *command, const char *value, void *field) {
   }
   const double length = make_unit(field);
   if (length == 0.0) {
-    return supine_options_usage(command, "gravity 0,0,0 has no direction; supine is 0,1,0");
+    return supine_options_usage(command, "gravity 0,0,0 has no direction: give one, as 0,1,0 "
+                                         "for supine");
   }
   if (fabs(length - 1.0) > 1e-6) {
-    supine_options_say(command, "note: gravity has length %g; only its direction counts", length);
+    supine_options_say(command, "note: gravity has length %g; only its direction is used", length);
   }
   return SUPINE_EXIT_OK;
 }
@@ -64,10 +65,11 @@ static const char *const postures[] = {"supine",  "prone",    "left", "right",
                                        "upright", "inverted", NULL};
 
 const supine_option supine_options_orientation[] = {
-    {.help = "Where gravity points (one of the first three):"},
+    {.help = "Direction of gravity (one of the first three):"},
     {"posture", 0, "NAME",
-     "supine, prone, left, right (lying on that side), upright, inverted, or a DICOM patient "
-     "position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR; supine+15: tilted, as by --tilt 15",
+     "supine, prone, left or right (left or right lateral decubitus), upright, inverted (head "
+     "down), or a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR; "
+     "supine+15 is supine with --tilt 15",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "a direction in body axes: x to the left, y to the back, z to the head; supine is 0,1,0",
@@ -76,15 +78,16 @@ const supine_option supine_options_orientation[] = {
      "rotation from body axes to a world whose z points up; 1,0,0,0 is upright", GRAVITY,
      .read = read_quaternion, .wants = "four finite numbers, W,X,Y,Z, not all 0"},
     {"tilt", 0, "DEGREES",
-     "turns gravity in the sagittal plane from the back towards the head: from supine, 15 is "
-     "Trendelenburg, head down",
+     "angle by which gravity is turned in the sagittal plane from the back towards the head; "
+     "supine with 15 is Trendelenburg (head down)",
      SUPINE_FILLS(supine_orientation, tilt), .wants = "degrees"},
     {.name = NULL}};
 
 int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
                                       double gravity[3]) {
   if (!orientation->given && orientation->tilt == 0.0) {
-    return supine_options_usage(command, "where does gravity point? Give --posture, for example");
+    return supine_options_usage(command, "the direction of gravity is missing: give --posture, "
+                                         "--gravity or --quaternion");
   }
   static const double supine[3] = {0.0, 1.0, 0.0};
   (void)supine_posture_tilt(orientation->given ? orientation->gravity : supine, orientation->tilt,

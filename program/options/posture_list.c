@@ -10,17 +10,23 @@ int supine_options_posture_list_parse(const char *command, const char *text,
   for (const char *at = text;;) {
     const size_t length = strcspn(at, ",");
     if (list->count == SUPINE_POSTURE_LIST_MAX) {
-      return supine_options_usage(command, "more than %d postures", SUPINE_POSTURE_LIST_MAX);
+      return supine_options_usage(command, "more than %d postures: name fewer",
+                                  SUPINE_POSTURE_LIST_MAX);
     }
     supine_posture_item *item = &list->item[list->count];
     if (length >= sizeof item->name) {
-      return supine_options_usage(command, "no posture '%.*s'", (int)length, at);
+      return supine_options_usage(command,
+                                  "no posture '%.*s': give supine, prone, left, right, "
+                                  "upright or inverted, or a gravity X:Y:Z",
+                                  (int)length, at);
     }
     memcpy(item->name, at, length);
     item->name[length] = '\0';
-    const int result = length > 0
-                           ? supine_options_posture(command, item->name, item->gravity)
-                           : supine_options_usage(command, "an empty name in the list of postures");
+    const int result =
+        length > 0
+            ? supine_options_posture(command, item->name, item->gravity)
+            : supine_options_usage(command, "the list of postures has an empty name: remove the "
+                                            "extra comma");
     if (result != SUPINE_EXIT_OK) {
       return result;
     }

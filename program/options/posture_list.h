@@ -21,8 +21,8 @@ typedef struct supine_posture_list {
 /* What a list may hold, for a command's help. */
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
-  "position), a name tilted by degrees towards the head (supine+15: Trendelenburg), or gravity "   \
-  "in body axes with colons, X:Y:Z (0.6:0:-0.8)."
+  "position), a name with a tilt towards the head in degrees (supine+15: Trendelenburg), "         \
+  "or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
 
 /* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
 int supine_options_posture_list_parse(const char *command, const char *text,

@@ -28,14 +28,14 @@ static int read_from(const char *command, const char *text, void *field) {
 
 const supine_option supine_options_folds[] = {
     {"allow-folds", 0, NULL,
-     "also volumes below a tenth or above 1.2 of full inflation, and surfaces of which more than 1 "
-     "% of the triangles turn over",
+     "allow volumes below 10 % or above 120 % of full inflation, and surfaces of which more "
+     "than 1 % of the triangles turn over",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
 const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
-     SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: lung by lung, all named",
+     SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
@@ -43,8 +43,8 @@ const supine_option supine_options_volume[] = {
 
 const supine_option supine_options_from[] = {
     {"from", 0, "STATE",
-     "what displacements count from: POSTURE, VOLUME or POSTURE:VOLUME, as supine:rest or scan; "
-     "default: the scan as it was given, or supine at rest where postures are compared",
+     "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, as "
+     "supine:rest or scan; default: the scan, or supine:rest in comparisons of postures",
      SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from},
     {.name = NULL}};
 
@@ -85,8 +85,8 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
 static supine_status say_or_fail(const supine_error *wrong, const char *command, bool strict,
                                  supine_error *error) {
   if (strict) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds does it all the same",
-                            wrong->message);
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "%s; give --allow-folds to compute it all the same", wrong->message);
   }
   supine_options_say(command, "%s", wrong->message);
   return SUPINE_OK;
@@ -140,8 +140,9 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
     supine_error wrong;
     (void)supine_error_set(
         &wrong, SUPINE_ERROR_NUMERICAL,
-        "%.0f mL are %.0f %% of full inflation (%.0f mL): lungs hold %.0f to %.0f %%", volume,
-        100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+        "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% that "
+        "lungs hold",
+        volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
     status = say_or_fail(&wrong, command, strict, error);
   }
   return status != SUPINE_OK ? status : check_folds(basis, command, strict, pose, error);

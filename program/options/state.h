@@ -22,9 +22,10 @@ typedef struct supine_volume_options {
 } supine_volume_options;
 
 #define SUPINE_VOLUME_HELP                                                                         \
-  "rest (the end of a quiet expiration in that posture; default where the basis knows it), full "  \
-  "(full inflation) or scan (what the scan held), each with +ML or -ML, as rest+500; or an "       \
-  "absolute volume of all lungs, gas and tissue, as a CT shows it: 2600mL"
+  "rest (FRC, the end of a quiet expiration in that posture; the default where the basis "         \
+  "knows it), full (TLC, full inflation) or scan (the volume scanned), each with +ML or "          \
+  "-ML added, as rest+500; or the absolute volume of gas and tissue in all lungs, as "             \
+  "measured in a CT: 2600mL"
 
 /* --from, into a supine_from. */
 extern const supine_option supine_options_from[];

@@ -32,14 +32,13 @@ static int read_units(const char *command, const char *text, void *field) {
 
 const supine_option supine_options_surface_frame[] = {
     {"axes", 0, "ABC",
-     "axes of the files' coordinates, in place of what the files say: three letters that name "
-     "which "
-     "way each coordinate grows (Left or Right, Posterior or Anterior, Superior or Inferior), as "
-     "LPS in DICOM and RAS in 3D Slicer and nibabel; ITK's RAI codes name where each begins, so "
-     "that its RAI is LPS here. Default: the files' SPACE tag or header, else LPS",
+     "axes of the files' coordinates: three letters, the directions in which x, y and z grow (L or "
+     "R, P or A, S or I): LPS in DICOM, RAS in 3D Slicer and nibabel. ITK names the opposite "
+     "directions: its RAI is LPS here. Default: the axes that the file states, else LPS",
      SUPINE_FILLS(supine_mesh_load_options, axes), .read = read_axes,
      .wants = "three letters, one each of L or R, P or A, S or I, as LPS"},
-    {"units", 0, "UNIT", "mm, cm, m, um or in, or millimetres per unit; default mm",
+    {"units", 0, "UNIT",
+     "unit of the files: mm, cm, m, um, in, or a number of millimetres; default mm",
      SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
      .wants = "mm, cm, m, um, in or millimetres per unit"},
     {.name = NULL}};
@@ -48,15 +47,15 @@ const supine_option supine_options_surface_frame[] = {
 
 const supine_option supine_options_landmarks[] = {
     {"landmarks", 0, "FILE",
-     "matched points, mm, LPS: CSV with the columns x,y,z,to_x,to_y,to_z (from the first state to "
-     "the other), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from 2 "
-     "to 1); of several states, the first",
+     "matched points, in mm and LPS: CSV with the columns x,y,z,to_x,to_y,to_z (first state, "
+     "other state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled; "
+     "motion is from 2 to 1). Of several states, they are for the first",
      FILLS(path), .file = SUPINE_FILE_IN},
-    {"reverse", 0, NULL, "landmarks start from the other one of the two", FILLS(reverse)},
-    {"translation", 0, NULL,
-     "the scans' frames may be shifted against each other: finds the shift as well",
+    {"reverse", 0, NULL, "exchange the two states of the landmarks", FILLS(reverse)},
+    {"translation", 0, NULL, "also fit a translation between the frames of the scans",
      FILLS(translation), .rivals = "motion"},
-    {"rigid", 0, NULL, "or shifted and slightly turned", FILLS(rigid), .rivals = "motion"},
+    {"rigid", 0, NULL, "also fit a translation and a small rotation", FILLS(rigid),
+     .rivals = "motion"},
     {.name = NULL}};
 
 void supine_options_say_findings(const char *command, const supine_findings *findings) {

@@ -418,9 +418,11 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
   const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
   supine_status status = SUPINE_OK;
   if (at.font < 4) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT, "%zu x %zu pixels are too few for %zu postures and %zu views",
-        picture->width, picture->height, picture->panel_count, picture->view_count);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%zu x %zu pixels are too few for %zu postures and %zu "
+                            "views: give a larger --size",
+                            picture->width, picture->height, picture->panel_count,
+                            picture->view_count);
   }
   ground(cr, picture, look);
   if (picture->heading != NULL) {
@@ -468,8 +470,8 @@ static supine_status begin(const supine_picture *picture, supine_error *error) {
   return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
              ? SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error)
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "a picture has at most %d x %d pixels", SIZE_MAX_CAIRO,
-                                SIZE_MAX_CAIRO);
+                                "a picture has at most %d x %d pixels: give a smaller --size",
+                                SIZE_MAX_CAIRO, SIZE_MAX_CAIRO);
 }
 
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,

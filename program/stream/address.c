@@ -18,8 +18,8 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
     const bool bracketed = text[0] == '[' && colon > text + 1 && colon[-1] == ']';
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
     if (length == 0 || length >= sizeof host) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' names no host before its port",
-                              text);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "'%s' names no host before its port: give HOST:PORT", text);
     }
     memcpy(host, text + (bracketed ? 1 : 0), length);
     host[length] = '\0';
@@ -27,7 +27,8 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   char *end = NULL;
   const long number = strtol(port, &end, 10);
   if (end == port || *end != '\0' || number < 0 || number > 65535) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' is no port from 0 to 65535", port);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' is not a port: give 0 to 65535",
+                            port);
   }
   const struct addrinfo wanted = {.ai_socktype = SOCK_STREAM,
                                   .ai_flags = AI_NUMERICSERV | (numeric ? AI_NUMERICHOST : 0)};
@@ -51,7 +52,7 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
   if (s < 0 || setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
       bind(s, (const struct sockaddr *)&address->where, address->size) != 0 || listen(s, 64) != 0 ||
       getsockname(s, (struct sockaddr *)&given, &size) != 0) {
-    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "the port cannot be listened on: %s",
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "cannot listen on the port: %s. Give another",
                            strerror(errno));
     if (s >= 0) {
       (void)close(s);

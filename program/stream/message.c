@@ -30,12 +30,13 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
   memcpy(header->device, bytes + 14, sizeof header->device - 1);
   if (header->version != 1 && header->version != 2) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "a message header of version %u, where 1 and 2 are known",
+                            "message header version %u is unknown: send version 1 or 2",
                             header->version);
   }
   for (const char *c = header->type; *c != '\0'; ++c) {
     if (!isprint((unsigned char)*c)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "a message type that is no text");
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "the type of a message is not text: send OpenIGTLink");
     }
   }
   return SUPINE_OK;

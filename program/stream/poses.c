@@ -26,8 +26,8 @@ static supine_status take(const supine_csv *csv, supine_stream_poses *poses, sup
                             csv->path, csv->line, number[0], before);
   }
   if (!(length > 1e-9) || !isfinite(length)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: gravity points nowhere", csv->path,
-                            csv->line);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s:%zu: gravity is 0,0,0: give a direction", csv->path, csv->line);
   }
   *pose =
       (supine_stream_pose){number[0], {number[1] / length, number[2] / length, number[3] / length}};
@@ -48,8 +48,9 @@ supine_status supine_stream_poses_load(const char *path, supine_stream_poses *po
       break;
     }
     if (poses->count == SUPINE_STREAM_POSES_MAX) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: more than %d poses", path,
-                                SUPINE_STREAM_POSES_MAX);
+      status =
+          supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: more than %d poses: split the file",
+                           path, SUPINE_STREAM_POSES_MAX);
       break;
     }
     if (poses->count == room) {
@@ -65,7 +66,8 @@ supine_status supine_stream_poses_load(const char *path, supine_stream_poses *po
   }
   supine_csv_close(&csv);
   if (status == SUPINE_OK && poses->count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no poses", path);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: no poses: record some with 'supine stream --record'", path);
   }
   if (status != SUPINE_OK) {
     supine_stream_poses_free(poses);

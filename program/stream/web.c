@@ -250,8 +250,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (!w->running) {
     supine_stream_web_destroy(w);
     return supine_error_set(error, SUPINE_ERROR_WRITE,
-                            "no page can be served at %s, port %d: is the port taken, or the "
-                            "certificate no good?",
+                            "cannot serve a page at %s, port %d: give a free port with --web, "
+                            "and check --certificate and --key",
                             info.iface, site->port);
   }
   *web = w;

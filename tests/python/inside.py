@@ -250,7 +250,7 @@ for basis in (lungs, made):
 assert supine.embed(made, place).vertex_count == 1
 assert supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place])).vertex_count == n + 1
 assert supine.embed(made, grid=40, clamp=True).vertex_count > 100
-refused(supine.ArgumentError, "which content?", supine.embed, made)
+refused(supine.ArgumentError, "nothing to embed", supine.embed, made)
 refused(ValueError, "points must be", supine.embed, made, [(1, 2)])
 program, os.environ["PATH"] = shutil.which("supine"), ""
 refused(supine.UnsupportedError, "neither on PATH nor beside", supine.precompute, lungs.vertices, lungs.triangles)
