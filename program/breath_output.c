@@ -14,21 +14,21 @@
 #include "program/breath_output.h"
 #include "program/export/template.h"
 
-/* mm: half of it is less than what storage may cost (supine_basis_info's storage_error). */
+/* Quantum of positions, mm: half of it is less than the storage error (supine_basis_info). */
 static const double rounding = 1.0 / 256.0;
 
 enum { FIELDS = 3 };
 
 struct breath_output {
   breath_content content;
-  supine_mesh mesh; /* the frame: its own vertices, the rest's triangles */
+  supine_mesh mesh; /* mesh of the frame: its own vertices, the basis' triangles */
   supine_mesh_save_options save;
   supine_mesh_field fields[FIELDS];
   float *normals; /* [N, 3] */
   char *path;
-  supine_mesh_series *series; /* NULL: not one file */
+  supine_mesh_series *series; /* NULL: the output is not one file */
   supine_folder folder; /* of a file a frame, with the PVD file beside it, or NULL: it is inside */
-  float *positions;     /* [T, N, 3] */
+  float *positions;     /* positions of all frames [T, N, 3], mm */
   size_t next;
   char comment[512];
 };
@@ -78,7 +78,7 @@ static supine_status open_series(breath_output *made, supine_error *error) {
   memcpy(made->mesh.vertices, made->content.rest->vertices, count * sizeof *made->mesh.vertices);
   fill_save(made);
   if (supine_text_ends_in(made->path, ".vtp")) {
-    made->save.field_count = FIELDS - 1; /* it has the time of its own */
+    made->save.field_count = FIELDS - 1; /* the file holds the time of each frame */
     return supine_mesh_series_open(made->path, &made->mesh, &made->save, course->count,
                                    course->time, &made->series, error);
   }
@@ -134,8 +134,8 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
   return SUPINE_OK;
 }
 
-/* Bytes a vertex as measured on made lungs of 40,000 vertices, which tests/bench/bench_breath.py
- * prints; the triangles' are among them where each frame has them. */
+/* Bytes per vertex, measured on synthetic lungs of 40,000 vertices (tests/bench/bench_breath.py);
+ * with triangles where each frame stores them. */
 double supine_command_breath_output_size(const char *path, const breath_content *content) {
   const double each = supine_text_ends_in(path, ".safetensors") ? 12.0
                       : supine_text_ends_in(path, ".vtp")       ? 23.0

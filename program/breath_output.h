@@ -18,7 +18,7 @@ typedef struct breath_content {
   const supine_mesh_save_options *frame; /* axes and units of VTP files */
   const breath_course *course;
   const double *volumes; /* [T, G] mL, gas and tissue */
-  const char *made_by;   /* in one line */
+  const char *made_by;   /* command line, for the metadata */
 } breath_content;
 
 /* Begins an output; nothing shows under its name before supine_command_breath_output_commit.
@@ -45,7 +45,7 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
 /* Gives the output its name. */
 supine_status supine_command_breath_output_commit(breath_output *output, supine_error *error);
 
-/* Releases; removes what was not committed. NULL is legal. */
+/* Release the output and remove what was not committed. NULL is legal. */
 void supine_command_breath_output_close(breath_output *output);
 
 #endif

@@ -13,7 +13,7 @@
 
 static const char name[] = "breathe";
 
-static const double budget = 15e-3; /* s a frame */
+static const double budget = 15e-3; /* time allowed per frame, s */
 
 typedef struct request {
   supine_orientation orientation;
@@ -83,7 +83,7 @@ static const supine_option table[] = {
 static int complete(request *wanted, size_t *count) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
-  if (wanted->step > 0.0) { /* in and out alike, at this volume a frame */
+  if (wanted->step > 0.0) { /* the flow is this volume per frame, in and out */
     breath->course = SUPINE_PV_CONSTANT_FLOW;
     breath->inhale_fraction = 0.5;
     breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
@@ -123,9 +123,9 @@ static int compare(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* What the frames' own surfaces enclose, against what was asked. */
+/* Compare the volumes that the surfaces of the frames enclose with those requested. */
 typedef struct gauge {
-  supine_mesh mesh;          /* shares the rest surface's triangles */
+  supine_mesh mesh;          /* shares the triangles of the reference surface */
   double least, peak, worst; /* mL */
 } gauge;
 
@@ -162,7 +162,7 @@ static void report(const request *wanted, const breath_course *course, const bre
                1e3 * most, 1e3 * budget);
 }
 
-/* Eight parameters: the frames, what is asked of them and where they go. */
+/* Write all frames. Eight parameters: the frames, their targets and the outputs. */
 static supine_status play_frames(const breath_course *course, breath_frames *frames,
                                  breath_output *output, const double *asked, gauge *measured,
                                  float *xyz, double *seconds, supine_error *error) {
@@ -181,7 +181,7 @@ static supine_status play_frames(const breath_course *course, breath_frames *fra
   return status;
 }
 
-/* Whether lungs can look as they do at the ends of the breath. */
+/* Check that the states at the ends of the breath are plausible. */
 static supine_status check_ends(const supine_basis *basis, const request *wanted,
                                 const breath_course *course, supine_error *error) {
   size_t least = 0;
@@ -204,7 +204,7 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
-/* Before the work, of what few would want by accident. */
+/* Warn before the work about outputs so large that they are probably unintended. */
 static void warn_of_size(const request *wanted, const breath_content *content) {
   static const double large = 2e9; /* bytes */
   const double bytes = supine_command_breath_output_size(wanted->path, content);
@@ -228,8 +228,8 @@ static double *find_origin(const supine_basis *basis, const supine_pose *pose, f
   return origin;
 }
 
-/* What the lungs together hold in each frame, mL: the posture's rest, or the scan, and the breath.
- */
+/* Compute the total volume of the lungs in each frame, mL: rest in the posture, or the scan, plus
+ * the breath. */
 static supine_status find_asked(const supine_basis *basis, const breath_course *course,
                                 double *asked, supine_error *error) {
   for (size_t t = 0; t < course->count; ++t) {

@@ -60,7 +60,7 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
-/* In every form that is wanted. */
+/* Write the report in every form requested. */
 static int tell(const supine_comparison *comparison, const request *wanted) {
   if (!wanted->json) {
     supine_report_text(comparison, stdout);
@@ -103,7 +103,7 @@ static int compare(const char *path, const supine_basis *basis, const request *w
                        path);
     return SUPINE_EXIT_INPUT;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* of 'supine embed' */
+  if (supine_basis_metadata(basis, "content") != NULL) { /* the basis is from 'supine embed' */
     if (wanted->html != NULL || wanted->by_rms) {
       return supine_options_usage(name,
                                   "-o and --rms are for lungs, and this basis holds structures "

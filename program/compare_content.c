@@ -13,8 +13,8 @@
 #include "program/names.h"
 #include "program/options/expected.h"
 
-/* Where everything is in every posture: moves [postures, names, 3], mm from the reference surface.
- */
+/* Displacements of each name in each posture, [postures, names, 3], mm from the reference
+ * surface. */
 typedef struct comparison {
   const supine_posture_list *postures;
   supine_command_names names;
@@ -75,7 +75,7 @@ static double error_of(const comparison *c, size_t from, size_t to, size_t name)
   return c->errors[(from * c->postures->count + to) * c->names.count + name];
 }
 
-/* From posture `from` to posture `to`; its length is returned. */
+/* Compute the displacement from posture `from` to posture `to` and return its length. */
 static double move_between(const comparison *c, size_t from, size_t to, size_t name,
                            double move[3]) {
   for (size_t k = 0; k < 3; ++k) {
@@ -129,7 +129,7 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
   return true;
 }
 
-/* All that was asked for, pair by pair. */
+/* Print every pair of postures. */
 static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
   if (csv != NULL) {
     (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", csv);

@@ -26,8 +26,8 @@ typedef struct request {
   bool has_scale, as_scanned;
   double scale;
   supine_deform_content content;
-  const char *states; /* a list of them */
-  char *output;       /* of a row of it */
+  const char *states; /* list of states */
+  char *output;       /* output of a row of that list */
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
@@ -84,7 +84,7 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
   return largest;
 }
 
-/* The pose asked for: a largest displacement from the reference surface, or volumes. */
+/* Compute the pose requested: by largest displacement from the reference surface, or by volumes. */
 static int find_pose(const supine_basis *basis, const request *wanted, const double gravity[3],
                      supine_mesh *mesh, supine_pose *pose) {
   if (!wanted->has_scale) {
@@ -112,7 +112,7 @@ static int find_pose(const supine_basis *basis, const request *wanted, const dou
   return SUPINE_EXIT_OK;
 }
 
-/* One line: where the surface went, how far it moved and what it holds. */
+/* Print in one line the file written, the displacement and the volume. */
 static void report(const char *path, const double gravity[3], const supine_mesh *mesh,
                    const supine_mesh *from, const char *reference, bool volumes) {
   (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
@@ -177,7 +177,7 @@ static int deform(const supine_basis *basis, const request *wanted, const double
     result = supine_options_fail(name, &error);
     goto cleanup;
   }
-  save.normals = mesh.triangle_count > 0 ? normals : NULL; /* points inside have none */
+  save.normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no volume */
   save.expected_error = expected.sigma;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
@@ -228,7 +228,8 @@ static int read_row(const supine_csv *csv, request *row) {
              : supine_command_deform_content_check(&row->content, name);
 }
 
-/* Is the last row's output no input and no other row's, and can it be written? */
+/* Check that the output of the last row is no input and no other row's output, and can be
+ * written. */
 static int check_row(const char *basis, const request *rows, size_t count) {
   const request *row = &rows[count - 1];
   const char *const inputs[] = {basis, row->states, row->content.image, row->content.labels};

@@ -62,7 +62,8 @@ int supine_command_deform_content_check(const supine_deform_content *wanted, con
 }
 
 int supine_command_deform_content_read(supine_deform_content *wanted, const char *command) {
-  static const double aerated = -300.0; /* some voxel of any lung in Hounsfield units is below */
+  static const double aerated =
+      -300.0; /* Hounsfield units: some voxel of any lung lies below this */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   supine_error error;
@@ -139,7 +140,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
         from->name, axes, unit_name,
         expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
         expected->sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) { /* in the order in which they were given */
+    for (size_t i = 0; i < n; ++i) { /* in the order of the input */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
@@ -259,7 +260,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   second->nodes.values = u;
   supine_image depth;
   status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
-  if (status == SUPINE_OK) { /* of where the tissue was in the scan */
+  if (status == SUPINE_OK) { /* the field from the moved lungs back to the scan */
     supine_image_free(&second->depth);
     second->depth = depth;
   }
@@ -304,7 +305,7 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return status;
 }
 
-/* Eight parameters, as the command has them. */
+/* Eight parameters: those of the command. */
 int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
                                   const supine_basis *basis, const supine_pose *pose,
                                   const supine_reference_pose *from, bool other,

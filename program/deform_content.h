@@ -16,12 +16,12 @@ typedef struct supine_deform_content {
   const char *image;  /* --image */
   const char *labels; /* --labels */
   bool inverse, density;
-  supine_image source; /* what --image or --labels names, once read */
+  supine_image source; /* image of --image or --labels, once read */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* Do the options fit each other? An exit code. */
+/* Check that the options fit each other; return an exit code. */
 int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command);
 
 /* Reads what --image or --labels names, and says whether densities are scaled; an exit code. */

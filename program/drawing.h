@@ -17,12 +17,12 @@ typedef struct supine_command_drawing {
   const char *output;
   const char *postures;
   supine_volume_options volume;
-  supine_from from; /* what colours and moves count from */
+  supine_from from; /* state that colours and displacements are measured from */
   const char *title;
   const char *inside; /* a file, or NULL */
   double scale;       /* mm, or 0: by volume */
   double largest;
-  double opacity; /* of the lungs; 0: not given */
+  double opacity; /* opacity of the lungs; 0: not given */
   size_t width, height;
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
@@ -39,8 +39,8 @@ typedef struct supine_command_drawn {
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* The pose for gravity along a direction of that name; an exit code. `value` [N] is written over.
- */
+/* Compute the pose for a direction of gravity of that name; return an exit code. Overwrites `value`
+ * [N]. */
 int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
                               const supine_command_drawing *wanted, const supine_posture_item *item,
                               supine_command_drawn *found);

@@ -36,7 +36,7 @@ int supine_command_read_turn(const char *command, const char *value, breath_turn
                                   : result;
 }
 
-/* What the frames are drawn with. */
+/* Resources to draw the frames. */
 typedef struct turning {
   const supine_basis *basis;
   const supine_command_drawing *wanted;
@@ -76,7 +76,8 @@ static supine_picture make_picture(turning *t, supine_panel *panel, char *label)
   return picture;
 }
 
-/* What colours and frames reach over the whole turn, so that nothing jumps; an exit code. */
+/* Find the extents of colours and picture over the whole turn, so that they stay fixed; return an
+ * exit code. */
 static int measure(turning *t, supine_command_drawn *shown) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   supine_posture_item item;
@@ -150,7 +151,7 @@ static int animate(turning *t, supine_command_drawn *shown) {
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, &error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* why a write failed, it knows */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* the stream knows why a write failed */
       status = supine_output_commit(&output, &error);
     }
   }

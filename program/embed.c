@@ -18,7 +18,7 @@
 
 static const char name[] = "embed";
 
-/* Room around the lungs in which 'supine deform' lets a field fade out, mm. */
+/* Margin around the lungs, mm, in which 'supine deform' fades a field out. */
 static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
@@ -37,7 +37,7 @@ typedef struct request {
   bool has_grid;
   double grid; /* mm */
   bool clamp;
-  const char *rigid; /* parts by name, or "all" */
+  const char *rigid; /* parts named, or "all" */
   supine_mesh_load_options load;
 } request;
 

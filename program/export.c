@@ -17,7 +17,7 @@ typedef struct request {
   double volume;
   double largest;
   bool page;
-  bool glb_only; /* an option was given that a page has no use for */
+  bool glb_only; /* set where an option was given that a page does not use */
   const char *inside;
   export_glb_options glb;
 } request;
@@ -134,7 +134,7 @@ static int write_either(const export_source *source, const request *wanted, cons
   return wanted->page ? write_page(source, wanted, path) : write_glb(source, wanted);
 }
 
-/* The same with what is inside, which must be of these lungs. */
+/* Export with embedded structures, which must be of the same basis. */
 static int write_with_inside(const export_source *source, request *wanted, const char *path) {
   export_source inside = {0};
   supine_command_names names = {0};
@@ -178,7 +178,7 @@ static int export_basis(const char *path, request *wanted) {
 
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
-  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other: .glb */
+  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form, .glb */
   if (wanted->page && wanted->glb_only) {
     return supine_options_usage(name, "--profile, --quantise and --animate need an output that "
                                       "ends in .glb");

@@ -26,13 +26,13 @@ typedef struct request {
   supine_mesh_load_options load;
 
   supine_state rest, state;
-  size_t count; /* of further states, or of all where no other was named */
+  size_t count; /* landmarks of further states, or of all where no other state was named */
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
   const char *rest_path, *state_path; /* surfaces; NULL: none */
 } request;
 
-/* What is known of the person. */
+/* Evidence about the person. */
 typedef struct evidence {
   supine_lungs lungs[2]; /* at the fuller state, at the emptier one */
   supine_patient_pairs pairs;
@@ -127,7 +127,8 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* The deep law's: a lung's lowest parts are emptied about 1.5 times as far as its uppermost. */
+/* Gain of the law deep: the lowest parts of a lung are emptied about 1.5 times as far as the
+ * uppermost. */
 static const double usual_gain = 0.4;
 
 static void print_row(const char *what, double fitted, double held_out, const char *after) {
@@ -176,7 +177,7 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
   }
 }
 
-/* The region that is seen and gives way least, or most. */
+/* Print the determined region with the least (`sign` -1) or greatest expandability. */
 static void print_extreme(const supine_patient_stiffness *stiffness, const char *what,
                           double sign) {
   const supine_patient_mode *found = NULL;
@@ -198,7 +199,8 @@ static void print_extreme(const supine_patient_stiffness *stiffness, const char 
   }
 }
 
-/* The regions that move too little, or along the surface, to tell how expandable they are. */
+/* Print the regions whose expandability is not determined: they move too little, or along the
+ * surface. */
 static void print_unseen(const supine_patient_stiffness *stiffness,
                          const supine_patient_expand_report *expand) {
   (void)printf("  not determined: %zu of %zu regions; they take their neighbours' values%s\n",
@@ -307,7 +309,7 @@ static void print_text(const supine_patient_record *record, const supine_patient
                100.0 * report->explained_fitted);
 }
 
-/* "left.ply,right.ply" as one model. */
+/* Load "left.ply,right.ply" as one model. */
 static supine_status load_lungs(const request *wanted, const char *operand, supine_lungs *lungs,
                                 supine_error *error) {
   enum { FILES_MAX = 2 };
@@ -400,7 +402,7 @@ static supine_status load_evidence(const request *wanted, evidence *of, supine_e
   return status;
 }
 
-/* +1 where the second state was named the fuller one, -1 the emptier one, 0 neither. */
+/* Return +1 where the second state was named as the fuller one, -1 the emptier one, 0 neither. */
 static int named_order(const supine_state *first, const supine_state *second) {
   const supine_volume *a = &first->volume;
   const supine_volume *b = &second->volume;
@@ -414,9 +416,11 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Count from the fuller of the two states, by the surfaces' volumes or the landmarks' spread. */
+/* Choose the reference state: the fuller one, by the volumes of the surfaces or the spread of the
+ * landmarks. */
 static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
-  static const double doubt = 0.02; /* of a volume: less than that may be how surfaces were cut */
+  static const double doubt =
+      0.02; /* relative difference of volumes that can come from how the surfaces were cut */
   const double volume[2] = {volume_of(&of->lungs[0]), volume_of(&of->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
                         : of->pairs.count > 0              ? supine_patient_pairs_growth(&of->pairs)
@@ -446,7 +450,8 @@ static supine_status fit_surfaces(const request *wanted, const evidence *of,
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
-  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain; /* held for expandability */
+  model.force.gain =
+      wanted->has_gain ? wanted->gain : usual_gain; /* kept for the fit of expandability */
   supine_patient_surface_task task = {.rest = &of->lungs[0],
                                       .state = &of->lungs[1].mesh,
                                       .model = &model,
@@ -481,15 +486,15 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
 
 /* --- further states -------------------------------------------------------------------------- */
 
-/* Further states: what of the force turns. */
+/* Fit the gravity-dependent share of the force to the further states. */
 typedef struct further_work {
   supine_patient_pairs pairs[SUPINE_PATIENT_OTHERS_MAX];
   supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX];
   supine_patient_other other[SUPINE_PATIENT_OTHERS_MAX];
 } further_work;
 
-/* Landmarks of further states start in the first scan: taken to the fuller state where that is the
- * emptier one. */
+/* Move landmarks of further states, which start in the first scan, to the fuller state where the
+ * first is the emptier one. */
 static supine_status load_further(const request *wanted, const evidence *of,
                                   const supine_patient_record *record, further_work *work,
                                   supine_error *error) {
@@ -556,7 +561,7 @@ static supine_status find_gain(const request *wanted, evidence *of, supine_patie
 
 /* --- the record ------------------------------------------------------------------------------ */
 
-/* A state without a volume, by what the surfaces hold. */
+/* Describe a state; where it has no volume, with that of the surfaces. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -598,7 +603,8 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
 
 /* Warn where the two scans show another volume at rest than is assumed of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  static const double apart_least = 0.07; /* of full: healthy people's standard deviation is 0.04 */
+  static const double apart_least =
+      0.07; /* share of full inflation: the standard deviation in healthy people is 0.04 */
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
@@ -685,7 +691,7 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   return status;
 }
 
-/* Which surfaces and landmarks the law is fitted to, and which states are further ones. */
+/* Choose the surfaces and landmarks that the law is fitted to, and the further states. */
 static int arrange(request *wanted, const supine_arguments *given) {
   size_t next = 1;
   wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
@@ -739,7 +745,7 @@ static int arrange(request *wanted, const supine_arguments *given) {
 
 static int run(void *chosen, const supine_arguments *given) {
   request *wanted = chosen;
-  static supine_patient_record record; /* some 40 kB each */
+  static supine_patient_record record; /* about 40 kB each, too large for the stack */
   static supine_patient_surface_fit found;
   supine_error error;
   const int result = arrange(wanted, given);

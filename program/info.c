@@ -66,7 +66,7 @@ static const char *text_of(const supine_basis *basis, const char *key) {
   return value != NULL ? value : "?";
 }
 
-/* The state that errors in mm are stated at, in words. */
+/* Describe the state for which errors are given in mm. */
 static void state_words(const supine_basis *basis, char *words, size_t size) {
   const char *part = supine_basis_metadata(basis, "error_rest_part");
   const char *volume = supine_basis_metadata(basis, "error_volume_ml");
@@ -79,7 +79,7 @@ static void state_words(const supine_basis *basis, char *words, size_t size) {
   }
 }
 
-/* How many of what is inside each lung, and how deep. */
+/* Print how many embedded vertices lie in each lung, and how deep. */
 static void print_content(const supine_basis *basis, const char *content) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *tensor = supine_basis_tensor(basis, "depth");
@@ -133,7 +133,7 @@ static void print_expected(const supine_basis *basis) {
   }
 }
 
-/* How the basis was made, and what was found of its input. */
+/* Print how the basis was made, and the findings about its input. */
 static void print_facts(const supine_basis *basis) {
   for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
     if (supine_basis_metadata(basis, shown[i]) != NULL) {
@@ -148,7 +148,7 @@ static void print_facts(const supine_basis *basis) {
   }
 }
 
-/* What was found, as a list. */
+/* Return the findings as a list. */
 static json_t *list_warnings(const supine_basis *basis) {
   json_t *list = json_array();
   const char *at = supine_basis_metadata(basis, warnings);
@@ -202,7 +202,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
                  state, text_of(basis, turned_over));
   }
   if (info->triangle_count == 0) {
-    return; /* energy is the surface's */
+    return; /* the energy is that of the surface */
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;

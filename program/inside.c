@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What is inside lungs, beside them. */
+/* Structures embedded in the lungs, opened beside them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,7 +65,7 @@ supine_status supine_command_marks_make(const supine_basis *inside,
   if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
     supine_deform(inside, pose, xyz);
     supine_deform(inside, from, before);
-    for (size_t at = 0; at < n;) { /* a part's vertices are together */
+    for (size_t at = 0; at < n;) { /* the vertices of a part are contiguous */
       const uint32_t part = names->part[names->order[at]];
       size_t end = at;
       while (end < n && names->part[names->order[end]] == part) {

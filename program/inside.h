@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What is inside lungs, shown with them: a file of 'supine embed' beside the basis it is of. */
+/* Structures embedded in the lungs, shown with them: a file of 'supine embed' beside its basis. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
@@ -11,14 +11,14 @@
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Opens content of these lungs and its names; close both in any case, which begin as zeros.
- * Statuses of opening, of its names, and of the check. */
+/* Open the structures and their names; both arguments start zeroed and must be closed also after a
+ * failure. Statuses of opening, of the names, and of the check. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
 
-/* Marks of a picture: each named point, with how far it has moved; meshes as their vertices, and
- * their name at the middle. */
+/* Make the marks of a picture: each named point with its displacement; the vertices of meshes, with
+ * the name at the middle. */
 typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;

@@ -22,7 +22,7 @@ static const char name[] = "locate";
 typedef struct request {
   const char *output, *points;
   supine_orientation orientation;
-  supine_state state; /* its volume; the default where none was given */
+  supine_state state; /* its volume is the default where none was given */
   double noise;
   bool rigid;
 } request;
@@ -94,7 +94,7 @@ static supine_status write_points(const char *path, const supine_basis *inside,
   return supine_output_commit(&output, error);
 }
 
-/* What was found, in lines. */
+/* Print the result. */
 static void tell(const request *wanted, const supine_command_names *names,
                  const supine_command_observed *observed, const supine_basis *basis,
                  const supine_command_located *located) {
@@ -146,7 +146,8 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status =
       supine_command_located_find(&task, wanted->orientation.given, shown, &located, error);
-  if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) { /* the file's points, no option */
+  if (status == SUPINE_ERROR_ARGUMENT &&
+      wanted->rigid) { /* the points of the file, not an option */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lungs found from observed points: the postures, and what they differ by. */
+/* Fit the lungs to observed points in several postures, and measure the differences between
+ * them. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 static const char *const postures[SUPINE_LOCATED_POSTURES] = {"supine", "prone",   "left",
                                                               "right",  "upright", "inverted"};
 
-static const double negligible = 0.01; /* a posture of less counts for nothing */
+static const double negligible = 0.01; /* smallest probability with which a posture counts */
 static const double determined = 0.95;
 
 /* Try every posture; those that no volume fits have the share 0. */

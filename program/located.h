@@ -12,8 +12,10 @@ typedef struct supine_command_located {
   supine_location location[SUPINE_LOCATED_POSTURES]; /* of each */
   double share[SUPINE_LOCATED_POSTURES];             /* its probability, given the points */
   const supine_location *best;
-  supine_locate_residual *residuals; /* of the best, as the task's points */
-  float *xyz, *sigma;                /* [N, 3], [N] of the best; errors over all postures */
+  supine_locate_residual
+      *residuals; /* positions of the most probable posture, in the order of the task's points */
+  float *xyz,
+      *sigma; /* [N, 3] and [N], for the most probable posture; errors include all postures */
   void *space;
 } supine_command_located;
 

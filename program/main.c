@@ -61,8 +61,8 @@ static int unknown_command(const char *name) {
   return SUPINE_EXIT_USAGE;
 }
 
-/* A value that JSON lacks for want of memory would be missing in silence, and GSL tells a lack of
- * it only to its handler: both end the program here, and unfinished outputs with it. */
+/* End the program where jansson or GSL lacks memory: a JSON value would be missing without a
+ * message, and GSL reports it only to its handler. Unfinished outputs are removed. */
 static _Noreturn void end_without_memory(void) {
   supine_output_abandon_all();
   (void)fputs("supine: out of memory\n", stderr);
@@ -77,7 +77,7 @@ static void *allocate_json(size_t size) {
   return memory;
 }
 
-/* Every other error is in what the function returned. */
+/* Functions return every other error. */
 static void hear_gsl(const char *reason, const char *file, int line, int code) {
   (void)reason;
   (void)file;
@@ -90,7 +90,7 @@ static void hear_gsl(const char *reason, const char *file, int line, int code) {
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler(hear_gsl);
   json_set_alloc_funcs(allocate_json, free);
-  openblas_set_num_threads(1); /* its threads would spin beside the program's own */
+  openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own */
   supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();

@@ -12,7 +12,7 @@ void supine_command_model_options_begin(supine_model_options *options) {
   options->choice = supine_precompute_choice_default();
 }
 
-/* A law's name; those of former versions answer with what took their place. */
+/* Read the name of a law; for a removed law, name its replacement. */
 static int read_law(const char *command, const char *text, void *field) {
   int *choice = field;
   for (int law = 0; law < SUPINE_LAW_COUNT; ++law) {
@@ -289,8 +289,8 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Take the law, force and stiffness of a person, and what the scan shows of the two states that
- * were fitted, into the choice; the caller frees its stiffness. */
+/* Copy the law, force and stiffness of a person, and the scanned one of the two fitted states, into
+ * the choice; the caller frees the stiffness. */
 static supine_status take_patient(supine_model_options *options, double **stiffness,
                                   supine_error *error) {
   const supine_patient_record *record = options->patient;

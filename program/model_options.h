@@ -18,19 +18,19 @@ extern const supine_option supine_command_model_options[];
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
-  const supine_patient_record *patient; /* a person's own law, the caller's; NULL: none */
+  const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
   supine_patient_field field;           /* of it */
-  supine_source made_from;              /* what loading found: the lungs and how they came */
-  supine_prepared prepared;             /* the model of them */
-  char assumed[800];                    /* what was assumed, in a sentence */
-  supine_findings findings;             /* and what was found that the user should know */
+  supine_source made_from;  /* the lungs as loaded, and the axes and units of their files */
+  supine_prepared prepared; /* the model of them */
+  char assumed[800];        /* what was assumed, in a sentence */
+  supine_findings findings; /* findings that the user should know */
 } supine_model_options;
 
 /* The defaults, of a zeroed struct. */
 void supine_command_model_options_begin(supine_model_options *options);
 
-/* Load the files, say on stderr what was found that the user should know, and prepare the model; an
- * exit code. `keep`: the surface is the reference as it stands, whatever the options say. */
+/* Load the files, report the findings on stderr and prepare the model; return an exit code. `keep`:
+ * the surface is the reference, whatever the options say. */
 int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
                               size_t count, bool keep);
 

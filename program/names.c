@@ -5,7 +5,7 @@
 
 #include "program/names.h"
 
-/* Vertices by name, in the file's order within each: a counting sort. */
+/* Sort vertices by name, stably (a counting sort). */
 static bool sort_by_name(supine_command_names *names, size_t n) {
   size_t *next = calloc(names->count + 1, sizeof *next);
   names->order = malloc(n * sizeof *names->order);

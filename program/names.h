@@ -18,7 +18,7 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
                                         supine_error *error);
 void supine_command_names_close(supine_command_names *names);
 
-/* The lung that a vertex is of. */
+/* Return the lung of a vertex. */
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 
 #endif

@@ -8,7 +8,7 @@
 #include "program/observed.h"
 #include "program/options/command.h"
 
-/* The one vertex of a name. */
+/* Find the single vertex of a name. */
 static supine_status find_vertex(const supine_csv *csv, const char *text,
                                  const supine_basis *inside, const supine_command_names *names,
                                  size_t *vertex, supine_error *error) {
@@ -95,7 +95,7 @@ supine_status supine_command_observed_names(const char *path, const supine_basis
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
   size_t count = 0;
-  for (size_t i = 0; i < n; ++i) { /* a name's vertices follow each other */
+  for (size_t i = 0; i < n; ++i) { /* the vertices of a name are contiguous */
     const uint32_t part = names->part[names->order[i]];
     const bool first = i == 0 || names->part[names->order[i - 1]] != part;
     const bool last = i + 1 == n || names->part[names->order[i + 1]] != part;

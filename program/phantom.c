@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine phantom: a made pair of lungs. */
+/* supine phantom: synthetic lungs. */
 #include "precompute/lungs/phantom.h"
 
 #include "program/options/command.h"

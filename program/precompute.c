@@ -69,7 +69,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Share of turned triangles that is worth a word. */
+/* Share of turned-over triangles from which the result is called torn. */
 static const double turned_over_limit = 0.01;
 
 static void report_result(const char *path, const supine_lungs *lungs,
@@ -107,7 +107,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
   }
 }
 
-/* What the directions of a fit can and cannot carry. */
+/* Report the fit: its error in each band and what the directions determine. */
 static void report_fit(const char *path, const supine_fields *fields, const supine_fit_report *fit,
                        size_t mode_count, bool scalar) {
   const size_t highest = fit->band_highest;
@@ -138,14 +138,14 @@ static void report_fit(const char *path, const supine_fields *fields, const supi
                fit->accuracy.max_mm);
 }
 
-/* The output must be none of the surfaces that a list of fields names. */
+/* Check that the output is none of the surfaces that a list of fields names. */
 static int check_fields(const char *list, const char *output) {
   static const char *const columns[] = {"gx", "gy", "gz", "file"};
   supine_csv csv;
   bool more = true;
   int result = SUPINE_EXIT_OK;
   if (supine_csv_open(list, columns, 4, 4, &csv, NULL) != SUPINE_OK) {
-    return SUPINE_EXIT_OK; /* no list: what is wrong with it is said when it is loaded */
+    return SUPINE_EXIT_OK; /* not a list: loading reports the fault */
   }
   while (result == SUPINE_EXIT_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
     char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
@@ -207,7 +207,7 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   return supine_options_finish(name);
 }
 
-/* Read a person's own law, and what the file keeps of it, which the caller owns. */
+/* Read a patient model and the text that the basis stores of it; the caller frees the text. */
 static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
                                   supine_error *error) {
   supine_status status = supine_patient_read(wanted->patient, record, error);
@@ -219,7 +219,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  wanted->model.choice.law = SUPINE_LAW_DEEP; /* what the options below say of constants */
+  wanted->model.choice.law = SUPINE_LAW_DEEP; /* law whose constants the options below replace */
   wanted->basis.patient = *text;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
@@ -238,8 +238,8 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Constants beside a patient's: which of the two is meant? Only before loading, which fills in what
- * was not given. */
+/* Refuse constants given beside a patient model. Call before loading, which sets those not
+ * given. */
 static int check_patient(const request *wanted) {
   const supine_model_choice *choice = &wanted->model.choice;
   const supine_model *model = &choice->model;
@@ -270,7 +270,7 @@ static int run(void *chosen, const supine_arguments *given) {
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
   supine_error error;
   char *text = NULL;
-  static supine_patient_record record; /* some 40 kB */
+  static supine_patient_record record; /* about 40 kB, too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_options_usage(
         name, "%s: this name is a mesh's: give a name that ends in .safetensors", wanted->path);

@@ -30,7 +30,7 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
     {.name = NULL}};
 
-/* What is not finite is null, as JSON has no word for it. */
+/* Numbers that are not finite become null: JSON cannot represent them. */
 static json_t *json_numbers(size_t count, const double *numbers) {
   json_t *list = json_array();
   for (size_t i = 0; i < count; ++i) {
@@ -114,7 +114,7 @@ static int run_fit(const char *path, const request *chosen) {
   return supine_options_finish(command);
 }
 
-/* One row of show; nothing where the pressure is outside a limb. */
+/* Print one row of show; nothing where the pressure lies outside a limb. */
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
   (void)printf("%.10g", pressure);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {

@@ -23,7 +23,7 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
     return supine_options_fail(name, &error);
   }
   if (supine_render_picture_write(renderer, picture, output.file, &error) != SUPINE_OK) {
-    if (ferror(output.file) != 0) { /* why a write failed, the output knows */
+    if (ferror(output.file) != 0) { /* the output knows why a write failed */
       (void)supine_output_commit(&output, &error);
     }
     supine_output_abandon(&output);
@@ -36,7 +36,7 @@ static int write_picture(const request *wanted, supine_renderer *renderer,
   return supine_options_finish(name);
 }
 
-/* Draws and writes what states and colours were found for. */
+/* Draw and write the states with the colours found for them. */
 static int draw(const request *wanted, supine_renderer *renderer,
                 const supine_posture_list *postures, const char *from, const state *states,
                 const double ends[2]) {
@@ -75,7 +75,7 @@ static int render(const supine_basis *basis, const request *wanted,
   supine_compare *compare = NULL;
   supine_renderer *renderer = NULL;
   supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  double ends[2] = {0.0, 0.0}; /* of the colours: 95th percentile, largest */
+  double ends[2] = {0.0, 0.0}; /* end of the colours: the 95th percentile, and the largest value */
   int result = SUPINE_EXIT_OK;
   state *states = calloc(count, sizeof *states);
   float *values = malloc(count * n * sizeof *values);
@@ -209,7 +209,7 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
-/* The options make sense together; then the postures are read. */
+/* Check that the options fit each other, then read the postures. */
 static int check(const request *wanted, supine_posture_list *postures) {
   const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* the other: .png */
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {

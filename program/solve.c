@@ -19,7 +19,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_state state; /* its volume the default where none was given: rest */
+  supine_state state; /* its volume is rest where none was given */
   bool has_scale, has_vertex, as_scanned, pitcher_catcher;
   double scale;
   size_t vertex;
@@ -87,7 +87,7 @@ cleanup:
   return status;
 }
 
-/* mL that each lung is to hold beyond its healthy reference surface. */
+/* Compute the volume of each lung, mL, beyond its healthy reference surface. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -172,10 +172,10 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Share of the largest force that a node may still hold. */
+/* Iteration stops where no node holds more than this share of the largest force. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Prints each doubling of the distributions a vertex. */
+/* Print progress at each doubling of the number of distributions per vertex. */
 static void report_held(void *context, size_t steps, double held) {
   const size_t turns = steps / *(const size_t *)context;
   if ((turns & (turns - 1)) == 0) {
@@ -183,7 +183,7 @@ static void report_held(void *context, size_t steps, double held) {
   }
 }
 
-/* Replaces the solved catch by what the paper's iteration comes to. */
+/* Replace the directly solved catch by the result of the iteration of Santhanam 2008. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;

@@ -17,7 +17,7 @@
 
 static const char name[] = "stream";
 
-static const double budget = 15e-3; /* s a frame */
+static const double budget = 15e-3; /* time allowed per frame, s */
 
 typedef struct request {
   const char *listen, *connect, *device, *called;
@@ -132,7 +132,7 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-/* On a terminal: the last second's state, over the one before. */
+/* Print the state of the last second on a terminal, over the previous line. */
 static void show(void *context, supine_stream_server *server) {
   const supine_stream_counts *counts = supine_stream_server_counts(server);
   (void)context;
@@ -183,7 +183,7 @@ static void report(const supine_stream_server *server, const request *wanted) {
   }
 }
 
-/* What is observed live: a file of 'supine embed' and the names of its points. */
+/* Observed points: a file of 'supine embed' and their names. */
 typedef struct watched {
   supine_basis *inside;
   supine_command_names names;

@@ -15,7 +15,7 @@
 
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
 
-static const double search_span = 0.5; /* of a full breath, on either side */
+static const double search_span = 0.5; /* half-width of the search, in shares of a full breath */
 static const double golden = 0.6180339887498949;
 static const double same_posture = 1e-9;
 
@@ -85,7 +85,7 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
   if (s->from.posture[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
-  /* Where no rest is known, a posture alone is the scan. */
+  /* Where rest is unknown, a posture without a volume means the scan. */
   if (s->from.state.volume.kind == SUPINE_VOLUME_DEFAULT &&
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
@@ -101,7 +101,7 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
 
 /* --- a prediction ---------------------------------------------------------------------------- */
 
-/* The gains: as asked, or those of the state's volume. */
+/* Compute the gains: as given, or those of the state's volume. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -155,12 +155,12 @@ static supine_status predict_surface(const supine_command_subject *s,
 typedef struct search {
   const supine_inside_surface *tree;
   double *positions;      /* [vertices, 3] */
-  size_t vertices, count; /* of the mesh, and how many of them are searched */
+  size_t vertices, count; /* vertices of the mesh, and how many of them are searched */
   double *distance;       /* [count] */
 } search;
 
-/* mm RMS from predicted vertices to the surface at a scale: all gains in proportion, so that each
- * lung keeps its part. */
+/* Compute the RMS distance, mm, from predicted vertices to the surface at a scale; all gains keep
+ * their proportion. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
                                  const search *look, double *rms, supine_error *error) {
@@ -374,7 +374,7 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
-  if (status == SUPINE_OK && state->path != NULL) { /* adds the motion to the prediction */
+  if (status == SUPINE_OK && state->path != NULL) { /* add the fitted motion to the prediction */
     status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;

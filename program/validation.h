@@ -13,14 +13,14 @@ enum { SUPINE_COMMAND_STATES_MAX = 8 };
 
 /* A state as the command line names it. */
 typedef struct supine_command_state {
-  const char *path;                      /* its surface; NULL: landmarks alone */
-  char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not said */
-  supine_state state;                    /* of default volume: not said */
+  const char *path;                      /* its surface; NULL: landmarks only */
+  char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not given */
+  supine_state state;                    /* default volume: not given */
   bool has_scale;
   double scale; /* the gain instead; negative below full inflation */
 } supine_command_state;
 
-/* What came of one. */
+/* Result for one state. */
 typedef struct supine_command_outcome {
   supine_pose pose;
   double scale; /* its gain */
@@ -31,13 +31,13 @@ typedef struct supine_command_outcome {
   bool has_surface, has_points, has_best;
   supine_patient_distance surface[SUPINE_PATIENT_MAP_COUNT];
   supine_patient_distance points[SUPINE_PATIENT_MAP_COUNT];
-  double best_scale; /* that comes nearest to the surface */
-  double best_rms;   /* mm, of vertices to it */
+  double best_scale; /* best scale: least distance to the surface */
+  double best_rms;   /* distance of vertices to it, mm */
 } supine_command_outcome;
 
 typedef struct supine_command_subject {
   supine_basis *basis;
-  supine_patient_moved moved; /* which motion between the scans is taken out */
+  supine_patient_moved moved; /* motion between the scans that is removed */
   supine_command_state from;
   double from_scale, from_millilitres; /* gain and volume of the state that motion starts from */
   supine_mesh rest;                    /* where motion starts from */

@@ -9,7 +9,7 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-/* mm at the end of the colours: what is less is not worth a colour. */
+/* Least end of the colours, mm: smaller errors need no colour. */
 static const double end_least = 1.0;
 
 /* How far each vertex is predicted from the state's surface, mm; the largest, and what 95 % of the

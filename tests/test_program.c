@@ -107,7 +107,7 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(1, "name them all", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
-  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL): outside the 10 to 120 %",
+  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
   EXPECT(5, "left: 7915 mL are 132 % of", /* at the breath's end */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");

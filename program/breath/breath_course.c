@@ -9,7 +9,7 @@
 
 #include "program/breath/breath_course.h"
 
-/* The direction a quarter turn on from `from`, towards `to`. */
+/* Return the direction 90 degrees from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
   static const double left[3] = {1.0, 0.0, 0.0};
   static const double back[3] = {0.0, 1.0, 0.0};
@@ -50,7 +50,7 @@ void supine_breath_course_free(breath_course *course) {
   *course = (breath_course){0};
 }
 
-/* Eight parameters: the relation, the breath, the turn, and how many frames of how many lungs. */
+/* Eight parameters: the relation, the breath, the turn, and the numbers of frames and lungs. */
 supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
                                           const breath_turn *turn, double rate, size_t count,
                                           size_t lungs, breath_course *course,

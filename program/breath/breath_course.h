@@ -9,14 +9,14 @@
 /* From one posture to another at constant speed, then staying there. */
 typedef struct breath_turn {
   double from[3], to[3]; /* unit */
-  double seconds;        /* 0: `to` from the beginning */
+  double seconds;        /* 0: gravity is `to` throughout */
 } breath_turn;
 
-/* Gravity at a time: along the shorter arc; from a direction to its opposite over the left side, or
- * over the back where gravity begins along the body. */
+/* Compute gravity at a time: along the shorter arc; between opposite directions over the left side,
+ * or over the back where gravity starts along the body. */
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
-/* All frames, of `lungs` lungs. */
+/* Compute all frames for `lungs` lungs. */
 typedef struct breath_course {
   size_t count;    /* T */
   size_t lungs;    /* G */
@@ -26,7 +26,7 @@ typedef struct breath_course {
   double *gravity; /* [T, 3] */
 } breath_course;
 
-/* Frames 0 to `count` - 1 at `rate` a second; release with supine_breath_course_free. */
+/* Compute frames 0 to `count` - 1 at `rate` a second; release with supine_breath_course_free. */
 supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
                                           const breath_turn *turn, double rate, size_t count,
                                           size_t lungs, breath_course *course, supine_error *error);

@@ -10,7 +10,7 @@
 
 enum { RUN_MAX = 128 };
 
-static const double tolerance = 0.01; /* mL, of the frames of a run */
+static const double tolerance = 0.01; /* largest error of a volume within a run, mL */
 
 typedef double lung_gains[SUPINE_LUNGS_MAX][3];
 
@@ -126,7 +126,7 @@ static void find_runs(breath_frames *frames) {
       stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * course->lungs);
       ++frames->stepped;
     }
-    if (last > first) { /* the first frame's gains and the step stay */
+    if (last > first) { /* the gains of the first frame and the step stay */
       mix_gains(frames, first, last, 1.0 / (double)(last - first), frames->gains[first + 1]);
     }
     first = last + 1;
@@ -161,10 +161,10 @@ supine_status supine_breath_frames_create(const supine_basis *basis, const breat
   return SUPINE_OK;
 }
 
-/* A frame from its orientation and volume: what a player that knew nothing in advance would do. */
+/* Compute a frame from its orientation and volume, as a player that knows no later frame would. */
 static void place(breath_frames *frames, size_t t, float *xyz) {
   supine_pose pose;
-  (void)pose_frame(frames, t, &pose, NULL); /* it was found before */
+  (void)pose_frame(frames, t, &pose, NULL); /* the pose was computed before, so this cannot fail */
   supine_deform(frames->basis, &pose, xyz);
   if (t + 1 < frames->course->count && frames->run[t + 1] == t) { /* a run begins */
     for (size_t i = 0; i < 3 * frames->course->lungs; ++i) {

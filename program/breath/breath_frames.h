@@ -27,7 +27,7 @@ double supine_breath_frames_next(breath_frames *frames, float *xyz);
 /* Volume of each lung, gas and tissue, [T, G], mL. */
 const double *supine_breath_frames_volumes(const breath_frames *frames);
 
-/* Frames that three additions a vertex made. */
+/* Return the number of frames computed as a step (three additions a vertex). */
 size_t supine_breath_frames_stepped(const breath_frames *frames);
 
 #endif

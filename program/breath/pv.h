@@ -14,12 +14,12 @@
 /** What a fit determines: the control parameters and the volumes at the two ends. */
 enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 
-/** How well samples determine a limb. */
+/** Quality of the fit of one limb. */
 typedef struct supine_pv_report {
   size_t samples;    /**< 0: the limb had none, and its curve is the other limb's */
   double confidence; /**< of the intervals, 0 to 1 */
-  double control_interval[SUPINE_PV_CONTROLS];               /**< c_i +- this, Student t */
-  double volume_interval[2];                                 /**< V_low, V_high +- this, mL */
+  double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of the Student t interval of c_i */
+  double volume_interval[2]; /**< half-widths of the intervals of V_low and V_high, mL */
   double covariance[SUPINE_PV_UNKNOWNS][SUPINE_PV_UNKNOWNS]; /**< c_1 ... c_5, V_low, V_high */
   double rms;                                                /**< root mean square misfit, mL */
   double rms_percent; /**< the same as a percentage of the samples' volume range */

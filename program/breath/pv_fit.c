@@ -24,7 +24,7 @@ typedef struct problem {
  *   V = (1 - q) V_low + q V_high      dq/dc_i = (dy/dc_i - q dy(1)/dc_i) / y(1) */
 static int problem_evaluate(const gsl_vector *unknowns, problem *limb, gsl_vector *residual,
                             gsl_matrix *jacobian) {
-  static const double wall = 1e6; /* a misfit that turns the search back */
+  static const double wall = 1e6; /* residual that makes the search step back */
   const size_t size = jacobian != NULL ? PV_STATE_WITH_RESPONSES : PV_STATE;
   const double *control = unknowns->data;
   for (size_t i = 0; i < SUPINE_PV_CONTROLS; ++i) {
@@ -88,7 +88,7 @@ static supine_status problem_solve(problem *limb, gsl_multifit_nlinear_workspace
   if (limb->status != SUPINE_OK) {
     return limb->status;
   }
-  /* No progress is what a minimum reached to rounding looks like. */
+  /* A minimum reached to rounding makes no further progress. */
   return code == GSL_SUCCESS || code == GSL_ENOPROG ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
 }
 
@@ -129,7 +129,7 @@ static supine_status fit_curve(problem *limb, double span, double confidence,
   return status;
 }
 
-/* Nine parameters, over 60 lines: samples, how to fit them, and what comes of it, limb by limb. */
+/* Fit both limbs. Nine parameters, over 60 lines: samples, options of the fit, and its results. */
 supine_status supine_breath_fit(size_t count, const double *pressures, const double *volumes,
                                 const size_t *lines, const char *name, double confidence,
                                 supine_pv_curve *curve, supine_pv_report *report,

@@ -34,7 +34,8 @@ typedef struct pv_origin {
   const double *volumes;   /* [count] */
 } pv_origin;
 
-/* Enough samples, finite, pressures strictly rising or falling, volume higher at the end. */
+/* Check that there are enough samples, finite, with pressures strictly rising or falling and a
+ * higher volume at the end. */
 supine_status supine_breath_samples_check(const pv_origin *origin, supine_error *error);
 
 /* Least and greatest pressure, volumes at these, and the span of the volumes, mL. */
@@ -46,8 +47,8 @@ void supine_breath_samples_range(const pv_origin *origin, supine_pv_curve *curve
 supine_status supine_breath_check_falls(const pv_origin *origin, const double *v, double allowed,
                                         supine_error *error);
 
-/* Statistics of a least-squares minimum in shares of `span` mL, and its noise, in the same shares,
- * estimated robustly. */
+/* Compute the statistics of a least-squares minimum and estimate its noise robustly, both in shares
+ * of `span` mL. */
 supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_vector *residual,
                                         double span, double confidence, supine_pv_report *report,
                                         double *sigma);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How well samples determine a limb. */
+/* Quality of the fit of a limb. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -29,7 +29,7 @@ static double jacobian_condition(const gsl_matrix *jacobian, double *scaled) {
   return found ? s[0] / s[columns - 1] : 0.0;
 }
 
-/* sigma from the median absolute residual, which a few bad samples do not move. */
+/* Estimate sigma from the median absolute residual, which is robust against outliers. */
 static double residual_sigma(const gsl_vector *residual, gsl_vector *scratch) {
   static const double normal = 1.4826; /* sigma over median |error| of the normal distribution */
   const size_t count = residual->size;
@@ -66,7 +66,7 @@ supine_status supine_breath_report_fill(const gsl_matrix *jacobian, const gsl_ve
                                .rms_percent = 100.0 * misfit / sqrt((double)count),
                                .condition = jacobian_condition(jacobian, scaled)};
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
-    const double unit_i = i < SUPINE_PV_CONTROLS ? 1.0 : span; /* shares of the range to mL */
+    const double unit_i = i < SUPINE_PV_CONTROLS ? 1.0 : span; /* from shares of the range to mL */
     for (size_t j = 0; j < SUPINE_PV_UNKNOWNS; ++j) {
       const double unit_j = j < SUPINE_PV_CONTROLS ? 1.0 : span;
       report->covariance[i][j] = unit_i * unit_j * variance * gsl_matrix_get(covariance, i, j);

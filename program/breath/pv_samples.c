@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Samples of a limb: whether they can be fitted, and which one is at fault where not. */
+/* Check the samples of a limb, and name the one at fault. */
 #include <math.h>
 
 #include "program/breath/pv_internal.h"
 
-/* Blames sample j of the caller's order: "FILE:LINE: " or "samples: sample 3: ", then why. */
+/* Report sample j of the caller's order: "FILE:LINE: " or "samples: sample 3: ", then the
+ * reason. */
 static supine_status sample_fail(const pv_origin *origin, size_t j, supine_error *error,
                                  const char *why) {
   const char *name = origin->name != NULL ? origin->name : "samples";
@@ -82,7 +83,7 @@ supine_status supine_breath_check_falls(const pv_origin *origin, const double *v
   double peak = v[0];
   size_t seen = falling ? last : 0; /* which sample that is */
   for (size_t j = 1; j <= last; ++j) {
-    /* The rise that the samples on either side lead one to expect of this step. */
+    /* Predict the rise of this step from the samples on either side. */
     const size_t before = j >= 2 ? j - 2 : 0;
     const size_t after = j < last ? j + 1 : last;
     const double expected = fmax(0.0, (v[after] - v[before]) / (double)(after - before));

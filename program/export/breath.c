@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How deep a breath is: by volume where the surface is closed, by displacement where it is open. */
+/* Depth of a breath: by volume on closed surfaces, by displacement on open ones. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +22,8 @@ supine_status supine_export_breath_set(const export_source *source, double volum
   if (xyz == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  (void)supine_basis_weights(source->basis, supine, pose.weights); /* a direction that is legal */
+  (void)supine_basis_weights(source->basis, supine,
+                             pose.weights); /* cannot fail: a valid direction */
   supine_deform(source->basis, &pose, xyz);
   double farthest = 0;
   for (size_t i = 0; i < n; ++i) {
@@ -42,7 +43,7 @@ supine_status supine_export_breath_set(const export_source *source, double volum
   return SUPINE_OK;
 }
 
-/* mL beyond the reference that all lungs hold in a state; the pose has the state's weights. */
+/* Compute the volume of all lungs in a state, mL beyond the reference; the pose has its weights. */
 static supine_status held_in(const export_source *source, const supine_state *state,
                              supine_pose *pose, double *beyond, supine_error *error) {
   double held[SUPINE_LUNGS_MAX];
@@ -55,7 +56,7 @@ static supine_status held_in(const export_source *source, const supine_state *st
   return status;
 }
 
-/* The same gains for all lungs, at which they hold together what they do in the state. */
+/* Find the common gain at which all lungs together hold the volume of the state. */
 static supine_status find_common_gains(const export_source *source, const supine_state *state,
                                        supine_pose *pose, supine_error *error) {
   const supine_basis_info *info = source->info;

@@ -69,7 +69,8 @@ typedef struct export_parts {
 /** How to write glTF. Zeros: every mode as a target, float32, no animation. */
 typedef struct export_glb_options {
   bool eight;      /**< at most eight targets, the best there are */
-  bool clamp_safe; /**< weights from 0 to 1 for every gravity and breaths up to `breath` */
+  bool clamp_safe; /**< keep weights within 0 to 1 for every gravity and every breath up to `breath`
+                    */
   bool quantise;   /**< targets as 16-bit counts (KHR_mesh_quantization) */
   bool animate;    /**< an animation that breathes and turns the patient; clamp-safe too, because
                       there are engines whose animations know no other weights */

@@ -23,9 +23,10 @@
 #include "program/export/targets.h"
 
 enum { POSES = EXPORT_POSES, PARTS = 5 };
-static const double singular = 1e-6; /* of the largest singular value: what the poses do not tell */
+static const double singular =
+    1e-6; /* share of the largest singular value below which a direction is not determined */
 
-/* A = U S V^T of the poses' weights [POSES, J], in place, then A := pinv(A)^T. */
+/* Replace A = U S V^T, the weights of the poses [POSES, J], by pinv(A)^T. */
 static supine_status invert(size_t count, double *a) {
   const int j = (int)count;
   double *u = malloc(POSES * count * sizeof *u);
@@ -77,8 +78,7 @@ static supine_status find_turn(size_t count, const export_pose *pose, double *tu
  * along them. */
 static void settle(const export_targets *targets, size_t n, const double *turn, const float *own,
                    float *base, float *added) {
-  static const double least =
-      0.2; /* a base that the fit makes shorter has no direction of its own */
+  static const double least = 0.2; /* the fit shortens this base until it has no direction */
   for (size_t i = 0; i < n; ++i) {
     double sum[3];
     double length = 0.0;
@@ -132,7 +132,7 @@ supine_status supine_export_targets_normals(const export_source *source,
     double g[3];
     supine_spiral((double)p, POSES, 0, g);
     double part = (double)(p % PARTS) / (PARTS - 1);
-    do { /* a breath that folds is no pose: one less deep is */
+    do { /* a breath at which the surface folds is replaced by a shallower one */
       status = supine_export_targets_at(source, breath, targets, g, part, &pose[p], error);
       part /= 2;
     } while (status == SUPINE_ERROR_NUMERICAL && part > 1e-3);

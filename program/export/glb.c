@@ -10,7 +10,7 @@ enum { CHUNK_ALIGNMENT = 4 };
 static const uint32_t magic = 0x46546C67, version = 2, json_chunk = 0x4E4F534A,
                       binary_chunk = 0x004E4942;
 
-/* A file on its way. */
+/* A file being written. */
 typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
@@ -82,7 +82,7 @@ static json_t *plan_mesh(glb *g) {
                                                                  GLTF_VERTICES, 3, low, high);
     (void)supine_export_glb_plan_add(&g->plan, GLTF_FLOAT, "VEC3", n, GLTF_VERTICES, 3, NULL, NULL);
     (void)json_array_append_new(targets, json_pack("{s:I, s:I}", "POSITION", at, "NORMAL", at + 1));
-    /* At breath scale 0. Stored as the positions are, so that no engine sees another. */
+    /* Write the base at breath scale 0, rounded as the positions are stored. */
     (void)json_array_append_new(weights, json_real(0 - g->targets.offset[j] / g->targets.unit[j]));
   }
   json_t *primitives = json_array();

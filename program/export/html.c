@@ -20,8 +20,9 @@ enum { COUNT_MAX = 32767 };
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double unit[EXPORT_PAGE_MODES_MAX];        /* mm a count, of each mode of the lungs */
-  double inside_unit[EXPORT_PAGE_MODES_MAX]; /* likewise, of what is inside */
+  double unit[EXPORT_PAGE_MODES_MAX];        /* mm per count, for each mode of the lungs */
+  double inside_unit[EXPORT_PAGE_MODES_MAX]; /* mm per count, for each mode of the embedded
+                                                structures */
 } page;
 
 static void write_tensor(FILE *file, const char *name, const void *bytes, size_t size) {
@@ -30,7 +31,7 @@ static void write_tensor(FILE *file, const char *name, const void *bytes, size_t
   (void)fputs("</script>\n", file);
 }
 
-/* A vertex's direction as it is in the file, whose length goes into the coefficients. */
+/* Return a vertex's direction as in the file; its length is moved into the coefficients. */
 static double length_of_direction(const export_source *s, size_t vertex) {
   const float *d = s->direction + 3 * vertex;
   const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
@@ -86,13 +87,13 @@ static void find_units(page *p) {
       p->inside_unit[i % k] = fmax(p->inside_unit[i % k], c / COUNT_MAX);
     }
   }
-  for (size_t i = 0; i < k; ++i) { /* a mode that moves nothing has no unit */
+  for (size_t i = 0; i < k; ++i) { /* a mode without displacement needs no unit */
     p->unit[i] = p->unit[i] > 0 ? p->unit[i] : 1;
     p->inside_unit[i] = p->inside_unit[i] > 0 ? p->inside_unit[i] : 1;
   }
 }
 
-/* Triangles: 16 bits a corner where they name every vertex. */
+/* Write triangles as 16-bit indices where these can number every vertex, else as 32-bit ones. */
 static void write_triangles(FILE *file, const char *name, const export_source *s) {
   enum { AT_ONCE = 3072 };
   uint16_t corners[AT_ONCE];
@@ -174,7 +175,7 @@ static json_t *lung_begins(const supine_basis_info *info) {
   return list;
 }
 
-/* What is inside, or null. */
+/* Return the embedded structures as JSON, or null. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();
@@ -213,7 +214,7 @@ static double scan_volume(const export_source *s) {
   return beyond;
 }
 
-/* What displacements count from. */
+/* State that displacements are measured from. */
 static json_t *describe_from(const page *p) {
   return json_pack("{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
                    numbers(p->shown->from->weights, p->source->info->mode_count), "gains",

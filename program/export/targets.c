@@ -10,7 +10,8 @@
 #include "program/export/targets.h"
 
 enum { EIGHT = 8, DIRECTIONS = 4096, COUNT_MAX = 32767 };
-static const double margin = 0.02; /* of a range, on both sides: between the directions tried */
+static const double margin =
+    0.02; /* Margin added to each range on both sides, for directions between those sampled. */
 
 static bool allocate(const export_source *source, export_targets *targets) {
   const size_t k = source->info->mode_count;

@@ -22,7 +22,7 @@ typedef struct export_targets {
   double *offset;      /**< [count] */
   double *unit;        /**< [count] */
   double loss_percent; /**< see export_glb_report */
-  double count_mm;     /**< what one stored unit of length is, mm: 1, or a count's when quantised */
+  double count_mm; /**< mm per stored unit of length: 1, or the size of a count when quantised */
 } export_targets;
 
 /** Chooses targets for the options.

@@ -33,7 +33,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
       const size_t up = corner >> a & 1U;
       weight[a] = up ? cell->share[a] : 1.0 - cell->share[a];
       at[a] = cell->corner[a] + up;
-      at[a] -= at[a] == image->size[a]; /* an image of one slice; its weight is 0 */
+      at[a] -= at[a] == image->size[a]; /* a one-slice image: the next slice has weight 0 */
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
     for (size_t c = 0; c < image->channels; ++c) {

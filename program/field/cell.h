@@ -11,12 +11,12 @@ typedef struct supine_field_cell {
   double share[3];
 } supine_field_cell;
 
-/* The nearest cell, at its border where the point lies outside. */
+/* Find the cell that contains a point, or for a point outside the nearest cell, at its border. */
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* All channels there of an F32 image, and optionally their derivative [channels, 3] by the shares.
- */
+/* Interpolate all channels of an F32 image and, optionally, their derivative [channels, 3] by the
+ * shares. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

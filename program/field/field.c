@@ -44,7 +44,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   }
   double axes[3] = {0.0, 0.0, 0.0};
   if (well) {
-    supine_image_locate(nodes, axes, axes); /* not finite where the steps are no frame */
+    supine_image_locate(nodes, axes,
+                        axes); /* not finite where the steps of the grid are not independent */
   }
   if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -113,7 +114,7 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
     if (!any) {
       break;
     }
-    /* The layer before this one no longer differs from what is known. */
+    /* The previous layer counts as known from here on. */
     for (size_t i = 0; i < count; ++i) {
       known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
     }

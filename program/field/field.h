@@ -13,7 +13,8 @@
 /** u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
   supine_image nodes; /**< three channels, F32 */
-  supine_image depth; /**< one, F32: mm below the lungs' surface, negative outside; none of an inverse */
+  supine_image
+      depth; /**< one, F32: mm below the lungs' surface, negative outside; none of an inverse */
 } supine_field;
 
 /** The field of a basis's grid in a pose, from the scan. Outside the lungs, beyond the nodes that
@@ -28,7 +29,7 @@ void supine_field_free(supine_field *field);
 /** u at any point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
-/** How far forward and inverse together miss. */
+/** Residual of the field followed by its inverse. */
 typedef struct supine_field_residual {
   double rms, largest; /**< mm, over the nodes inside: |u(x) + v(x + u(x))| */
   size_t lost; /**< nodes of the inverse at which none was found to 0.01 mm: the field folds */
@@ -42,9 +43,9 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
                                   supine_field_residual *residual, supine_error *error);
 
 /** moved(y) = image(y + v(y)) on the image's own voxels; where that lies outside the image, the
- * nearest of its voxels. With a depth, that of the field, densities (Hounsfield units + 1000) inside
- * the lungs are multiplied by det(dv/dy + 1), the volume that the tissue had of that it has now, so
- * that its mass is kept; outside, where the field means nothing, they stay.
+ * nearest of its voxels. With a depth, that of the field, densities (Hounsfield units + 1000)
+ * inside the lungs are multiplied by det(dv/dy + 1), the volume that the tissue had of that it has
+ * now, so that its mass is kept; outside, where the field means nothing, they stay.
  * @param inverse  of supine_field_invert
  * @param depth    NULL: densities are not scaled
  * @param labels   nearest voxel instead of linear

@@ -28,7 +28,7 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* The step in shares that takes the residual away; false where the field folds. */
+/* Compute the Newton step, in shares; false where the field folds. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
   supine_image cell = {.origin = {0.0}}; /* where shares are coordinates */
   for (size_t k = 0; k < 9; ++k) {
@@ -38,8 +38,8 @@ static bool newton(const double slope[3][3], const double residual[3], double st
   return isfinite(step[0] + step[1] + step[2]);
 }
 
-/* x with x + u(x) = y from the x that is there; how far off it is. Newton's steps, halved until
- * they help: the field's derivative jumps between cells. */
+/* Find x with x + u(x) = y, starting from x, and return the residual. Newton steps are halved until
+ * they reduce it: the derivative of the field is discontinuous between cells. */
 static double solve(const supine_field *field, const double y[3], double x[3]) {
   enum { STEPS = 40, HALVINGS = 6 };
   double residual[3];
@@ -111,7 +111,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Forward and back again, from every node inside. */
+/* Measure the residual of field and inverse at every node inside. */
 static void measure(const supine_field *field, const supine_field *inverse,
                     supine_field_residual *residual) {
   const supine_image *nodes = &field->nodes;

@@ -17,8 +17,8 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
-  const supine_image *depth; /* NULL: densities stay, and `inside` is empty */
-  supine_image inside;       /* the lungs, 1 of each of the image's voxels, else 0 */
+  const supine_image *depth; /* NULL: densities are not scaled and `inside` is empty */
+  supine_image inside;       /* mask of the lungs: 1 or 0 for each voxel of the image */
   const supine_image *from;
   supine_image *to;
   bool labels;
@@ -33,7 +33,7 @@ typedef struct cells {
 
 /* Find the cells of points, mm: the operations of supine_field_find_cell in the same order. */
 INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *found) {
-  const supine_image frame = *image; /* which no store below can change */
+  const supine_image frame = *image; /* a local copy, so that stores cannot alias it */
   double at[3][RUN];
   double across[3];
   supine_cross(frame.step[1], frame.step[2], across);

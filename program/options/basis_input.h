@@ -15,12 +15,12 @@ extern const supine_option supine_options_as_scanned[];
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
-/* Files in the axes and units that the scan came in, where they are wanted; an exit code after a
- * message where the basis does not know them. */
+/* Select the axes and units of the scan where requested; an exit code after a message where the
+ * basis does not know them. */
 int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
                                supine_mesh_save_options *save);
 
-/* The rest surface as a mesh of its own. */
+/* Copy the reference surface into a mesh. */
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
 
 #endif

@@ -39,11 +39,10 @@ int supine_options_fail(const char *command, const supine_error *error);
 /* Prints a message and "Try 'supine COMMAND --help'."; returns SUPINE_EXIT_USAGE. */
 int supine_options_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Results reached stdout? Flushes; a full disk or closed pipe ends with SUPINE_EXIT_OUTPUT. */
+/* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
 int supine_options_finish(const char *command);
 
-/* The command line in one line, for what a file says of how it was made; names of files without
- * their folders. */
+/* Write the command line as one line for a file's metadata; names of files lose their folders. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
 /* Reads a finite number, or a whole one, that takes up the whole text. */
@@ -53,7 +52,7 @@ bool supine_options_parse_count(const char *text, size_t *value);
 /* Reads exactly `count` finite numbers separated by commas. */
 bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
-/* The candidate that is fewest edits from `text`, or NULL where all are far. */
+/* Return the candidate with the fewest edits from `text`, or NULL where all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
 /* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors as commands tell them. */
+/* Expected errors in the output of commands. */
 #include <math.h>
 #include <stdlib.h>
 

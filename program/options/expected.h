@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors as commands tell them. */
+/* Expected errors in the output of commands. */
 #ifndef SUPINE_OPTIONS_EXPECTED_H
 #define SUPINE_OPTIONS_EXPECTED_H
 

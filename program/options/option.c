@@ -14,7 +14,7 @@ enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* long options are FIRST_LO
 
 typedef struct row {
   const supine_option *option;
-  char *begin; /* of its struct, in the request */
+  char *begin; /* its struct within the request */
   bool given;
   const char *value;
 } row;
@@ -24,7 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard[16]; /* "-" with the first of an output's endings */
+  char standard[16]; /* "-" and the first ending of an output */
 } reading;
 
 static void collect(void *context, const supine_option *option, size_t base) {
@@ -85,7 +85,7 @@ static int read_value(const char *command, const supine_option *option, const ch
   return good ? SUPINE_EXIT_OK : SUPINE_OPTION_MISFIT;
 }
 
-/* What the option takes, in words. */
+/* Describe the values that the option takes. */
 static void say_wanted(const supine_option *option, char *text, size_t size) {
   if (option->wants != NULL) {
     (void)snprintf(text, size, "%s", option->wants);
@@ -165,7 +165,7 @@ static int take_given(reading *r, row *taken, const char *text) {
   return take(r, taken, text);
 }
 
-/* What getopt_long does not know, or what lacks its value. */
+/* Report an unknown option, or one without its value. */
 static int say_unknown(const reading *r, int result, const char *given) {
   const char *names[ROWS_MAX + 1];
   for (size_t i = 0; i < r->count; ++i) {
@@ -226,7 +226,7 @@ static int read_options(reading *r, int argc, char **argv) {
   return SUPINE_EXIT_OK;
 }
 
-/* The ending is one of ".ply, .obj or .stl", whatever its case. */
+/* Check that a name ends in one of ".ply, .obj or .stl", in any case. */
 static bool has_ending(const char *path, const char *endings) {
   const char *dot = strrchr(path, '.');
   if (dot == NULL || dot == path || dot[-1] == '/') {
@@ -279,7 +279,7 @@ int supine_options_check_output(const char *command, const char *output, const c
               : SUPINE_EXIT_OK;
 }
 
-/* No output is an input or another output, and each can be written. */
+/* Check that an output is neither an input nor another output and can be written. */
 static int check_output(const reading *r, const row *output, const supine_arguments *given) {
   const char *name = r->command->name;
   int result = SUPINE_EXIT_OK;

@@ -68,12 +68,12 @@ typedef struct supine_option {
   size_t given;        /* 1 + offset of a bool that says whether it was given; 0: none */
   supine_option_reader *read;
   const char *standard; /* default, read like a value, told in the help; NULL: the field's zero */
-  double range[2];      /* of numbers and counts; both 0: any */
+  double range[2];      /* range of numbers and counts; both 0: any */
   bool open;            /* the range's ends are outside it */
   const char *wants;    /* "millilitres": for messages; NULL: from the kind and the range */
   const char *const *choices; /* ends with NULL; for completion where there is a reader */
   const char *alias;          /* another long name, not shown */
-  const char *rivals;         /* of options with the same word here one at most is given, once */
+  const char *rivals;         /* at most one of the options with the same word may be given, once */
   bool required;
   bool more; /* shown by --help-all, not by --help */
   supine_option_file file;
@@ -97,9 +97,9 @@ typedef struct supine_option {
 
 /* What a command runs on, beside its request. */
 typedef struct supine_arguments {
-  char **operand; /* what is no option, in order */
+  char **operand; /* operands, in order */
   size_t count;
-  const char *made_by; /* the command line in one line, for what a file says of its making */
+  const char *made_by; /* the command line, for the metadata of a file */
 } supine_arguments;
 
 typedef struct supine_command {

@@ -28,7 +28,7 @@ typedef struct supine_posture_list {
 int supine_options_posture_list_parse(const char *command, const char *text,
                                       supine_posture_list *list);
 
-/* A name as people say it: "left side" of "left"; other names as they are. */
+/* Return a posture's name in words: "left side" for "left"; other names unchanged. */
 const char *supine_options_posture_label(const char *name);
 
 #endif

@@ -6,9 +6,11 @@
 #include "program/options/basis_input.h"
 #include "program/options/state.h"
 
-static const double least_of_full = 0.1; /* tissue alone: nothing is emptier */
+static const double least_of_full =
+    0.1; /* share of full inflation held by tissue alone, the least possible */
 static const double most_of_full = 1.2;
-static const double folded_limit = 0.01; /* of the triangles: the surface is no lung's any more */
+static const double folded_limit =
+    0.01; /* share of turned-over triangles above which the surface is implausible */
 
 int supine_options_read_volume(const char *command, const char *text, void *field) {
   supine_error error;
@@ -20,7 +22,7 @@ int supine_options_read_volume(const char *command, const char *text, void *fiel
 static int read_from(const char *command, const char *text, void *field) {
   supine_state *state = field;
   supine_error error;
-  *state = (supine_state){.gravity = {0.0}}; /* no posture: see supine_options_reference */
+  *state = (supine_state){.gravity = {0.0}}; /* no posture: supine_options_reference chooses it */
   return supine_state_parse(text, state, &error) == SUPINE_OK
              ? SUPINE_EXIT_OK
              : supine_options_usage(command, "--from: %s", error.message);
@@ -57,7 +59,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    if (!posed) { /* a volume alone: of the scan in its own posture, else supine */
+    if (!posed) { /* a volume without a posture: that of the scan, else supine */
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);
       const double supine[3] = {0.0, 1.0, 0.0};
@@ -81,7 +83,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-/* Fail with what is wrong where that is `strict`; else say it. */
+/* Fail with the message where `strict`, else print it. */
 static supine_status say_or_fail(const supine_error *wrong, const char *command, bool strict,
                                  supine_error *error) {
   if (strict) {

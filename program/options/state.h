@@ -17,7 +17,7 @@ int supine_options_read_volume(const char *command, const char *text, void *fiel
 extern const supine_option supine_options_folds[];
 
 typedef struct supine_volume_options {
-  supine_state state; /* its volume; the default where none was given */
+  supine_state state; /* its volume is the default where none was given */
   bool allow_folds;
 } supine_volume_options;
 
@@ -35,7 +35,7 @@ typedef struct supine_from {
   supine_state state;
 } supine_from;
 
-/* What displacements count from: a state, its pose, and its name for people. */
+/* State that displacements are measured from, its pose, and its name for people. */
 typedef struct supine_reference_pose {
   supine_state state;
   supine_pose pose;
@@ -48,9 +48,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Whether lungs can look like this: where rest is known, volumes below tissue alone or a fifth
+/* Check that the state is plausible. Where rest is known, volumes below tissue alone or a fifth
  * above full, and surfaces that fold, are SUPINE_ERROR_NUMERICAL unless folds are allowed;
- * elsewhere, and then, it is said. */
+ * otherwise they are warned about. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);

@@ -21,7 +21,7 @@ typedef struct supine_landmark_options {
 /* --landmarks, --reverse, --translation and --rigid, a table that fills one. */
 extern const supine_option supine_options_landmarks[];
 
-/* Prints what was found of an input, a line each. */
+/* Print the findings about an input, one per line. */
 void supine_options_say_findings(const char *command, const supine_findings *findings);
 
 #endif

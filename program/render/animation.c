@@ -7,7 +7,7 @@
 
 #include "program/render/render.h"
 
-/* Of 100: letters stay sharp at a tenth of the size of exact pixels. */
+/* Quality, of 100: letters stay sharp at a tenth of the lossless size. */
 static const float quality = 90.0F;
 enum { EFFORT = 2, SIDE_MAX = 16383 };
 
@@ -15,7 +15,7 @@ struct supine_animation {
   WebPAnimEncoder *encoder;
   WebPConfig config;
   size_t width, height;
-  int time; /* ms, so far */
+  int time; /* duration so far, ms */
   uint32_t *pixels;
 };
 
@@ -29,7 +29,7 @@ supine_status supine_render_animation_open(size_t width, size_t height,
   }
   supine_animation *made = calloc(1, sizeof *made);
   if (made != NULL && WebPAnimEncoderOptionsInit(&options) && WebPConfigInit(&made->config)) {
-    options.kmax = 1; /* whole frames: differences of lossy ones add up to staircases of colour */
+    options.kmax = 1; /* key frames only: differences of lossy frames leave staircases of colour */
     made->config.quality = quality;
     made->config.method = EFFORT;
     made->width = width;

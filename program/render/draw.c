@@ -90,14 +90,14 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   return c;
 }
 
-/* A vector of the body as the viewer has it: right, up, towards the viewer. */
+/* Rotate a vector to the viewer's axes: right, up, towards the viewer. */
 static void turn(const camera *c, const double v[3], double seen[3]) {
   for (size_t row = 0; row < 3; ++row) {
     seen[row] = c->axes[row][0] * v[0] + c->axes[row][1] * v[1] + c->axes[row][2] * v[2];
   }
 }
 
-/* A position likewise, from the centre. */
+/* Transform a position to the viewer's axes, from the centre. */
 static void place(const camera *c, const float xyz[3], double seen[3]) {
   const double from[3] = {(double)xyz[0] - c->centre[0], (double)xyz[1] - c->centre[1],
                           (double)xyz[2] - c->centre[2]};
@@ -164,7 +164,7 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 
 /* --- the nearest triangle of each sample ----------------------------------------------------- */
 
-/* What the threads that draw share. */
+/* Data shared by the drawing threads. */
 typedef struct canvas {
   const supine_renderer *renderer;
   const supine_scene *scene;
@@ -222,7 +222,7 @@ static face face_of(const canvas *c, size_t triangle) {
   return f;
 }
 
-/* Shares of the corners at a place of the picture. */
+/* Compute the barycentric coordinates of a place in the picture. */
 static void shares_at(const face *f, float x, float y, float share[3]) {
   for (int k = 0; k < 3; ++k) {
     const corner *a = f->at[(k + 1) % 3];
@@ -292,7 +292,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* How much of a contour line is here, as contour.glsl has it. */
+/* Compute the coverage of a contour line, as in contour.glsl. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =

@@ -91,7 +91,7 @@ static void text(cairo_t *cr, double x, double y, double align, const char *word
   cairo.show_text(cr, words);
 }
 
-/* The same, made smaller where it is wider than `room`. */
+/* Draw text, scaled down where it is wider than `room`. */
 static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
                         const char *words) {
   font(cr, size, bold);
@@ -158,7 +158,7 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
   cairo.fill(cr);
 }
 
-/* The ball that says how the body lies to the viewer, and gravity to the body. */
+/* Draw the ball that shows the body's axes and gravity. */
 static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
                  const double gravity[3], const theme *look) {
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
@@ -202,7 +202,7 @@ static void place_name(double (*box)[3], size_t count, double line) {
     const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
     if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
       own[1] = box[i][1] + line;
-      i = SIZE_MAX; /* from the first again: i + 1 is 0 */
+      i = SIZE_MAX; /* start again at the first name: i + 1 is 0 */
     }
   }
 }
@@ -508,7 +508,7 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
   return status;
 }
 
-/* Bytes of a growing file. */
+/* A growing file in memory. */
 typedef struct buffer {
   unsigned char *bytes;
   size_t size, room;

@@ -17,7 +17,7 @@ const char *supine_report_ink(supine_colours map, double t) {
   return 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] > 0.5 ? "#101418" : "#fff";
 }
 
-/* Told apart by people with any colour vision (M. Okabe and K. Ito, 2008). */
+/* Colours distinguishable with any colour vision (M. Okabe and K. Ito, 2008). */
 const char *supine_report_line(size_t posture) {
   static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                       "#56b4e9", "#e69f00", "#8c8c8c"};

@@ -5,7 +5,7 @@
 
 #include "program/report/comparison.h"
 
-/* Who ventilates in a breath from the volume on. */
+/* Compute the ventilation of a breath from the volume on. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {
@@ -111,7 +111,7 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
 }
 
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
-  supine_state supine = c->state; /* where the search begins */
+  supine_state supine = c->state; /* the search starts there */
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   const size_t count = c->postures.count;
   supine_status status = SUPINE_ERROR_MEMORY;

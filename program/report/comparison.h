@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What 'supine compare' finds out, and the forms in which it tells. */
+/* Results of 'supine compare', and their output forms. */
 #ifndef SUPINE_COMPARISON_H
 #define SUPINE_COMPARISON_H
 
@@ -13,13 +13,13 @@
 
 enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
 
-/* One posture at the volume. */
+/* Results for one posture at the volume of the comparison. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement;   /* from the comparison's reference */
-  double expected_error;                     /* of it, mm RMS; 0 where it is not known */
-  double volume[SUPINE_LUNGS_MAX];           /* mL that each lung holds, tissue included; closed */
-  double gain[SUPINE_LUNGS_MAX];             /* mL that each takes of the breath; closed */
+  supine_distance_statistics displacement; /* from the comparison's reference */
+  double expected_error;           /* expected error of the displacement, mm RMS; 0 where unknown */
+  double volume[SUPINE_LUNGS_MAX]; /* mL that each lung holds, tissue included; closed */
+  double gain[SUPINE_LUNGS_MAX];   /* mL that each takes of the breath; closed */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
 } supine_compared_posture;
 
@@ -52,7 +52,7 @@ void supine_report_volume(const supine_comparison *comparison, char *text, size_
 /* Are expected errors known? */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* What all lungs together take of the breath in a posture, mL. */
+/* Return the share of a breath that all lungs take in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* The forms. They leave errors of writing to be found when the file is closed. */
@@ -60,7 +60,7 @@ void supine_report_text(const supine_comparison *comparison, FILE *file);
 bool supine_report_json(const supine_comparison *comparison, FILE *file);
 void supine_report_csv(const supine_comparison *comparison, FILE *file);
 
-/* Without pictures, and why, where nothing can draw. */
+/* Print without pictures where nothing can draw; print the reason. */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);
 

@@ -9,7 +9,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* What a profile shows of a slab, in %. */
+/* Values of a profile at a slab, %. */
 typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
 
 static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
@@ -101,8 +101,8 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
 /* The map of map.html. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
-/* The map's place of a direction: across, rolling from right over supine and left to prone; down,
- * tilting from head down to feet down. */
+/* Compute the place of a direction on the map: across, roll from right over supine and left to
+ * prone; down, tilt from head down to feet down. */
 static void place(const double g[3], double *x, double *y) {
   const double roll = atan2(g[0], g[1]) / pi; /* supine 0, left 1/2 */
   const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;

@@ -15,7 +15,7 @@ static const struct {
     {"left", "0 and +25 %"},
 };
 
-/* Percent that each lung holds more than where displacements count from, and how many mL. */
+/* Volume change of each lung from the reference state, in % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
   supine_basis_volumes(c->basis, &c->reference.pose, held);
@@ -51,7 +51,7 @@ static void print_where(const char *name, FILE *to) {
   }
 }
 
-/* Each lung's change, the largest first, and the mean move. */
+/* Print the change of each lung, the largest first, and the mean displacement. */
 static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double percent[SUPINE_LUNGS_MAX];
@@ -101,14 +101,15 @@ json_t *supine_report_findings(const supine_comparison *c) {
   enum { SENTENCES = 3 };
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
-    if (c->posture[i].displacement.max >= 0.05) { /* not what displacements count from */
+    if (c->posture[i].displacement.max >=
+        0.05) { /* not the state that displacements are measured from */
       (void)json_array_append_new(list, printed(c, i, print_finding));
     }
   }
   return list;
 }
 
-/* Of every posture, what its chart shows most plainly: as the title's end. */
+/* Print the main finding of each posture, as the end of a chart's title. */
 static void print_ratios(const supine_comparison *c, size_t most, FILE *to) {
   for (size_t i = 0; i <= most; ++i) {
     (void)fprintf(to, "%s %s %.1f", i > 0 ? "," : "",
@@ -153,10 +154,10 @@ json_t *supine_report_postures(const supine_comparison *c) {
     }
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
-          lungs,
-          json_pack("{s:o, s:o, s:o}", "ml", json_sprintf("%.0f", c->posture[i].volume[lung]),
-                    "percent", json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]), "breath",
-                    json_sprintf("%+.1f", c->posture[i].gain[lung])));
+          lungs, json_pack("{s:o, s:o, s:o}", "ml",
+                           json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
+                           json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]),
+                           "breath", json_sprintf("%+.1f", c->posture[i].gain[lung])));
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
       if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {

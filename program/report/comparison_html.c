@@ -71,7 +71,7 @@ static json_t *matrix(const supine_comparison *c) {
   return supine_report_parts(c, rows);
 }
 
-/* The two that differ most. */
+/* Find the two postures that differ most. */
 static json_t *matrix_title(const supine_comparison *c) {
   const size_t count = c->postures.count;
   size_t most = 0;
@@ -114,7 +114,7 @@ static json_t *slabs(const supine_comparison *c) {
                    supine_report_parts(c, rows));
 }
 
-/* A share as %, and what rounds to nothing as 0. */
+/* Format a share in %; what rounds to nothing is 0. */
 static json_t *percent(double share) {
   return fabs(100.0 * share) < 0.005 ? json_string("0 %") : json_sprintf("%.2f %%", 100.0 * share);
 }
@@ -163,7 +163,7 @@ static void write_command(const supine_comparison *c, const char *file, char *co
   command[size - 1] = '\0';
 }
 
-/* That command, and all that the basis says of itself. */
+/* Return the command and the metadata of the basis. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
   json_t *list = json_array();
   char command[2048] = "";
@@ -183,7 +183,7 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   return list;
 }
 
-/* The head's facts and the foot's. */
+/* Make the facts of the page's head and foot. */
 static json_t *facts(const supine_comparison *c) {
   const supine_extremes *e = &c->extremes;
   const char *slash = strrchr(c->path, '/');

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What stands in the HTML report's templates (page/), by their names. */
+/* Data of the HTML report's templates (page/), by name. */
 #ifndef SUPINE_COMPARISON_PARTS_H
 #define SUPINE_COMPARISON_PARTS_H
 

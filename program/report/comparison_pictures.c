@@ -59,7 +59,7 @@ static json_t *encoded(const void *bytes, size_t size) {
   return made;
 }
 
-/* What lies at the picture's four sides. */
+/* Names of the picture's four sides. */
 static json_t *ends(supine_view view) {
   static const char *const letters[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
   static const char *const sides[2][2] = {{"right", "left"}, {"top", "bottom"}};
@@ -78,7 +78,7 @@ static json_t *ends(supine_view view) {
   return list;
 }
 
-/* Gravity as the viewer sees it: an arrow `along` so many degrees, `towards` him, or `away`. */
+/* Gravity relative to the viewer: an arrow at `along` degrees, `towards` the viewer, or `away`. */
 static void set_gravity(supine_view view, const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
@@ -120,7 +120,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, co
   return made;
 }
 
-/* One look at every posture, all to one scale; NULL on failure. */
+/* Draw every posture from one side on one scale; NULL on failure. */
 static json_t *row(const supine_comparison *c, supine_renderer *renderer, look *from,
                    double largest, float *value, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;

@@ -70,7 +70,7 @@ static void print_pairs(const supine_comparison *c, int width, FILE *file) {
   }
 }
 
-/* What each lung takes of the breath. */
+/* Print the share of each lung in the breath. */
 static void print_gains(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
@@ -112,7 +112,7 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
   }
 }
 
-/* A share as %; what rounds to nothing is 0. */
+/* Print a share in %; what rounds to nothing is 0. */
 static const char *percent(double share, char text[32]) {
   if (fabs(share) < 5e-6) {
     return "0 %";

@@ -12,7 +12,7 @@ json_t *supine_report_parts(const supine_comparison *c, json_t *rows) {
   const size_t parts = (count + SUPINE_REPORT_COLUMNS - 1) / SUPINE_REPORT_COLUMNS;
   json_t *list = json_array();
   for (size_t p = 0; p < parts; ++p) {
-    const size_t begin = p * count / parts; /* as even as can be */
+    const size_t begin = p * count / parts; /* parts of nearly equal size */
     const size_t end = (p + 1) * count / parts;
     json_t *columns = json_array();
     json_t *part = json_array();
@@ -46,7 +46,7 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    if (cosine > nearest + 1e-9) { /* the first of equals: names before DICOM's codes */
+    if (cosine > nearest + 1e-9) { /* among equal ones the first: names precede DICOM codes */
       nearest = cosine;
       name = supine_posture_name(i);
     }

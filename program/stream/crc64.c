@@ -10,9 +10,9 @@
 
 #include "program/stream/crc64.h"
 
-static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* x^64 is understood */
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* without the term x^64 */
 
-/* What is worked out once: table[b] = b(x) x^64 mod P, and powers of x for folding. */
+/* Tables computed once: table[b] = b(x) x^64 mod P, and powers of x for folding. */
 static struct {
   uint64_t table[256];
   uint64_t far[2], near[2]; /* x^(512 + 64), x^512; x^(128 + 64), x^128 */
@@ -76,7 +76,7 @@ CARRY_LESS static lane take(const unsigned char *at) {
   return _mm_shuffle_epi8(_mm_loadu_si128((const lane *)(const void *)at), front);
 }
 
-/* What `a` is worth where `next` stands: a_high x^(n + 64) + a_low x^n + next. */
+/* Fold `a` onto `next`: a_high x^(n + 64) + a_low x^n + next. */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
@@ -100,7 +100,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   for (; size != 0; at += 16, size -= 16) {
     sum = fold(sum, near, take(at));
   }
-  unsigned char rest[16]; /* worth the same as the whole message */
+  unsigned char rest[16]; /* congruent to the whole message */
   const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   _mm_storeu_si128((lane *)(void *)rest, _mm_shuffle_epi8(sum, front));
   return by_bytes(0, rest, sizeof rest);

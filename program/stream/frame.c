@@ -41,8 +41,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
   f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
-  /* Now: 0.1 s for a million triangles would hold up every peer when the first asks for a surface.
-   */
+  /* Compute now: 0.1 s for a million triangles would delay every peer at the first request of a
+   * surface. */
   if (supine_stream_strips_make(supine_basis_triangles(basis), f->info->triangle_count,
                                 f->info->vertex_count, &f->triangles) != SUPINE_OK) {
     free(f);
@@ -130,7 +130,7 @@ typedef struct placing {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* bytes; 0 after the last */
+  size_t size[THREADS_MAX]; /* bytes of the part; 0 after the last */
 } placing;
 
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {

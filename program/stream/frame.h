@@ -15,7 +15,7 @@
 #include "program/stream/message.h"
 #include <supine/locate.h>
 
-/** What a peer is sent. */
+/** Content sent to a peer. */
 typedef enum supine_stream_what {
   SUPINE_STREAM_WEIGHTS = 0,
   SUPINE_STREAM_POINTS,  /**< POLYDATA: triangles in the first frame only */
@@ -27,12 +27,12 @@ typedef enum supine_stream_what {
 /** "weights", "points", "surface", "nothing"; NULL past the last. */
 const char *supine_stream_what_name(supine_stream_what what);
 
-/** A moment. */
+/** The lungs at one time. */
 typedef struct supine_stream_moment {
   double gravity[3]; /**< unit */
   double volume;     /**< mL of all lungs together, gas and tissue */
   double above;      /**< mL above the posture's rest, or the scan where no rest is known */
-  uint64_t stamp;    /**< of the pose, as in headers */
+  uint64_t stamp;    /**< time of the pose, as in headers */
   double received;   /**< when the pose came, s of supine_clock_seconds; < 0: no pose did */
   supine_pose pose;
   const supine_location *location; /**< NULL: no points were observed */
@@ -48,7 +48,7 @@ typedef struct supine_stream_frame {
   uint64_t points_crc;
   unsigned char
       *errors; /**< the attribute of a located frame as on the wire; NULL: never was one */
-  struct supine_stream_frame *next; /**< of the unused */
+  struct supine_stream_frame *next; /**< next frame in the list of unused ones */
 } supine_stream_frame;
 
 /** What frames of one basis share. */
@@ -80,7 +80,7 @@ typedef struct supine_stream_parcel {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
   int count;
-  size_t size; /**< of all pieces */
+  size_t size; /**< total length of the pieces, bytes */
 } supine_stream_parcel;
 
 /** Wraps a frame: `what` but silence, triangles or not, a header of version 1 or 2. The first time

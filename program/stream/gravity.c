@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From rotations, good and bad, to gravity in the body. */
+/* Gravity in the body from exact or faulty rotations. */
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>

@@ -20,7 +20,7 @@ supine_stream_setup supine_stream_setup_default(void);
 /** The rotation of a unit quaternion W, X, Y, Z, rows. */
 void supine_stream_rotation(const double quaternion[4], double rotation[9]);
 
-/** What became of a pose. */
+/** Verdict on a pose. */
 typedef enum supine_stream_verdict {
   SUPINE_STREAM_EXACT = 0,
   SUPINE_STREAM_REPAIRED, /**< not quite a rotation: the nearest one was taken */

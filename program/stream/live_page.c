@@ -11,8 +11,8 @@
 
 extern const supine_asset supine_stream_assets[]; /* live.js, put in by the build */
 
-/* The page may talk to nobody; this one to its server. 'self' means its WebSocket too, but not in
- * every browser. */
+/* The content security policy lets the page connect to its own server only. Not every browser
+ * counts WebSockets under 'self'. */
 static const char silent[] = "default-src 'none';";
 static const char talking[] = "default-src 'none'; connect-src 'self' ws: wss:;";
 

@@ -74,7 +74,7 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 }
 
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
-  static const char text[] = "expected_error_mm"; /* with its NUL of even length */
+  static const char text[] = "expected_error_mm"; /* length with the NUL, made even */
   _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "type, components, count, name");
   put(bytes, 2, 1); /* a scalar of one component */
   put(bytes + 2, 4, points);
@@ -89,7 +89,7 @@ void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM
   put(bytes + 8, 4, message);
 }
 
-/* Points that are turned over together, in vectors. */
+/* Points converted to big-endian together, in vectors. */
 enum { BUNCH = 16 };
 
 SUPINE_CLONES static void put_bunch(const float *xyz, const uint32_t *sign, unsigned char *bytes) {

@@ -40,9 +40,9 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
 void supine_stream_header_write(const supine_stream_header *header,
                                 unsigned char bytes[SUPINE_STREAM_HEADER]);
 
-/** What a message says. */
+/** Content of a message. */
 typedef enum supine_stream_kind {
-  SUPINE_STREAM_NOTHING = 0, /**< of no concern here: another type or device */
+  SUPINE_STREAM_NOTHING = 0, /**< ignored: another type or device */
   SUPINE_STREAM_ROTATION,    /**< number [9]: rows of the matrix from tracker to world axes, and
                                   [3]: where it is, mm; text: its device */
   SUPINE_STREAM_PLACE,       /**< the same of another device than the one that is followed */

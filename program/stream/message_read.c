@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What messages say, from bytes that nobody vouches for. */
+/* Read messages from untrusted bytes. */
 #include <math.h>
 #include <string.h>
 
@@ -112,7 +112,7 @@ static void position(cursor *c, supine_stream_message *m) {
   m->number[0] = sqrt(fmax(0.0, 1.0 - square));
 }
 
-/* The instrument of that name; the last of that name where there are several. */
+/* Find the instrument of that name; the last where there are several. */
 static void instruments(cursor *c, const char *device, const supine_stream_header *header,
                         supine_stream_message *m) {
   const int all = device == NULL || strcmp(header->device, device) == 0;

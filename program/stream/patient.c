@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Messages become a pose and a volume, and these a moment of the lungs. */
+/* Compute posture and volume from messages, and from these the state of the lungs. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -45,7 +45,7 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
 static void take(supine_stream_patient *p, const double gravity[3], double received,
                  uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
-  if (!p->posed) { /* nothing to turn from */
+  if (!p->posed) { /* first pose: nothing to smooth from */
     memcpy(p->smooth, gravity, sizeof p->smooth);
     p->smoothed = received;
     p->first = received;
@@ -75,7 +75,7 @@ static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const
   take(p, gravity, received, stamp);
 }
 
-/* Take in where a point is seen; false where no sensor has that name. */
+/* Store the position of a sensor; false where no sensor has that name. */
 static bool place(supine_stream_patient *p, const char *name, const double position[3],
                   double received, uint64_t stamp) {
   if (p->options->sensors == NULL ||
@@ -183,7 +183,7 @@ static double held(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-/* The gains of the moment's state, or the last that could be had; volumes follow from them. */
+/* Compute the gains of the state, or keep the last valid ones; compute the volumes. */
 static void find_gains(supine_stream_patient *patient, double now, supine_stream_moment *moment) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(patient->options->volume, basis,
@@ -206,7 +206,7 @@ static void find_gains(supine_stream_patient *patient, double now, supine_stream
   moment->above += moment->volume;
 }
 
-/* The lungs that the observed points show; the volume is found unless it was fixed. */
+/* Fit the lungs to the observed points; the volume too unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_moment *moment) {
   const supine_stream_volume *volume = patient->options->volume;

@@ -12,18 +12,18 @@ typedef struct supine_stream_patient {
   const supine_stream_options *options;
   supine_stream_counts *counts;
   double begun;                      /* s of the clock */
-  bool posed;                        /* some pose has come */
-  bool fresh;                        /* and was not shown yet */
+  bool posed;                        /* at least one pose was received */
+  bool fresh;                        /* the pose was not shown yet */
   double first;                      /* s of the clock, of the first pose: where a record begins */
   double received;                   /* s of the clock, of the newest */
   uint64_t stamp;                    /* the newest's; 0: none */
   double gravity[3];                 /* the newest's */
   double smooth[3];                  /* as shown */
-  double smoothed;                   /* s of the clock, when `smooth` was worked out */
-  bool turning;                      /* `smooth` is not there yet */
+  double smoothed;                   /* when `smooth` was computed, s of the clock */
+  bool turning;                      /* `smooth` has not reached the pose yet */
   double warned;                     /* s of the clock, of the last warning */
   uint64_t unsaid;                   /* warnings since then */
-  double gains[SUPINE_LUNGS_MAX][3]; /* the last that a volume gave */
+  double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
 } supine_stream_patient;
 
 /* Supine until a pose comes. */
@@ -35,7 +35,7 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format, ...)
     SUPINE_PRINTF(3, 4);
 
-/* Takes in a pose or volume; a message of another kind does nothing. */
+/* Store a pose or volume; ignore other messages. */
 void supine_stream_patient_hear(supine_stream_patient *patient,
                                 const supine_stream_message *message, double received,
                                 uint64_t stamp);
@@ -44,10 +44,10 @@ void supine_stream_patient_hear(supine_stream_patient *patient,
 void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
                                 double received);
 
-/* Whether the lungs move though no pose comes. */
+/* Return whether the lungs move without new poses. */
 bool supine_stream_patient_moves(const supine_stream_patient *patient);
 
-/* The lungs at `now`: the pose counts as shown. */
+/* Compute the lungs at `now`; marks the pose as shown. */
 void supine_stream_patient_moment(supine_stream_patient *patient, double now,
                                   supine_stream_moment *moment);
 

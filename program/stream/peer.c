@@ -12,7 +12,8 @@
 
 #include "program/stream/peer.h"
 
-static const uint64_t body_most = 256u << 20; /* an image passed over; more is no message */
+static const uint64_t body_most =
+    256u << 20; /* largest message skipped, such as an image; more is no message */
 
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error) {
@@ -60,7 +61,7 @@ static ssize_t receive(int socket, void *bytes, size_t size) {
   }
 }
 
-/* A header is whole: read its body, or pass over it? */
+/* Read the body of a complete header, or skip it. */
 static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
   if (supine_stream_header_read(peer->raw, &peer->header, error) != SUPINE_OK) {
     return false;

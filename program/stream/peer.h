@@ -11,10 +11,10 @@
 #include "program/stream/message.h"
 
 typedef struct supine_stream_peer {
-  int socket;        /**< -1: no peer */
+  int socket;        /**< socket; -1: no peer */
   bool connecting;   /**< not yet there */
-  double took, said; /**< s, when it last took, and said, something */
-  /* what it says */
+  double took, said; /**< time of the last receipt and send, s */
+  /* received data */
   unsigned char raw[SUPINE_STREAM_HEADER];
   size_t got; /**< of the header, then of the body */
   bool in_body;
@@ -22,9 +22,9 @@ typedef struct supine_stream_peer {
   uint64_t skip;       /**< bytes of a body that is not read */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
   double heard;        /**< s, when everything it had sent had been read */
-  /* what it is sent */
+  /* data to send */
   supine_stream_what what;
-  unsigned version; /**< of headers: as it speaks itself; 1 until it does */
+  unsigned version; /**< version of headers: that of the peer's own; 1 until it sends one */
   bool knows_triangles;
   uint64_t begun;             /**< number of the frame that was begun last */
   supine_stream_frame *frame; /**< on its way; NULL: none */
@@ -32,7 +32,7 @@ typedef struct supine_stream_peer {
   size_t sent; /**< of the parcel */
 } supine_stream_peer;
 
-/** What came of reading or sending. */
+/** Result of reading or sending. */
 typedef enum supine_stream_outcome {
   SUPINE_STREAM_DONE = 0, /**< all there was */
   SUPINE_STREAM_MORE,     /**< there may be more: read: this pass's share is used up; sent: the rest
@@ -57,7 +57,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
                                               supine_stream_hear *hear, void *context,
                                               uint64_t *skipped, supine_error *error);
 
-/** Whether a new frame may begin: none is on its way, here or in the kernel's queue. */
+/** Return whether no frame is in transit, here or in the kernel's queue. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
 /** Begins a frame.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The loop: what has come is read, the newest pose becomes a frame, and the frame leaves. */
+/* Main loop: read messages, compute a frame of the newest pose, send it. */
 #include <errno.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -60,7 +60,7 @@ static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
   --s->counts.present;
 }
 
-/* A place for a socket; NULL, and the socket is closed, where there is none. */
+/* Find a slot for a socket; where none is free, close the socket and return NULL. */
 static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
   supine_error error;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -84,7 +84,7 @@ static void accept_peers(supine_stream_server *s) {
     const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
-        s->accept_at = s->woke + again_time; /* out of descriptors, say */
+        s->accept_at = s->woke + again_time; /* out of descriptors, for example */
       }
       return;
     }
@@ -184,7 +184,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* Poses that come at that pace make the frames themselves. */
+  /* Poses received at that rate trigger the frames themselves. */
   const bool posed = s->woke - s->patient.received < 2.0 * frame_time;
   return fmax(soonest, s->framed + (posed ? 2.0 : 1.0) * frame_time);
 }
@@ -206,7 +206,7 @@ static bool make_frame(supine_stream_server *s) {
   return true;
 }
 
-/* The newest frame to a peer that is ready, and what is left of an older one. */
+/* Send the newest frame to a peer that is ready, or the rest of an older one. */
 static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (lagging(s, peer) && supine_stream_peer_ready(peer) &&
       !supine_stream_peer_give(peer, s->frames, s->latest, s->woke)) {
@@ -245,7 +245,7 @@ static bool send_peers(supine_stream_server *s) {
   return true;
 }
 
-/* Peers that have left something unfinished for too long. */
+/* Drop peers that leave a message or frame unfinished for too long. */
 static void lose_stuck(supine_stream_server *s) {
   const double patience = s->options->patience > 0.0 ? s->options->patience : 20.0;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -266,7 +266,7 @@ static void lose_stuck(supine_stream_server *s) {
   }
 }
 
-/* How long poll may wait. */
+/* Compute the timeout of poll, ms. */
 static struct timespec patience_of(const supine_stream_server *s, double end) {
   const supine_stream_poses *poses = s->options->replay;
   double next = fmin(fmin(s->woke + asked_time, end), fmin(s->connect_at, frame_due(s)));
@@ -282,7 +282,7 @@ static struct timespec patience_of(const supine_stream_server *s, double end) {
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
-/* Everything that poll() is to look at; returns how many. */
+/* List the sockets for poll() and return their number. */
 static nfds_t gather(supine_stream_server *s) {
   nfds_t count = 0;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -327,7 +327,7 @@ static void listen_round(supine_stream_server *s, nfds_t count) {
   replay_poses(s);
 }
 
-/* When a replay has been seen. */
+/* Return whether a replay has ended and was sent. */
 static bool replay_over(const supine_stream_server *s) {
   const supine_stream_poses *poses = s->options->replay;
   return poses != NULL && s->replayed == poses->count &&

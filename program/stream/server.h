@@ -18,17 +18,17 @@
 typedef struct supine_stream_counts {
   uint64_t poses;     /**< taken, the overtaken ones too */
   uint64_t places;    /**< of observed points, likewise */
-  uint64_t repaired;  /**< of them, no rotations until repaired */
-  uint64_t refused;   /**< poses that were none */
+  uint64_t repaired;  /**< poses repaired to rotations */
+  uint64_t refused;   /**< poses refused */
   uint64_t malformed; /**< messages with a wrong checksum or contradicting lengths */
   uint64_t skipped;   /**< messages of other types */
   uint64_t
       unreachable; /**< frames whose volume would fold the surface: the last one's gains stayed */
   uint64_t frames;
   uint64_t sent;        /**< frames, over all peers */
-  uint64_t peers;       /**< that came, in all */
+  uint64_t peers;       /**< peers accepted */
   uint64_t lost;        /**< that sent no messages, or took nothing for too long */
-  uint64_t turned_away; /**< because there were too many */
+  uint64_t turned_away; /**< peers turned away: too many */
   size_t present;       /**< peers now */
 } supine_stream_counts;
 
@@ -42,7 +42,7 @@ typedef struct supine_stream_options {
   supine_stream_setup setup;
   supine_stream_volume *volume;   /**< messages may change it */
   supine_stream_sensors *sensors; /**< points that messages may place; NULL: none */
-  supine_stream_what what;        /**< for peers that have not said */
+  supine_stream_what what;        /**< what peers receive that have not chosen */
   bool ras;                       /**< points in RAS */
   double rate;                    /**< most frames a second */
   size_t peers;                   /**< most at a time, up to 1000 */
@@ -51,10 +51,10 @@ typedef struct supine_stream_options {
   double patience; /**< s that a peer may leave a message or frame unfinished; 0: 20 */
   const supine_stream_poses
       *replay;            /**< poses from a file, from when the first peer is there; NULL */
-  FILE *record;           /**< takes each pose; NULL */
+  FILE *record;           /**< called with each pose; NULL: not */
   supine_stream_web *web; /**< NULL: none */
   void (*warn)(void *context, const char *text);
-  bool (*stop)(void *context);                                /**< asked at least every 100 ms */
+  bool (*stop)(void *context); /**< called at least every 100 ms; true ends the run */
   void (*shown)(void *context, supine_stream_server *server); /**< each second; NULL */
   void *context;
 } supine_stream_options;

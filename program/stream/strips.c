@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Strips by greed: of the three that begin at the first triangle left, the longest. */
+/* Greedy strips: the longest of the three that start at the first triangle left. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,8 +9,8 @@
 /* No edge. */
 static const uint32_t none = 0xFFFFFFFFu;
 
-/* Edges that are looked at from one vertex. More meet where no lung has them; a strip that ends
- * there is as right, and the time stays in proportion to the triangles. */
+/* Largest number of edges examined at a vertex. Real lungs have fewer; a strip may end there, and
+ * time stays proportional to the triangles. */
 enum { LOOKS = 64 };
 
 /* Edge 3 t + k leaves corner k of triangle t, towards the next. */
@@ -46,7 +46,7 @@ static size_t grow(walk *w, uint32_t edge) {
     w->used[edge / 3] = 1;
     const uint32_t before = last;
     last = w->corner[after(after(edge))];
-    /* Every other triangle faces the other way round. */
+    /* Every second triangle of a strip has the opposite orientation. */
     edge = count % 2 == 0 ? edge_between(w, before, last) : edge_between(w, last, before);
   }
   return count;
@@ -73,7 +73,7 @@ static size_t longest(walk *w, uint32_t triangle) {
   return most;
 }
 
-/* Length, two corners, and the corner of each triangle that is not on its edge. */
+/* Write the length, two corners, and for each triangle the corner opposite its edge. */
 static void put_strip(const walk *w, size_t count, supine_stream_strips *strips) {
   unsigned char *at = strips->bytes + strips->size;
   supine_stream_put32(at, (uint32_t)count + 2);
@@ -95,7 +95,7 @@ supine_status supine_stream_strips_make(const uint32_t *triangles, size_t count,
             .used = calloc(count + 1, 1),
             .strip = malloc(count * sizeof *w.strip + 1),
             .best = malloc(count * sizeof *w.best + 1)};
-  /* At most a strip a triangle: 16 bytes. */
+  /* At most one strip per triangle: 16 bytes. */
   *strips = (supine_stream_strips){.bytes = malloc(16 * count + 1)};
   if (w.first == NULL || w.next == NULL || w.used == NULL || w.strip == NULL || w.best == NULL ||
       strips->bytes == NULL) {

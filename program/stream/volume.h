@@ -9,7 +9,7 @@
 
 #include "program/breath/breath_frames.h"
 
-enum { SUPINE_STREAM_BREATH_SAMPLES = 1024 }; /* of one breath; straight lines between */
+enum { SUPINE_STREAM_BREATH_SAMPLES = 1024 }; /* samples per breath, interpolated linearly */
 
 typedef struct supine_stream_volume {
   bool breathes;                                   /**< else `fixed` */

@@ -59,8 +59,7 @@ static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* A browser says whose page opened the socket: only ours may. Programs that are no browsers do not
- * say. */
+/* Accept sockets only from our own page: browsers send its origin, other programs none. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
@@ -98,7 +97,7 @@ static void hear(supine_stream_web *web, const char *bytes, size_t size) {
   }
 }
 
-/* The newest moment, where the viewer has not seen it; 0, or -1 to end. */
+/* Send the newest state where the viewer has not received it; 0, or -1 to end. */
 static int tell(supine_stream_web *web, struct lws *wsi, session *s) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
@@ -233,7 +232,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   info.gid = -1;
   info.uid = -1;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-  if (strchr(info.iface, ':') == NULL) { /* it would listen on every address, of either kind */
+  if (strchr(info.iface, ':') ==
+      NULL) { /* by default it would listen on every address, IPv4 and IPv6 */
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
   info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* pages on their way, too */

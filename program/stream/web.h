@@ -44,10 +44,10 @@ int supine_stream_web_descriptor(const supine_stream_web *web);
  * @param received  s of supine_clock_seconds */
 bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received);
 
-/** Tells the viewers, each as soon as it can be told; a moment that is overtaken is dropped. */
+/** Send a state to the viewers as soon as each can receive; overtaken states are dropped. */
 void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *moment);
 
-/** How many are looking. */
+/** Return the number of viewers. */
 size_t supine_stream_web_viewers(supine_stream_web *web);
 
 #endif
