@@ -12,7 +12,6 @@
 
 static const char name[] = "compare";
 
-/* Writes one form to a file, whole or not at all. */
 static int write_file(const char *path, const supine_comparison *comparison, bool html) {
   supine_output output = {0};
   supine_error error;

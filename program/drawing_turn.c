@@ -97,7 +97,6 @@ static int measure(turning *t, supine_command_drawn *shown) {
   return result;
 }
 
-/* Every frame into the animation. */
 static supine_status play(turning *t, supine_command_drawn *shown, supine_animation *animation,
                           supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);

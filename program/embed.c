@@ -108,7 +108,6 @@ static supine_status read_grid(const supine_inside_shells *shells, const request
   return status;
 }
 
-/* The labels of a map, each a part. */
 static supine_status read_labelled(const request *wanted, const char *path,
                                    supine_inside_content *content, supine_error *error) {
   supine_labels_shape *parts = NULL;
@@ -152,7 +151,6 @@ static supine_status read_content(const supine_inside_shells *shells, const requ
   return status;
 }
 
-/* Name of a part, "nodule 3". */
 static void part_name(const supine_inside_content *content, size_t point, char *text, size_t size) {
   const char *at = content->names;
   for (uint32_t part = 0; part < content->part[point]; ++part) {

@@ -26,7 +26,7 @@ typedef struct request {
   supine_mesh_load_options load;
 
   supine_state rest, state;
-  size_t count; /* landmarks of further states, or of all where no other state was named */
+  size_t count; /* number of `further`; all states where no --other was named */
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
   const char *rest_path, *state_path; /* surfaces; NULL: none */
@@ -127,8 +127,7 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Gain of the law deep: the lowest parts of a lung are emptied about 1.5 times as far as the
- * uppermost. */
+/* Gain of the law deep: it empties the lowest parts about 1.5 times as far as the uppermost. */
 static const double usual_gain = 0.4;
 
 static void print_row(const char *what, double fitted, double held_out, const char *after) {
@@ -344,8 +343,6 @@ static supine_status load_lungs(const request *wanted, const char *operand, supi
   return status;
 }
 
-/* --- the evidence ---------------------------------------------------------------------------- */
-
 static void evidence_free(evidence *of) {
   supine_lungs_free(&of->lungs[0]);
   supine_lungs_free(&of->lungs[1]);
@@ -416,11 +413,9 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Choose the reference state: the fuller one, by the volumes of the surfaces or the spread of the
- * landmarks. */
+/* Choose the fuller state, by the volumes of the surfaces or the spread of the landmarks. */
 static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
-  static const double doubt =
-      0.02; /* relative difference of volumes that can come from how the surfaces were cut */
+  static const double doubt = 0.02; /* of a volume: cutting alone explains less */
   const double volume[2] = {volume_of(&of->lungs[0]), volume_of(&of->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
                         : of->pairs.count > 0              ? supine_patient_pairs_growth(&of->pairs)
@@ -442,16 +437,13 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
   return SUPINE_OK;
 }
 
-/* --- the fit --------------------------------------------------------------------------------- */
-
 static supine_status fit_surfaces(const request *wanted, const evidence *of,
                                   const supine_patient_fit_options *options,
                                   supine_patient_surface_fit *found, supine_error *error) {
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
-  model.force.gain =
-      wanted->has_gain ? wanted->gain : usual_gain; /* kept for the fit of expandability */
+  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain; /* fixed for --expandability */
   supine_patient_surface_task task = {.rest = &of->lungs[0],
                                       .state = &of->lungs[1].mesh,
                                       .model = &model,
@@ -483,8 +475,6 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   free(rows);
   return status;
 }
-
-/* --- further states -------------------------------------------------------------------------- */
 
 /* Fit the gravity-dependent share of the force to the further states. */
 typedef struct further_work {
@@ -558,8 +548,6 @@ static supine_status find_gain(const request *wanted, evidence *of, supine_patie
   free(work);
   return status;
 }
-
-/* --- the record ------------------------------------------------------------------------------ */
 
 /* Describe a state; where it has no volume, with that of the surfaces. */
 static void complete_state(supine_patient_record *record, size_t k) {

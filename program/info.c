@@ -217,7 +217,6 @@ static void print_text(const char *path, const supine_basis *basis, const double
   (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
 }
 
-/* A tensor of errors in the file, or NULL. */
 static const double *error_list(const supine_basis *basis, const char *key, size_t *count) {
   const supine_tensor *tensor = supine_basis_tensor(basis, key);
   if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {

@@ -12,10 +12,8 @@ typedef struct supine_command_located {
   supine_location location[SUPINE_LOCATED_POSTURES]; /* of each */
   double share[SUPINE_LOCATED_POSTURES];             /* its probability, given the points */
   const supine_location *best;
-  supine_locate_residual
-      *residuals; /* positions of the most probable posture, in the order of the task's points */
-  float *xyz,
-      *sigma; /* [N, 3] and [N], for the most probable posture; errors include all postures */
+  supine_locate_residual *residuals; /* [points] of the most probable posture */
+  float *xyz, *sigma;                /* [N, 3] and [N] of that posture; errors include all */
   void *space;
 } supine_command_located;
 

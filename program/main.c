@@ -36,7 +36,6 @@ static void print_help(void) {
              "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
 }
 
-/* A command by its name, or NULL. */
 static const supine_command *find_command(const char *name) {
   size_t i = 0;
   while (supine_command_list[i] != NULL && strcmp(name, supine_command_list[i]->name) != 0) {

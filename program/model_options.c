@@ -260,7 +260,6 @@ const supine_option supine_command_model_options[] = {
      FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 
-/* Print what a label map holds. */
 static void print_map(const char *path, const supine_source *source) {
   const supine_labels_report *report = &source->report;
   const supine_lungs *lungs = &source->lungs;

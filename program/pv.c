@@ -114,7 +114,6 @@ static int run_fit(const char *path, const request *chosen) {
   return supine_options_finish(command);
 }
 
-/* Print one row of show; nothing where the pressure lies outside a limb. */
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
   (void)printf("%.10g", pressure);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {

@@ -53,7 +53,6 @@ static int draw(const request *wanted, supine_renderer *renderer,
   return write_picture(wanted, renderer, &picture);
 }
 
-/* What is inside, in each state. */
 static supine_status find_marks(const supine_basis *basis, const char *path, state *states,
                                 size_t count, const supine_pose *from, supine_error *error) {
   supine_basis *inside = NULL;

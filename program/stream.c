@@ -214,7 +214,6 @@ static void close_points(watched *points, supine_stream_sensors *sensors) {
   supine_basis_close(points->inside);
 }
 
-/* Opens the page, where it was asked for. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
   const char *colon = wanted->web == NULL ? NULL : strrchr(wanted->web, ':');

@@ -93,8 +93,6 @@ static bool draws(const char *path) {
   return supine_text_ends_in(path, ".png");
 }
 
-/* --- what is printed ------------------------------------------------------------------------- */
-
 static void print_distances(const char *title, const char *largest,
                             const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   (void)printf("%s, mm:\n  %-12s %7s %7s %7s %10s   explained\n", title, "", "mean", "RMS", "95 %",
@@ -218,8 +216,6 @@ static void print_json(const supine_command_subject *s) {
   (void)putchar('\n');
   json_decref(root);
 }
-
-/* --- all of it ------------------------------------------------------------------------------- */
 
 /* The states, each with a posture, and a volume or scale where one was given. */
 static int set_states(const request *wanted, supine_command_subject *s) {

@@ -99,8 +99,6 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
   return deform(s->basis, &pose, s->rest.vertices, error);
 }
 
-/* --- a prediction ---------------------------------------------------------------------------- */
-
 /* Compute the gains: as given, or those of the state's volume. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
@@ -149,8 +147,6 @@ static supine_status predict_surface(const supine_command_subject *s,
   }
   return status;
 }
-
-/* --- the scale that would have been best ------------------------------------------------------ */
 
 typedef struct search {
   const supine_inside_surface *tree;
@@ -254,8 +250,6 @@ void supine_command_find_line(supine_command_subject *subject) {
   }
   s->line_off = most > 0.0 ? off / most : 0.0;
 }
-
-/* --- points ---------------------------------------------------------------------------------- */
 
 /* Compute where points inside go: by biharmonic interpolation of the surface's displacement. */
 static supine_status predict_points(const supine_command_subject *s, size_t which,

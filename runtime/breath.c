@@ -44,7 +44,6 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
   return (1.0 - phase) / (1.0 - breath->inhale_fraction);
 }
 
-/* Each limb at rest and at the peak. */
 typedef struct loop {
   double rest, peak; /* cmH2O */
   supine_limb limb[SUPINE_PV_LIMB_COUNT];

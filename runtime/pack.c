@@ -99,7 +99,6 @@ static float largest(const float *values, size_t count) {
   return top;
 }
 
-/* The largest coefficient of each mode. */
 static void largest_coefficients(const supine_basis *basis, float *top) {
   const size_t modes = basis->info.mode_count;
   const size_t rows = basis->tiles.axes;

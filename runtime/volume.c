@@ -151,7 +151,6 @@ void supine_volume_bend(const double bend[3], double sigma, double ratio[3]) {
   }
 }
 
-/* Gains and volume at sigma on the path through `scale` at rest. */
 static double volume_on_path(const supine_volume_form *form, const double bend[3], double scale,
                              double sigma, double gains[3]) {
   supine_volume_bend(bend, sigma, gains);

@@ -62,7 +62,7 @@ turns() { # NAME ARGUMENTS of fit
     fail "$name: $(grep gain fit.txt)"
   "$supine" precompute p_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
     >out 2>note || fail "precompute $name: $(cat note)"
-  grep -q 'taken as the emptier of the two states' note || fail "the scan's state is not told"
+  grep -q 'assumed to be the emptier of the two' note || fail "the scan's state is not told"
   "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:p_prone_rest.ply \
     --json >valid.json || fail "validate $name"
   near "$(surfaces valid.json)" 0 1 || fail "$name: prone off by $(surfaces valid.json) mm"
@@ -146,7 +146,7 @@ grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain 
   >fit.txt || fail "fit a lesion"
 grep -q 'kept; 90 % of the determined tissue' fit.txt || fail "no expandability kept"
 grep -q 'least expandable: left lung' fit.txt || fail "not told: $(cat fit.txt)"
-grep -q 'not seen: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
+grep -q 'not determined: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
 grep -q 'correlation with height along gravity \(0.99\|1.00\);.* leaves [0-3] %' fit.txt || # what was made
   fail "the force: $(grep correlation fit.txt)"
 "$supine" precompute rest.ply --patient stiff.json -o stiff.safetensors >/dev/null 2>&1 ||

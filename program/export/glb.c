@@ -26,7 +26,6 @@ typedef struct glb {
   glb_plan plan;
 } glb;
 
-/* Triangles in the order of their lungs. */
 static void group_triangles(glb *g) {
   const supine_basis_info *info = g->source->info;
   size_t count = 0;

@@ -221,7 +221,6 @@ static json_t *describe_from(const page *p) {
                    numbers(p->shown->from->gains[0], 3 * p->source->info->lung_count));
 }
 
-/* Sizes and metadata. */
 static json_t *describe(const page *p) {
   static const char *const keys[] = {"lungs",
                                      "modes",

@@ -14,7 +14,6 @@
 #include "program/options/command.h"
 #include "runtime/words.h"
 
-/* Return the exit code that a status ends the program with. */
 static int exit_code(supine_status status) {
   switch (status) {
   case SUPINE_OK:

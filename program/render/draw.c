@@ -15,7 +15,6 @@ static const double depth_in_radii = 3.0;    /* drawn, in front of the centre an
 static const double margin = 1.03;
 static const float gamma_exponent = 2.2F;
 
-/* A vertex in the picture. */
 typedef struct corner {
   float x, y;      /* samples, from the left and upper edge */
   float nearness;  /* 1 / distance along the view; 0: not drawn */
@@ -56,7 +55,6 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-/* The vertices that a scene shows. */
 static void shown_vertices(const supine_renderer *r, const supine_scene *scene, size_t *begin,
                            size_t *end) {
   *begin = r->info->lung_begin[scene->one_lung ? scene->lung : 0];
@@ -162,8 +160,6 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
   }
 }
 
-/* --- the nearest triangle of each sample ----------------------------------------------------- */
-
 /* Data shared by the drawing threads. */
 typedef struct canvas {
   const supine_renderer *renderer;
@@ -264,8 +260,6 @@ static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end
     }
   }
 }
-
-/* --- light and colour ------------------------------------------------------------------------ */
 
 static float smoothstep(float low, float high, float x) {
   const float t = fminf(1.0F, fmaxf(0.0F, (x - low) / (high - low)));
@@ -379,7 +373,6 @@ static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
   return (sum[3] / COUNT) << 24 | (sum[0] / COUNT) << 16 | (sum[1] / COUNT) << 8 | sum[2] / COUNT;
 }
 
-/* Draws rows of pixels. */
 static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
   const canvas *c = context;
   const supine_basis_info *info = c->renderer->info;

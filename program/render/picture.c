@@ -508,7 +508,6 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
   return status;
 }
 
-/* A growing file in memory. */
 typedef struct buffer {
   unsigned char *bytes;
   size_t size, room;

@@ -39,7 +39,6 @@ double supine_report_lowest_over_uppermost(const supine_comparison *c, size_t po
   return gain[1] / volume[1] / (gain[0] / volume[0]);
 }
 
-/* "On the left side", "Prone," and so on. */
 static void print_where(const char *name, FILE *to) {
   const char *label = supine_options_posture_label(name);
   if (label != name) {
@@ -82,7 +81,6 @@ static void print_finding(const supine_comparison *c, size_t posture, FILE *to) 
                 c->posture[posture].displacement.max);
 }
 
-/* A text that `print` writes of a posture. */
 static json_t *printed(const supine_comparison *c, size_t posture,
                        void (*print)(const supine_comparison *c, size_t posture, FILE *to)) {
   char *text = NULL;

@@ -47,7 +47,6 @@ static double largest_pair(const supine_comparison *c) {
   return largest;
 }
 
-/* RMS distances between postures, coloured. */
 static json_t *matrix(const supine_comparison *c) {
   const size_t count = c->postures.count;
   const double largest = largest_pair(c);

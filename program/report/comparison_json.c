@@ -17,7 +17,6 @@ static json_t *direction(const double g[3]) {
   return json_pack("[f, f, f]", g[0], g[1], g[2]);
 }
 
-/* A number for each lung, by its name. */
 static json_t *by_lung(const supine_comparison *c, const double *values) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_object();

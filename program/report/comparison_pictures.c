@@ -45,7 +45,6 @@ static supine_scene make_scene(const supine_comparison *c, const look *from, siz
                         .extent = from->extent};
 }
 
-/* A file's bytes as base64; NULL when memory is short. */
 static json_t *encoded(const void *bytes, size_t size) {
   char *text = NULL;
   size_t length = 0;

@@ -303,7 +303,6 @@ static nfds_t gather(supine_stream_server *s) {
   return count;
 }
 
-/* Reads everything that has come. */
 static void listen_round(supine_stream_server *s, nfds_t count) {
   for (nfds_t i = 0; i + 2 < count; ++i) {
     if (s->polled[i].revents != 0) {

@@ -6,7 +6,6 @@
 #include "program/stream/message.h"
 #include "program/stream/strips.h"
 
-/* No edge. */
 static const uint32_t none = 0xFFFFFFFFu;
 
 /* Largest number of edges examined at a vertex. Real lungs have fewer; a strip may end there, and

@@ -11,7 +11,6 @@
 
 static const double four_pi = 12.566370614359172954;
 
-/* Twice the area of a triangle, mm^2. */
 static double twice_area(const supine_basis *basis, const uint32_t *corner) {
   const float *a = basis->info.vertices + 3 * (size_t)corner[0];
   const float *b = basis->info.vertices + 3 * (size_t)corner[1];

@@ -19,13 +19,13 @@ enum {
 typedef struct search {
   const supine_compare *compare;
   const supine_state *from; /* its volume */
-  double rms;                /* mm, or 0 */
-  size_t count;              /* 3 G K */
-  size_t reached;            /* directions that reach the volume */
-  double (*direction)[3];    /* [reached] */
-  double *state;             /* [reached, 3 G K] q = gains x weights */
-  double *product;           /* [reached, 3 G K] G q */
-  double *square;            /* [reached] q^T G q */
+  double rms;               /* mm, or 0 */
+  size_t count;             /* 3 G K */
+  size_t reached;           /* directions that reach the volume */
+  double (*direction)[3];   /* [reached] */
+  double *state;            /* [reached, 3 G K] q = gains x weights */
+  double *product;          /* [reached, 3 G K] G q */
+  double *square;           /* [reached] q^T G q */
 } search;
 
 static void normalise(double v[3]) {
@@ -39,7 +39,6 @@ static void normalise(double v[3]) {
   v[2] = z / length;
 }
 
-/* q of a direction. */
 static supine_status state_of(const search *s, const double direction[3], double *q,
                               supine_error *error) {
   supine_pose pose;

@@ -40,7 +40,6 @@ INLINE halves add_mode(halves sum, const unsigned char *at, const float *w, size
   return sum;
 }
 
-/* Three of the last modes. */
 INLINE halves add_thirds(halves sum, const unsigned char *words, const float *w) {
   for (size_t which = 0; which < 3; ++which) {
     const __m256 weight = _mm256_broadcast_ss(w + which);
@@ -72,7 +71,6 @@ INLINE halves dot(const unsigned char *at, const float *w, size_t modes, supine_
   return sum;
 }
 
-/* 48 numbers in order. */
 typedef struct triples {
   __m256 v[6];
 } triples;
@@ -99,7 +97,6 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
   return n;
 }
 
-/* Rest positions, mm. */
 INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
   const __m256i unit = _mm256_set1_epi32((int)tiles->rest_unit);
   triples p = numbers(tile + tiles->rest_begin, compact);

@@ -94,7 +94,6 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
       {_mm512_cvtepi32_ps(first), _mm512_cvtepi32_ps(second), _mm512_cvtepi32_ps(third)}};
 }
 
-/* Rest positions, mm. */
 INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
   const __m512i unit = _mm512_set1_epi32((int)tiles->rest_unit);
   triples p = numbers(tile + tiles->rest_begin, compact);

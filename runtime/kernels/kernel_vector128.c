@@ -22,7 +22,6 @@ typedef struct row {
   v4 v[4];
 } row;
 
-/* 48 numbers in order. */
 typedef struct triples {
   v4 v[12];
 } triples;
@@ -96,7 +95,6 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
   return n;
 }
 
-/* Rest positions, mm. */
 INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
   triples p = numbers(tile + tiles->rest_begin, compact);
   for (size_t j = 0; j < 12 && compact; ++j) {

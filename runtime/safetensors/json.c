@@ -49,7 +49,6 @@ size_t supine_safetensors_utf8_length(const char *text, size_t size) {
   return bad ? 0 : length;
 }
 
-/* Four hexadecimal digits. */
 static bool json_hex(json_cursor *cursor, uint32_t *value) {
   *value = 0;
   for (int i = 0; i < 4; ++i) {

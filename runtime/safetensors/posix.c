@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Files and memory of POSIX systems. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
