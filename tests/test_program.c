@@ -43,6 +43,8 @@ static void test_help_every_command_teaches(void **state) {
                                          "compare", "render",     "breathe", "export",
                                          "solve",   "pv",         "fit",     "validate"};
   EXPECT(0, "precompute", "--help");
+  EXPECT(0, "supine precompute --help-all", "precompute --help");
+  EXPECT(0, "--held-out N", "precompute --help-all");
   EXPECT(0, "supine ", "--version");
   EXPECT(1, "Commands:", "%s", "");
   for (size_t i = 0; i < sizeof commands / sizeof *commands; ++i) {
