@@ -135,7 +135,7 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   displace(work, begin, end);
 }
 
-enum { BLOCK = 1024 }; /* vertices whose amounts stay in the first-level cache */
+enum { BLOCK = 16384 }; /* vertices whose amounts stay in the first-level cache */
 
 /* The best simple loops: a mode after the other, over blocks of vertices. */
 static void run_planar(void *context, size_t begin, size_t end, size_t thread) {
