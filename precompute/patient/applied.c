@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The force that a displacement shows. */
+/* The force that a measured displacement implies. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,23 +15,23 @@ enum { GRAIN = 64, COLUMNS = SUPINE_PATIENT_COLUMNS };
 
 static const double compatible = 0.5; /* cosine between normals: 60 degrees */
 
-/* Where directions are shorter than this share of their RMS, little of the displacement shows. */
+/* Least length of a direction, relative to their RMS: shorter ones say little about the force. */
 static const double shortest = 0.1;
 
 typedef struct study {
   const supine_patient_matching *m;
   const supine_patient *patient;
-  double *normals;          /* [N, 3] at rest */
+  double *normals;          /* [N, 3] of the reference surface */
   double *area;             /* [N] a third of the triangles about each vertex, mm^2 */
-  double *directions;       /* [N, 3] d */
+  double *directions;       /* [N, 3] d, mm */
   double softener;          /* (share of the RMS of |d|)^2, mm^2 */
-  double *catch_;           /* [N] F */
-  double *force;            /* [N] f */
-  bool *matched;            /* [N] */
-  supine_patient_row *rows; /* [N] for their blocks */
+  double *catch_;           /* [N] F, the force after spreading */
+  double *force;            /* [N] f, the force before spreading */
+  bool *matched;            /* [N] has a compatible point on the other surface */
+  supine_patient_row *rows; /* [N] give each vertex its block */
 } study;
 
-/* The operator passes on area times force (equilibrium.h). */
+/* Find vertex areas: the spreading operator conserves area times force (equilibrium.h). */
 static void find_areas(const supine_mesh *mesh, double *area) {
   memset(area, 0, mesh->vertex_count * sizeof *area);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
@@ -58,7 +58,7 @@ static double dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* The catch of the law, and what the other surface adds to it along its normal. */
+/* Find the force after spreading: the law's, corrected by the other surface along its normal. */
 static void catch_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const study *s = context;
@@ -100,7 +100,7 @@ static void catch_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Means over blocks: the force, (18)'s columns and the height, and their area. */
+/* Area-weighted block means of the force, the columns of (18) and the height; block areas. */
 typedef struct block {
   double area, force, columns[COLUMNS], height;
 } block;
@@ -133,7 +133,7 @@ static void sum_blocks(const study *s, const double gravity[3], block *blocks, s
   }
 }
 
-/* (18) by weighted least squares, and what it leaves. */
+/* Fit (18) by weighted least squares, and find the residual. */
 static bool fit_force(const block *blocks, size_t count, supine_patient_applied *applied) {
   double matrix[COLUMNS * COLUMNS] = {0.0};
   double k[COLUMNS] = {0.0};
@@ -220,8 +220,9 @@ static supine_status find(study *s, const double *stiffness, const double gravit
   sum_blocks(s, gravity, blocks, applied->blocks);
   applied->correlation = correlation(blocks, applied->blocks);
   if (!fit_force(blocks, applied->blocks, applied)) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the displacement shows no force: nothing moves along its law");
+    status = supine_error_set(
+        error, SUPINE_ERROR_NUMERICAL,
+        "the displacement determines no force: it is nowhere along the law's directions");
   }
   free(blocks);
   return status;

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * The force that a measured displacement shows ([Santhanam2008] IV-B.3), without a word of what it
- * should look like:
+/** @file The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no
+ * assumption about its form:
  *
- *     F_i = u_i . d_i / |d_i|^2      u: where the other surface lies; d: (15)-(17) as fitted
- *     f = A F                        back through the operator (inverse.h)
+ *     F_i = u_i . d_i / |d_i|^2      u: displacement to the other surface; d: fitted directions
+ * (15)-(17) f = A F                        inverts the spreading operator (inverse.h)
  *
- * Roughness of u grows on that way by the square of spreading length over link, so f is looked at
- * in means over the surface in blocks of 40 mm: sums are what the operator passes on unchanged. */
+ * The inversion amplifies the roughness of u by (spreading length / edge length)^2, so f is
+ * averaged over blocks of 40 mm of surface: the operator conserves sums. */
 #ifndef SUPINE_PATIENT_APPLIED_H
 #define SUPINE_PATIENT_APPLIED_H
 
@@ -15,19 +14,19 @@
 
 typedef struct supine_patient_applied {
   size_t blocks;
-  double matched;     /**< share of the vertices that the other surface was seen from */
-  double correlation; /**< of the force with the height along gravity, over the blocks */
+  double matched;     /**< share of the vertices with a compatible point on the other surface */
+  double correlation; /**< between force and height along gravity, over the blocks */
   double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
-  double left;        /**< RMS that (18) leaves of it, of the force at the centre */
-  double spread;      /**< RMS of the force about its mean, the same */
+  double left;        /**< RMS residual of (18), in units of the force at the box's centre */
+  double spread;      /**< RMS of the force about its mean, in the same unit */
 } supine_patient_applied;
 
-/** Finds the force at every vertex of the surface at rest.
- * @param matching   with the catch under the stiffness
- * @param patient    the law as it was fitted to the matching
+/** Find the force at every vertex of the reference surface.
+ * @param matching   solved with the stiffness
+ * @param patient    the law fitted to the matching
  * @param stiffness  [N] or NULL: 1
  * @param gravity    of the other state
- * @retval SUPINE_ERROR_NUMERICAL  the blocks determine no (18)
+ * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_applied_find(const supine_patient_matching *matching,
                                           const supine_patient *patient, const double *stiffness,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Whether pairs of points can be two states of one chest. */
+/* Check whether pairs of points can be two states of one chest. */
 #include <math.h>
 #include <string.h>
 
@@ -11,22 +11,22 @@
 #include "mesh/mesh.h"
 #include "sh/base/vec3.h"
 
-enum { PAIRS_LEAST = 12 };          /* an affine map has as many unknowns as 4 pairs; thrice that */
-static const double flattest = 1.0; /* mm RMS across the plane that fits best */
-static const double stillest = 0.05;  /* mm RMS: below what a landmark can be placed to */
-static const double size_most = 2.0;  /* a full breath makes a lung's sides 1.4 times as long */
-static const double turn_most = 25.0; /* degrees: more than a chest turns between two scans */
-static const double apart_most = 0.5; /* of the spread of the points */
-static const double unmatched = 0.7;  /* of the spread, left by the best affine map */
+enum { PAIRS_LEAST = 12 };            /* an affine map needs 4 pairs; three times that */
+static const double flattest = 1.0;   /* least RMS distance from the best-fitting plane, mm */
+static const double stillest = 0.05;  /* least RMS motion, mm: below the precision of a landmark */
+static const double size_most = 2.0;  /* largest ratio of sizes: a full breath gives 1.4 */
+static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
+static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
+static const double unmatched = 0.7;  /* largest residual of the affine map over the spread */
 
 typedef struct summary {
   double mean[2][3];
   double spread[2]; /* RMS distance from the mean, mm */
   double side[2];   /* longest side of the box, mm */
-  double thinnest;  /* RMS across the flattest direction of the first points, mm */
-  double turn;      /* degrees; of the rotation in the best affine map */
-  double left;      /* RMS that it leaves, mm */
-  double growth;    /* its determinant; 0: none was found */
+  double thinnest;  /* RMS distance of the first points from their best-fitting plane, mm */
+  double turn;      /* rotation in the best affine map, degrees */
+  double left;      /* RMS residual of that map, mm */
+  double growth;    /* determinant of that map; 0: none was found */
   bool mirrored;
 } summary;
 
@@ -61,7 +61,7 @@ static double second_moment(const supine_patient_pairs *pairs, const summary *s,
   return sum / (double)pairs->count;
 }
 
-/* The affine map that fits best, and the rotation in it: with M = U S V^T, U V^T. */
+/* Fit the affine map by least squares, and find its rotation: U V^T of M = U S V^T. */
 static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
   double covariance[9];
   double decomposed[9];
@@ -84,9 +84,9 @@ static supine_status find_map(const supine_patient_pairs *pairs, summary *s) {
   }
   s->thinnest = sqrt(fmax(0.0, width[0]));
   if (s->thinnest < flattest) {
-    return SUPINE_OK; /* said by the caller */
+    return SUPINE_OK; /* the caller reports it */
   }
-  /* By columns, the rows of the map are the right-hand sides. */
+  /* In column-major order the right-hand sides are the rows of the map. */
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, covariance, 3, map, 3) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
@@ -109,7 +109,7 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
   return find_map(pairs, &s) == SUPINE_OK && s.growth > 0.0 ? s.growth : 1.0;
 }
 
-/* How far the points move, RMS mm; without what they have in common where that is of no account. */
+/* Find the RMS motion, mm; less its mean where a translation between scans is allowed. */
 static double motion(const supine_patient_pairs *pairs, const summary *s, bool moved) {
   double sum = 0.0;
   for (size_t i = 0; i < 3 * pairs->count; ++i) {
@@ -119,7 +119,7 @@ static double motion(const supine_patient_pairs *pairs, const summary *s, bool m
   return sqrt(sum / (double)pairs->count);
 }
 
-/* Over 60 lines: one doubt after another, each with its message. */
+/* Over 60 lines: a sequence of independent checks, each with its message. */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
                                          supine_error *error) {
   summary s = {0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion, and whether it is worth anything. */
+/* Expandability from motion, and whether it improves held-out blocks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,26 +17,26 @@
 
 enum {
   REGIONS = 2 * SUPINE_PATIENT_MODES,
-  LANES = 16, /* regions of one solve */
-  ROUNDS = 3, /* of finding nearest points anew */
-  TURNS = 30, /* of the regions and the law, at most */
+  LANES = 16, /* regions solved for at once */
+  ROUNDS = 3, /* rounds of finding the nearest points */
+  TURNS = 30, /* most alternations between regions and law */
   HELD_TURNS = 8,
   FOLDS = 5
 };
 
-/* What is believed before: neighbouring regions differ by so much, and any from 1. */
+/* Prior standard deviations of a: between neighbouring regions, and of any region from 1. */
 static const double neighbours_differ = 0.3;
 static const double regions_differ = 1.0;
-static const double noise_least = 0.3; /* mm: no surface is known better */
-static const double together = 10.0; /* rows that err alike, as neighbours do: they count as one */
+static const double noise_least = 0.3; /* Least noise of a surface point, mm. */
+static const double together = 10.0;   /* neighbouring rows of equal error: they count as one */
 
-static const double near_by = 1.7;   /* of the least distance between centres: neighbours */
-static const double least = 0.02;    /* a of any region */
-static const double worth = 0.95;    /* of the held-out RMS: what leaves more is not kept */
-static const double settled = 1e-3;  /* of any a, in a turn */
-static const double residual = 1e-6; /* of solves */
+static const double near_by = 1.7;   /* largest distance of neighbours over the least one */
+static const double least = 0.02;    /* Least a of a region. */
+static const double worth = 0.95;    /* ratio of held-out RMS, with over without, to keep it */
+static const double settled = 1e-3;  /* Change of every a at which the alternation ends. */
+static const double residual = 1e-6; /* relative residual of the solves */
 
-/* The regions' values, and a law to go with them. */
+/* The regions' values and the law fitted with them. */
 typedef struct estimate {
   double a[REGIONS];    /* left lung first */
   double seen[REGIONS]; /* diagonal of the resolution matrix */
@@ -47,11 +47,11 @@ typedef struct study {
   supine_patient_matching *m;
   const supine_patient_expand_task *task;
   supine_patient_krige_options prior;
-  supine_patient_stiffness regions; /* where they are */
-  size_t count;                     /* of both lungs */
+  supine_patient_stiffness regions; /* centres and radii */
+  size_t count;                     /* regions of both lungs */
   size_t row_count;
-  double *response;                 /* [row_count, count] F_k */
-  double belief[REGIONS * REGIONS]; /* of a - 1, over the squared noise */
+  double *response;                 /* [row_count, count] F_k of each region */
+  double belief[REGIONS * REGIONS]; /* precision of the prior of a - 1, times the squared noise */
 } study;
 
 /* --- the linear problem ---------------------------------------------------------------------- */
@@ -85,7 +85,7 @@ static void believe(study *s) {
   }
 }
 
-/* Best a of the rows under the law as it is. normal [count, count] and more of it are space. */
+/* Find the most likely a of all regions under a fixed law. `normal` is work space. */
 static bool solve_regions(const study *s, const supine_patient_row *rows, double *space,
                           estimate *e) {
   const size_t n = s->count;
@@ -115,11 +115,11 @@ static bool solve_regions(const study *s, const supine_patient_row *rows, double
   }
   const double noise = together * fmax(noise_least * noise_least, squares / fmax(weight, 1.0));
   for (size_t j = 0; j < n; ++j) {
-    for (size_t k = 0; k <= j; ++k) { /* one triangle of two */
+    for (size_t k = 0; k <= j; ++k) { /* the lower triangle of a symmetric matrix */
       normal[j * n + k] = normal[k * n + j];
       whole[j * n + k] = whole[k * n + j] = normal[j * n + k] + noise * s->belief[j * n + k];
     }
-    right[j] += noise * pow(regions_differ, -2.0); /* (a - 1)^2; differences have no mean */
+    right[j] += noise * pow(regions_differ, -2.0); /* (a - 1)^2; differences have mean 0 */
   }
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', size, 1, whole, size, right, size) != 0 ||
       LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', size, size, whole, size, normal, size) != 0) {
@@ -132,7 +132,7 @@ static bool solve_regions(const study *s, const supine_patient_row *rows, double
   return true;
 }
 
-/* The rows' force under a. */
+/* Set the rows' force from the regions' a. */
 static void set_forces(const study *s, const estimate *e, supine_patient_row *rows) {
   for (size_t i = 0; i < s->row_count; ++i) {
     memset(rows[i].force, 0, sizeof rows[i].force);
@@ -140,7 +140,7 @@ static void set_forces(const study *s, const estimate *e, supine_patient_row *ro
   }
 }
 
-/* Regions (where `with`) and the law by turns, for the rows as they are weighted. */
+/* Fit the regions (if `with`) and the law in turn, with the rows' weights fixed. */
 static supine_status fit_rows(const study *s, supine_patient_row *rows, bool with, size_t turns,
                               estimate *e, supine_error *error) {
   double *space = malloc((2 * s->count + 1) * s->count * sizeof *space);
@@ -153,8 +153,9 @@ static supine_status fit_rows(const study *s, supine_patient_row *rows, bool wit
     set_forces(s, e, rows);
     status = supine_patient_law_fit(&s->prior, rows, s->row_count, &e->power, error);
     if (status == SUPINE_OK && with && !solve_regions(s, rows, space, e)) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the surfaces do not determine the expandability");
+      status = supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "the surfaces do not determine the expandability: leave --expandability out");
     }
     change = 0.0;
     for (size_t k = 0; k < s->count; ++k) {
@@ -166,9 +167,9 @@ static supine_status fit_rows(const study *s, supine_patient_row *rows, bool wit
   return status;
 }
 
-/* --- what each region makes of the force ----------------------------------------------------- */
+/* --- the force of each region alone ---------------------------------------------------------- */
 
-/* The place of a row that stands for no vertex: a landmark is taken not to pass its force on. */
+/* Fill the response of a landmark's row, where the force is taken not to spread. */
 static void respond_landmark(const study *s, size_t row, const double slopes[4]) {
   const supine_patient_place *place = &s->m->rows[row].place;
   const size_t side = place->side > 0.0 ? 0U : 1U;
@@ -187,7 +188,7 @@ static void respond_landmark(const study *s, size_t row, const double slopes[4])
   }
 }
 
-/* (18) [N] as the model has it in the other state, and as the columns' sum nearest to it. */
+/* Find the model's force (18) [N] in the other state, and its least-squares fit by the columns. */
 static supine_status find_force(const study *s, double *force, double slopes[4],
                                 supine_error *error) {
   enum { COLUMNS = SUPINE_PATIENT_COLUMNS };
@@ -209,10 +210,11 @@ static supine_status find_force(const study *s, double *force, double slopes[4],
   }
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', COLUMNS, 1, matrix, COLUMNS, slopes, COLUMNS) == 0
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the surface at rest is flat");
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the reference surface is flat: give closed lungs");
 }
 
-/* Solves for the force on each region alone, some at a time. */
+/* Solve for the force on each region alone, LANES at a time. */
 static supine_status find_responses(const study *s, supine_error *error) {
   const supine_patient_matching *m = s->m;
   const size_t n = m->rest->mesh.vertex_count;
@@ -239,7 +241,7 @@ static supine_status find_responses(const study *s, supine_error *error) {
       double shares[SUPINE_PATIENT_MODES];
       supine_patient_stiffness_shares(&s->regions, side, m->rest->mesh.vertices + 3 * i, shares);
       for (size_t r = 0; r < lanes; ++r) {
-        const size_t k = first + r - begin; /* wraps where it is the other side's */
+        const size_t k = first + r - begin; /* wraps for the other lung's regions */
         alone[i * lanes + r] = k < s->regions.count[side] ? force[i] * shares[k] : 0.0;
       }
     }
@@ -261,9 +263,9 @@ cleanup:
   return status;
 }
 
-/* --- whether it is worth anything ------------------------------------------------------------ */
+/* --- whether expandability improves held-out blocks ------------------------------------------ */
 
-/* Blocks held out of one fold after the other: squares left of them, by fold. */
+/* Squared residuals of blocks held out, fold by fold. */
 typedef struct holding {
   const study *s;
   const estimate *from;
@@ -302,7 +304,7 @@ static void hold_out_range(void *context, size_t begin, size_t end, size_t threa
   }
 }
 
-/* mm RMS of blocks that the estimate had not seen. */
+/* Compute the RMS residual, mm, of held-out blocks. */
 static supine_status hold_out(const study *s, const estimate *from, bool with, double *rms,
                               supine_error *error) {
   holding h = {.s = s, .from = from, .with = with};
@@ -329,9 +331,9 @@ static supine_status hold_out(const study *s, const estimate *from, bool with, d
   return SUPINE_OK;
 }
 
-/* --- all of it ------------------------------------------------------------------------------- */
+/* --- the whole fit --------------------------------------------------------------------------- */
 
-/* The matching at an estimate: its vertices to where the law has them, and their rows. */
+/* Move the vertices by an estimate and find the nearest points anew. */
 static void match_anew(const study *s, const estimate *e) {
   supine_patient_matching *m = s->m;
   set_forces(s, e, m->rows);
@@ -346,7 +348,7 @@ static void match_anew(const study *s, const estimate *e) {
                             supine_patient_power_residual(&e->power, &row);
     }
   }
-  supine_patient_matching_find(m); /* whole weights: what the law misses is what is looked for */
+  supine_patient_matching_find(m); /* full weights: the law's residual is the signal here */
 }
 
 static double root_mean(const study *s, const estimate *e) {
@@ -360,7 +362,7 @@ static double root_mean(const study *s, const estimate *e) {
   return weight > 0.0 ? sqrt(squares / weight) : 0.0;
 }
 
-/* Nearest points, and the estimate, by turns. */
+/* Alternate between finding the nearest points and the estimate. */
 static supine_status settle(const study *s, bool with, estimate *e, double *rms,
                             supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -378,8 +380,8 @@ static supine_status settle(const study *s, bool with, estimate *e, double *rms,
   return status;
 }
 
-/* Between which E nine tenths of what is seen lie, of geometric mean 1 over all, and how much is
- * not seen. e [N] is sorted. */
+/* Find the range of E that holds nine tenths of the seen area, with a geometric mean of 1 over
+ * the whole surface, and the share not seen. e [N] is sorted. */
 static void note_range(const study *s, double *e, supine_patient_expand_report *report) {
   const supine_lungs *lungs = s->m->rest;
   const size_t n = lungs->mesh.vertex_count;
@@ -411,7 +413,7 @@ static void note_range(const study *s, double *e, supine_patient_expand_report *
   report->regions = s->count;
 }
 
-/* Leaves matching, law and stiffness as they were found to be worth it. */
+/* Set matching, law and stiffness to the estimate that is kept. */
 static supine_status finish(study *s, const estimate *e, supine_patient *patient,
                             supine_patient_stiffness *stiffness,
                             supine_patient_expand_report *report, supine_error *error) {
@@ -448,7 +450,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   memcpy(law.powers, patient->powers, sizeof law.powers);
   memcpy(law.linear, patient->lengths, sizeof patient->lengths);
   memcpy(law.linear + 3, patient->motion, sizeof patient->motion);
-  estimate found[2] = {{.power = law}, {.power = law}}; /* without and with */
+  estimate found[2] = {{.power = law}, {.power = law}}; /* without and with expandability */
   study *s = calloc(1, sizeof *s);
   *report = (supine_patient_expand_report){.tried = true, .softest = 1.0, .stiffest = 1.0};
   *stiffness = (supine_patient_stiffness){0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A law fitted, corrected and held out. */
+/* Fit a law and its correction, and hold blocks out. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,28 +13,28 @@
 
 enum { FOLDS = SUPINE_PATIENT_FOLDS, SEEDS = SUPINE_PATIENT_SEEDS, ITEMS = SEEDS * FOLDS };
 
-/* Half widths of the 95 % band, in the expected error of a point and of one component. */
+/* Half widths of the 95 % interval over the expected error: of a point, of one component. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
 
 /* Factor on the expected error within 8 mm of the surface, measured on ten patients. */
 static const double near_surface = 1.3;
 
-/* Weighted sums of squares, mm^2, over rows. */
+/* Sums over rows of weighted squares, mm^2. */
 typedef struct squares {
   double none, translation, affine, law, corrected, expected, weight;
   size_t points, within;
 } squares;
 
-/* Everything between the rows and the patient. */
+/* Inputs and working space of one fit. */
 typedef struct study {
   const supine_patient_frame *frame;
   const supine_patient_fit_options *options;
   supine_patient_row *rows;
   size_t single, row_count, components;
-  double sill;   /* of all rows; below 0: to be found */
+  double sill;   /* variance of the correction, of all rows; below 0: to be found */
   size_t *fold;  /* [SEEDS, row_count] */
-  squares *left; /* [ITEMS] of held-out folds */
+  squares *left; /* [ITEMS] residuals of held-out folds */
   size_t blocks;
   supine_status *failed; /* [ITEMS] */
 } study;
@@ -47,7 +47,7 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double w
   for (size_t k = 0; k < 3; ++k) {
     law.linear[k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
     law.powers[k] = model.direction.c[2 * k + 1];
-    /* Heights fall along Y and Z (lungs.h) where gravity is along +y and +z. */
+    /* With gravity along +y the heights fall along Y, along +z they fall along Z (lungs.h). */
     law.powers[3 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
@@ -55,7 +55,7 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double w
 
 /* --- fits ------------------------------------------------------------------------------------ */
 
-/* Fit the law alone, which a correction is judged by, and the corrected one. */
+/* Fit the law alone, the baseline of the correction, and the corrected law. */
 static supine_status fit_rows(const study *s, const supine_patient_row *rows, size_t count,
                               supine_patient_power *law, supine_patient_krige **krige,
                               supine_error *error) {
@@ -98,7 +98,7 @@ static void add_points(const study *s, const supine_patient_row *rows, size_t co
   }
 }
 
-/* The rows of a fold, or all others, single ones first; how many. */
+/* Gather the rows of one fold, or all others, scalar rows first; return how many. */
 static size_t split(const study *s, const size_t *fold, size_t which, bool inside,
                     supine_patient_row *rows) {
   size_t count = 0;
@@ -145,7 +145,8 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
   for (size_t item = 0; item < ITEMS; ++item) {
     const squares *of = &s->left[item];
     if (s->failed[item] != SUPINE_OK) {
-      return supine_error_set(error, s->failed[item], "holding blocks out failed: %s",
+      return supine_error_set(error, s->failed[item],
+                              "fitting without the held-out blocks failed: %s",
                               supine_status_string(s->failed[item]));
     }
     held->law += of->law;
@@ -161,11 +162,11 @@ static double root_mean(const study *s, double sum, double weight) {
   return weight > 0.0 ? sqrt(sum * (double)s->components / weight) : 0.0;
 }
 
-/* --- all of it ------------------------------------------------------------------------------- */
+/* --- the whole fit --------------------------------------------------------------------------- */
 
-/* What no model needs: fitted and held out. */
+/* Score the maps without a law, fitted and held out. */
 static void score_maps(const study *s, squares *fitted, squares *held) {
-  for (size_t seed = 0; seed <= SEEDS; ++seed) { /* the last: of all rows */
+  for (size_t seed = 0; seed <= SEEDS; ++seed) { /* the last item fits all rows */
     const size_t *fold = s->fold + (seed % SEEDS) * s->row_count;
     for (size_t which = 0; which < (seed < SEEDS ? FOLDS : 1); ++which) {
       double map[2][SUPINE_PATIENT_AFFINE];
@@ -210,7 +211,7 @@ static supine_status check_count(const study *s, supine_error *error) {
                                 points, needed, supine_patient_law_names[s->options->law]);
 }
 
-/* Deal the blocks of each seed's grid to the folds. */
+/* Assign the blocks of each seed's grid to folds. */
 static supine_status deal(study *s, supine_error *error) {
   for (size_t seed = 0; seed < SEEDS; ++seed) {
     const size_t blocks = supine_patient_rows_block(s->frame, s->rows, s->row_count, seed + 1);
@@ -229,7 +230,7 @@ static supine_status deal(study *s, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Expected error of the points of a surface in all three directions, mm RMS, and their mean
+/* Find the expected error of a surface's points in three dimensions, mm RMS, and their mean
  * displacement. */
 static void expect(const study *s, const supine_patient_krige *krige, double *scratch,
                    supine_patient_fit_report *report) {
@@ -252,7 +253,7 @@ static void expect(const study *s, const supine_patient_krige *krige, double *sc
   report->expected_point = near_surface * sqrt(variance);
 }
 
-/* Fit all rows; `fitted` gets what law and correction leave. */
+/* Fit all rows; `fitted` gets the residuals of law and correction. */
 static supine_status fit_all(study *s, supine_patient *patient, squares *fitted,
                              supine_patient_fit_report *report, supine_error *error) {
   double *scratch = malloc(s->row_count * sizeof *scratch);
@@ -310,7 +311,7 @@ static supine_status study_run(study *s, supine_patient *patient, supine_patient
   return status;
 }
 
-/* Eight parameters: what is fitted, to what, how, and what comes of it. */
+/* Eight parameters: the data, the options and the outputs of the fit. */
 supine_status supine_patient_fit(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t single, size_t triples,
                                  const supine_patient_fit_options *options, supine_patient *patient,

@@ -12,23 +12,23 @@
 #include "sh/base/vec3.h"
 
 static const double gain_most = 2.0;
-static const double at_bound = 0.01;     /* of a gain: nearer to a bound it is not determined */
-static const double same_posture = 0.05; /* of the unit vectors' distance: 3 degrees */
-static const double matched_least = 0.3; /* of a surface's vertices */
-static const double settled = 1e-4;      /* of a scale, between rounds */
+static const double at_bound = 0.01;     /* distance to a bound at which a gain is undetermined */
+static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
+static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
+static const double settled = 1e-4;      /* change of a scale between rounds at which they end */
 enum { SEARCH_STEPS = 40, GRID = 20, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, PARTS = 6 };
 
 /* What is known of one point of a state: axis . (s now / then u + t) = value. */
 typedef struct point {
-  double u[3];         /* from full inflation to rest, in the fitted posture */
-  double parts[PARTS]; /* what the forces 1, X, Y, Z, and the heights then and now come to here */
+  double u[3];         /* displacement from full inflation to rest in the fitted posture, mm */
+  double parts[PARTS]; /* spread forces 1, X, Y, Z and both heights here */
   double axis[3], value, weight;
   size_t block;
 } point;
 
 typedef struct state {
   supine_patient_other *other;
-  supine_patient_matching matching; /* of a surface */
+  supine_patient_matching matching; /* of a state given as a surface */
   size_t count;
   point *points;
 } state;
@@ -36,13 +36,13 @@ typedef struct state {
 typedef struct problem {
   const supine_patient_record *record;
   bool moved;
-  double gains[2][3]; /* of the fuller and the emptier state, by axis */
+  double gains[2][3]; /* share of the way of the fuller and the emptier state, by axis */
   state *states;
   size_t state_count;
-  size_t without_state, without_block; /* left out; SIZE_MAX: none */
+  size_t without_state, without_block; /* left out of the sums; SIZE_MAX: none */
 } problem;
 
-/* Take a displacement between the two states to that from full inflation to rest. */
+/* Scale a displacement between the two states to that from full inflation to rest. */
 static void lengthen(const problem *p, double u[3]) {
   for (size_t k = 0; k < 3; ++k) {
     u[k] /= p->gains[1][k] - p->gains[0][k];
@@ -58,7 +58,7 @@ static double ratio_at(const point *p, const supine_force_law *law) {
   return then != 0.0 ? (fixed + law->gain * p->parts[5]) / then : 0.0;
 }
 
-/* Squares left of a state at a gain, mm^2, with the best scale and translation [UNKNOWNS]. */
+/* Find the squared residual of a state at a gain, mm^2, with its best other unknowns. */
 static double squares_of(const problem *problem_, size_t which, double gain, double *unknowns,
                          double *weight) {
   const state *s = &problem_->states[which];
@@ -112,7 +112,7 @@ static double squares_at(const problem *p, double gain) {
   return squares;
 }
 
-/* The best of a grid, then golden section between its neighbours. */
+/* Minimise over a grid of gains, then by golden section between the best one's neighbours. */
 static double search(const problem *p) {
   static const double golden = 0.6180339887498949;
   double best = 0.0;
@@ -138,7 +138,7 @@ static double search(const problem *p) {
 
 /* --- points ---------------------------------------------------------------------------------- */
 
-/* Height along gravity over the corners of the frame. */
+/* Find the range of heights along gravity over the corners of the frame. */
 static double frame_height(const supine_patient_frame *frame, const double gravity[3],
                            const supine_patient_place *place) {
   double reach = 0.0;
@@ -152,7 +152,7 @@ static double frame_height(const supine_patient_frame *frame, const double gravi
   return height;
 }
 
-/* Three of each pair, with the forces themselves. */
+/* Make three points of each pair, with forces that do not spread. */
 static supine_status take_pairs(const problem *p, state *s, supine_error *error) {
   const supine_patient_pairs *pairs = s->other->pairs;
   const supine_patient_frame *frame = &p->record->patient.frame;
@@ -184,7 +184,7 @@ static supine_status take_pairs(const problem *p, state *s, supine_error *error)
   return SUPINE_OK;
 }
 
-/* What heights along both gravities come to at every vertex, [N, 2]. */
+/* Spread the heights along both gravities: their values at every vertex, [N, 2]. */
 static supine_status solve_heights(const problem *p, const state *s, const double *stiffness,
                                    double *caught, supine_error *error) {
   const supine_lungs *rest = s->matching.rest;
@@ -217,7 +217,7 @@ static supine_status solve_heights(const problem *p, const state *s, const doubl
   return status;
 }
 
-/* The vertices that take part, with what forces come to there. */
+/* Gather the vertices that take part and their spread forces. */
 static supine_status take_surface(const problem *p, state *s, const supine_lungs *rest,
                                   double reach, supine_error *error) {
   const supine_patient_record *record = p->record;
@@ -255,7 +255,7 @@ static supine_status take_surface(const problem *p, state *s, const supine_lungs
     to->parts[5] = caught[2 * v + 1];
     if (record->from_surface) {
       supine_patient_row_displacement(&record->patient, &s->matching.rows[i], to->u);
-    } else { /* the landmarks' box, not the surface's */
+    } else { /* the box of the landmarks is wider than the surface's */
       supine_patient_displacement(&record->patient, rest->mesh.vertices + 3 * v,
                                   s->matching.rows[i].place.side, to->u);
     }
@@ -266,7 +266,7 @@ static supine_status take_surface(const problem *p, state *s, const supine_lungs
   return status;
 }
 
-/* The points' rows, where the law puts the vertices at a gain, a scale and a translation. */
+/* Find the nearest points, with vertices moved at a gain, a scale and a translation. */
 static supine_status match_surface(const problem *p, state *s, double gain, const double *unknowns,
                                    supine_error *error) {
   supine_patient_matching *m = &s->matching;
@@ -317,9 +317,9 @@ void supine_patient_refer(const supine_patient *patient, size_t count, double *p
   }
 }
 
-/* --- all of it ------------------------------------------------------------------------------- */
+/* --- the whole fit --------------------------------------------------------------------------- */
 
-/* Gain, scales and the nearest points of surfaces, by turns. */
+/* Alternate between fitting gain and scales, and finding the nearest points. */
 static supine_status settle(problem *p, supine_patient_gain *found, supine_error *error) {
   double unknowns[SUPINE_PATIENT_OTHERS_MAX][UNKNOWNS] = {{0.0}};
   supine_status status = SUPINE_OK;
@@ -346,7 +346,7 @@ static supine_status settle(problem *p, supine_patient_gain *found, supine_error
   return status;
 }
 
-/* Landmarks give three numbers a point. */
+/* Find the RMS residual; a landmark has three components. */
 static double root_mean(const problem *p, size_t which, double gain) {
   double unknowns[UNKNOWNS];
   double weight;
@@ -384,7 +384,7 @@ static void conclude(problem *p, supine_patient_gain *found) {
       blocks > 0.0 ? sqrt(fmax(0.0, (blocks - 1.0) / blocks * (square - sum * sum / blocks))) : 0.0;
 }
 
-/* Its parameters are what is known of the person beside each other: law, surfaces, landmarks. */
+/* The parameters are the inputs of one person: law, surfaces and landmarks. */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       double reach, bool moved, supine_patient_other *others,
                                       size_t count, supine_patient_gain *found,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Law + kriging. */
+/* Fit a law together with the kriging of its residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,29 +14,29 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  LAW = SUPINE_PATIENT_CONSTANTS, /* the first terms; motion follows */
+  LAW = SUPINE_PATIENT_CONSTANTS, /* the first columns; the motion follows */
   SCALE = TERMS - 1,
-  WIDTH = TERMS + 1, /* of the design: the terms, and what is left of the value */
+  WIDTH = TERMS + 1, /* of the design: the terms, then the residual */
   STEPS = 60
 };
 
-static const double scale_spread = 0.3;  /* of a law whose shape is kept */
-static const double settled = 1e-10;     /* relative, of the squares in a step */
-static const double damping_most = 1e10; /* of a step: no step helps any more */
+static const double scale_spread = 0.3;  /* prior deviation of the size of a known shape */
+static const double settled = 1e-10;     /* relative decrease of the squares that ends the fit */
+static const double damping_most = 1e10; /* damping at which no step decreases the squares */
 
 struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
-  supine_patient_krige_options options; /* with the sill and the noise in use */
+  supine_patient_krige_options options; /* with the sill and noise in use */
   supine_patient_power law;
-  supine_patient_centre *centre; /* [count] of each row, without weight */
-  double *factor;                /* [count, count] of the covariance (Cholesky); without g unused */
+  supine_patient_centre *centre; /* [count] of each row, with weight 0 */
+  double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
   double *design;                /* [count, WIDTH] whitened */
   double *weight;                /* [count] */
-  double normal[TERMS * TERMS];  /* of the terms, factored (Cholesky) */
+  double normal[TERMS * TERMS];  /* normal matrix of the terms, Cholesky-factored */
   double right[TERMS];
-  double squares; /* left, whitened, with the prior's */
-  double sill;    /* factor on g's covariance in sizes of the law */
+  double squares; /* squared whitened residual, with the prior's */
+  double sill;    /* factor on the covariance of g, for a law of size 1 */
 };
 
 supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
@@ -67,18 +67,18 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   double u[3];
   supine_patient_power_displacement(law, row, u);
   centre.size = supine_length(u);
-  memcpy(centre.at, row->place.arm, sizeof centre.at); /* from the box's centre: distances alone */
+  memcpy(centre.at, row->place.arm, sizeof centre.at); /* from the box's centre: distances count */
   return centre;
 }
 
 /* --- the terms ------------------------------------------------------------------------------- */
 
-/* Whether the law's shape is the one that is known. */
+/* Whether the law keeps its known shape. */
 static bool keeps_shape(const supine_patient_krige_options *options) {
   return options->shape_kept && options->sill >= 1.0;
 }
 
-/* Standard deviation of a term: 0 known, INFINITY free. */
+/* Find the prior standard deviation of a term: 0 known, INFINITY free. */
 static double spread_of(const supine_patient_krige_options *options, size_t term) {
   static const size_t motion[] = {0, 3, 6};
   const double unit = term < 3 ? fabs(options->mean.linear[term]) : 1.0;
@@ -89,7 +89,7 @@ static double spread_of(const supine_patient_krige_options *options, size_t term
                                                : 0.0;
 }
 
-/* A term's distance from its mean. */
+/* Find a term's distance from its prior mean. */
 static double offset_of(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->options.mean;
@@ -119,8 +119,8 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->options.noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factor the covariance of the rows, noise and g. Where the law has its known shape, g is as large
- * as that law's size by least squares makes it.
+/* Factor the covariance of the rows: noise plus g. If the law keeps its known shape, the size of
+ * g follows the least-squares size of that law.
  * @return the logarithm of half its determinant; NAN where it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
@@ -152,7 +152,7 @@ static double factor(supine_patient_krige *k) {
   return logarithm;
 }
 
-/* The normal equations of the terms at the law, and the squares that it leaves. */
+/* Build the normal equations of the terms at the present law, and the squared residual. */
 static void look(supine_patient_krige *k) {
   const int n = (int)k->count;
   for (size_t i = 0; i < k->count; ++i) {
@@ -173,7 +173,7 @@ static void look(supine_patient_krige *k) {
   k->squares = cblas_ddot(n, k->design + TERMS, WIDTH, k->design + TERMS, WIDTH);
   for (size_t t = 0; t < TERMS; ++t) {
     const double spread = spread_of(&k->options, t);
-    if (spread == 0.0) { /* known: the row of 1 */
+    if (spread == 0.0) { /* known: the row of the identity */
       k->right[t] = 0.0;
       for (size_t s = 0; s < TERMS; ++s) {
         k->normal[s < t ? t * TERMS + s : s * TERMS + t] = s == t ? 1.0 : 0.0;
@@ -186,7 +186,7 @@ static void look(supine_patient_krige *k) {
   }
 }
 
-/* A damped step; false where it cannot be solved for. */
+/* Solve for a damped step; false if the matrix is singular. */
 static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS]) {
   double matrix[TERMS * TERMS];
   memcpy(matrix, k->normal, sizeof matrix);
@@ -197,7 +197,7 @@ static bool find_step(const supine_patient_krige *k, double damping, double step
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', TERMS, 1, matrix, TERMS, step, TERMS) == 0;
 }
 
-/* Take the law to where it leaves least. */
+/* Minimise the squares over the law. */
 static supine_status descend(supine_patient_krige *k, supine_error *error) {
   double damping = 0.0;
   look(k);
@@ -207,7 +207,8 @@ static supine_status descend(supine_patient_krige *k, supine_error *error) {
     double step[TERMS];
     if (!isfinite(squares) || !find_step(k, damping, step)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the points do not determine the law: they may lie in one plane");
+                              "the points do not determine the law, as if they lay in one plane: "
+                              "give points all over the lungs");
     }
     k->law = moved_by(&before, step);
     look(k);
@@ -224,7 +225,7 @@ static supine_status descend(supine_patient_krige *k, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* The restricted log likelihood of the rows under a sill and a noise, without its constant. */
+/* Find the restricted log likelihood of the rows under a sill and a noise, without its constant. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
   k->options.sill = sill;
@@ -243,7 +244,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Take the sill, then the noise, that make the rows most likely. */
+/* Choose the sill, then the noise, of the largest likelihood. */
 static void choose(supine_patient_krige *k) {
   static const double sills[] = {1.0, 0.03, 0.003, 0.0};
   static const double noises[] = {1.0, 0.5, 0.25, 1.5, 2.0};
@@ -266,7 +267,7 @@ static void choose(supine_patient_krige *k) {
   k->options.noise = best[1];
 }
 
-/* The law, then the correction of what it leaves, in sizes of that law. */
+/* Fit the law, then the correction of its residual, in units of that law's size. */
 static supine_status fit(supine_patient_krige *k, supine_error *error) {
   const int n = (int)k->count;
   choose(k);
@@ -276,8 +277,8 @@ static supine_status fit(supine_patient_krige *k, supine_error *error) {
   }
   if (status != SUPINE_OK) {
     return supine_error_set(error, status,
-                            "the points do not determine the law: they may lie in one plane, or "
-                            "not be numbers");
+                            "the points do not determine the law, as if they lay in one plane or "
+                            "were not numbers: give points all over the lungs");
   }
   look(k);
   cblas_dcopy(n, k->design + TERMS, WIDTH, k->weight, 1);
@@ -287,7 +288,8 @@ static supine_status fit(supine_patient_krige *k, supine_error *error) {
   return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the points do not determine the law: they may lie in one plane");
+                                "the points do not determine the law, as if they lay in one plane: "
+                                "give points all over the lungs");
 }
 
 supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
@@ -354,7 +356,7 @@ supine_status supine_patient_law_fit(const supine_patient_krige_options *options
   return status;
 }
 
-/* Solve the factored normal matrix's triangle, so that x . x is a variance. */
+/* Solve with the triangular factor of the normal matrix, so that x . x is a variance. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
   cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, TERMS, k->normal, TERMS, x, 1);
   return cblas_ddot(TERMS, x, 1, x, 1);

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A law and the kriging of what it leaves, fitted to rows (rows.h) together:
+/* A law and the kriging of its residual, fitted together to rows (rows.h):
  *
  *     value = axis . (u(c) + motion + g) + noise
  *
- * The nine constants c have a normal prior about those of a known law: narrow where that law is to
- * be kept, wide where it is to be found. They are the most likely ones (generalised least squares,
- * Gauss-Newton with damping); g has the covariance of points that are located (runtime/kriging.h),
- * or a share of it. */
+ * The nine constants c have a normal prior about those of a known law, narrow to keep that law,
+ * wide to find a new one. The fit takes the most likely c (generalised least squares,
+ * Gauss-Newton with damping); g has the covariance in runtime/kriging.h, or a share of it. */
 #ifndef SUPINE_PATIENT_KRIGE_H
 #define SUPINE_PATIENT_KRIGE_H
 
@@ -14,25 +13,25 @@
 
 typedef struct supine_patient_krige supine_patient_krige;
 
-/* What is known beforehand. */
+/* What is known before the fit. */
 typedef struct supine_patient_krige_options {
-  supine_patient_power mean; /* of the constants, and where their search begins */
+  supine_patient_power mean; /* prior mean of the constants, and start of the search */
   double spread[3]; /* standard deviations: of lengths, relative; of exponents' logarithms; of
                        slopes; 0: known */
-  bool shape_kept;  /* where g has all of its covariance the law's size alone is found */
-  supine_patient_moved moved; /* which motion is free */
-  double sill; /* share of g's covariance, 0: no g; below 0: whichever makes the rows most likely */
-  double noise; /* factor on the rows' noise; below 0: the most likely */
+  bool shape_kept;  /* if g has its full covariance, fit only the size of the law */
+  supine_patient_moved moved; /* which motion between the scans is fitted */
+  double sill;                /* factor on the covariance of g; 0: no g; below 0: the most likely */
+  double noise;               /* factor on the noise of the rows; below 0: the most likely */
 } supine_patient_krige_options;
 
-/* The options of a law whose size is known. Of `deep` the shape is kept, or, where the rows leave
- * less to g than people's do, all constants within 30 %; of `paper` they are free. */
+/* Give the options for a law whose size is known. `deep` keeps its shape, or varies all
+ * constants by 30 % if g is smaller than in other patients; `paper` leaves all constants free. */
 supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
                                                         const supine_patient_power *mean,
                                                         supine_patient_moved moved);
 
-/* Fit rows; those of weight 0 do not count.
- * @param rows  [count], kept by the caller for as long as the fit
+/* Fit rows; rows of weight 0 are ignored.
+ * @param rows  [count], must outlive the fit
  * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the law
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
@@ -40,7 +39,7 @@ supine_status supine_patient_krige_create(const supine_patient_krige_options *op
                                           supine_patient_krige **krige, supine_error *error);
 void supine_patient_krige_destroy(supine_patient_krige *krige);
 
-/* The law, and its sill and noise as they were given or found. */
+/* The fitted law, with the given or fitted sill and noise. */
 const supine_patient_power *supine_patient_krige_law(const supine_patient_krige *krige);
 double supine_patient_krige_sill(const supine_patient_krige *krige);
 double supine_patient_krige_noise(const supine_patient_krige *krige);
@@ -56,7 +55,7 @@ double supine_patient_krige_predict(const supine_patient_krige *krige,
                                     const supine_patient_row *row, double *variance,
                                     double *scratch);
 
-/* Move law, correction and motion into a patient, whose frame is there. */
+/* Write law, correction and motion into a patient whose frame is set. */
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
 
 /* Compute the covariance of one axis between two centres, mm^2. */

@@ -7,7 +7,7 @@
 
 #include "precompute/patient/rows.h"
 
-/* Exponents beyond these bend all motion into a face; slopes beyond let the force change sign. */
+/* Beyond these exponents all motion is at one face; beyond these slopes the force changes sign. */
 const double supine_patient_exponent_least = 0.5, supine_patient_exponent_most = 4.0,
              supine_patient_slope_most = 2.5;
 
@@ -16,7 +16,7 @@ double supine_patient_power_design(const supine_patient_power *law, const supine
   const double *slopes = law->powers + 3;
   const double force = row->force[0] + slopes[0] * row->force[1] + slopes[1] * row->force[2] +
                        slopes[2] * row->force[3]; /* (18) */
-  double even = 0.0;                              /* what a force of 1 moves */
+  double even = 0.0;                              /* displacement for a force of 1 */
   double left = -row->value;
   for (size_t a = 0; a < 3; ++a) {
     const double box = fmin(1.0, fmax(1e-12, row->place.box[a]));
@@ -82,7 +82,7 @@ supine_status supine_patient_scale_fit(const supine_patient_row *rows, size_t co
   memset(fit->linear + 3, 0, 6 * sizeof *fit->linear);
   for (size_t i = 0; i < count; ++i) {
     double x[SUPINE_PATIENT_TERMS];
-    double *column = x + 8; /* the law itself, then the motion */
+    double *column = x + 8; /* columns of the law, then of the motion */
     (void)supine_patient_power_design(fit, &rows[i], x);
     column[0] = x[15];
     for (size_t a = 0; a < n; ++a) {
@@ -95,7 +95,8 @@ supine_status supine_patient_scale_fit(const supine_patient_row *rows, size_t co
   const lapack_int size = (lapack_int)n;
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, size, right, size) != 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the points do not determine the law: they may lie in one plane");
+                            "the points do not determine the law, as if they lay in one plane: "
+                            "give points all over the lungs");
   }
   for (size_t a = 0; a < 3; ++a) {
     fit->linear[a] *= right[0];

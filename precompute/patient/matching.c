@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Closest points with compatible normals, and how much each counts. */
+/* Nearest points with compatible normals, and their weights. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,11 +16,12 @@
 enum { GRAIN = 64 };
 
 static const double compatible = 0.5;    /* cosine between normals: 60 degrees */
-static const double biweight = 4.685;    /* of the scale: 95 % efficient on normal errors */
+static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficient for normal
+                                          * errors */
 static const double surface_noise = 0.5; /* mm along the normal */
-static const double scale_least = 0.02;  /* mm: no surface is known better */
+static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
 
-/* Take the frame of a surface: its lungs' box and midline. */
+/* Find the frame of a surface: its lungs' box and midline. */
 static supine_patient_frame frame_of(const supine_lungs *lungs) {
   supine_patient_frame frame = {.midline = lungs->midline,
                                 .only_side = lungs->lung_count == 1 ? lungs->side[0] : 0};
@@ -107,7 +108,7 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   return status;
 }
 
-/* The network with its stiffness as the model has it, and the force's columns. */
+/* Set up the network with the model's stiffness, and the columns of the force. */
 static supine_status set_up_forces(supine_patient_matching *m, const supine_model *model,
                                    supine_error *error) {
   const size_t n = m->rest->mesh.vertex_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law as the model of a basis, and the scan that it is made of. */
+/* A patient's law as the model of a basis, and the scan that the law starts from. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,28 +12,30 @@
 
 enum { GRAIN = 64, SETTLE_STEPS = 60 };
 
-static const double settled = 1e-4; /* mm in a step */
+static const double settled = 1e-4; /* change in a step that ends the iteration, mm */
 
-/* Largest distance between the surface's box and the nearest state's, and ratio of their sizes.
- * Landmarks' boxes are guessed, so theirs may differ more. */
+/* Largest distance of the surface's box from the nearest state's over its width, and largest
+ * relative difference of their sizes, of surfaces. Boxes of landmarks are estimates and may
+ * differ more. */
 static const double apart_most[2] = {0.3, 0.15};
 static const double size_most[2] = {1.6, 1.25};
 
-/* Least force that a correction is divided by, of a mean of 1. */
+/* Least force that a correction is divided by, relative to its mean of 1. */
 static const double force_least = 0.2;
 
-/* Least part of the way from full inflation to rest that two states are apart. */
+/* Least part of the way from full inflation to rest between two states. */
 static const double part_least = 0.02;
 
-/* Range of what a resting lung holds of its full volume. */
+/* Range of a lung's volume at rest over its full volume. */
 static const double share_least = 0.15, share_most = 0.95;
 
 supine_force_law supine_patient_force(const supine_patient *patient, double gain,
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = patient->powers + 3;
-  /* Heights fall along Y and grow along Z where the patient lies supine or stands. Those of a lung
-   * seen from the side run along x, one way in each lung, so that nothing of X is theirs. */
+  /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
+   * lying on the side they run along x, in opposite directions of X in the two lungs, so no term
+   * of X represents them. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];
@@ -41,9 +43,9 @@ supine_force_law supine_patient_force(const supine_patient *patient, double gain
   return law;
 }
 
-/* --- the way between the states --------------------------------------------------------------- */
+/* --- the path between the states -------------------------------------------------------------- */
 
-/* Full volume by one of the two states, mL; 0 where it does not tell. */
+/* Find the full volume implied by one of the two states, mL; 0 if unknown. */
 static double full_volume(const supine_patient_record *record, size_t state, double volume,
                           const supine_resting *resting) {
   const supine_state *of = &record->state[state];
@@ -61,7 +63,7 @@ static double full_of_either(const supine_patient_record *record, const supine_r
   return full > 0.0 ? full : full_volume(record, 1, 0.0, resting);
 }
 
-/* Parts of the way from full inflation, 0, to rest, 1. */
+/* Find each state's part of the way from full inflation (0) to rest (1). */
 static void find_parts(const supine_patient_record *record, double part[2]) {
   supine_resting resting = supine_reference_resting_default();
   supine_patient_resting(record, &resting);
@@ -94,14 +96,14 @@ void supine_patient_path(const supine_patient_record *record, double gains[2][3]
 
 typedef struct work {
   const supine_patient_record *record;
-  supine_lungs lungs;  /* in the fuller state, as far as that is found */
+  supine_lungs lungs;  /* estimate of the lungs in the fuller state */
   const double *scan;  /* [N, 3] */
-  const double *ratio; /* [N] what a force comes to, over (18) itself */
+  const double *ratio; /* [N] spread force over (18) at the vertex */
   double *moved;       /* [N, 3] mm */
-  bool settle;         /* the scan is the emptier state: its vertices are taken to the fuller one */
+  bool settle;         /* the scan is the emptier state: find its vertices in the fuller one */
 } work;
 
-/* The displacement of each vertex, and where it came from. */
+/* Find the displacement of each vertex, and its place in the fuller state. */
 static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
@@ -137,7 +139,7 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* What the force of the fitted posture comes to at each vertex, over (18) itself. */
+/* Find the force of the fitted posture after spreading over (18), at each vertex. */
 static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
                                 supine_error *error) {
   const supine_patient_record *record = w->record;
@@ -161,8 +163,8 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   return status;
 }
 
-/* What the lungs would gain, mL, moved from the fuller state by `moved` over its way to full
- * inflation (which 0) or rest (1). */
+/* Find the volume gained, mL, by moving from the fuller state along `moved` to full inflation
+ * (which 0) or rest (1). */
 static double gain_towards(const supine_volume_form *form, const double part[2], size_t which) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   double gains[2][3];
@@ -175,7 +177,7 @@ static double gain_towards(const supine_volume_form *form, const double part[2],
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the ways of the three axes, at which the volumes of full inflation and rest are met. */
+/* Find the ways of the three axes that give the volumes at full inflation and rest. */
 static supine_status find_way(const work *w, const supine_resting *resting, double way[3],
                               supine_error *error) {
   enum { ROUNDS = 30 };
@@ -217,7 +219,7 @@ static supine_status find_way(const work *w, const supine_resting *resting, doub
     const supine_volume *of = &record->state[k].volume;
 
     if (of->ml == 0.0 && of->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
-      continue; /* known */
+      continue; /* volume known */
     }
     const double off = gain_towards(&form, part, k) - (volume[k] - held);
     part[k] += step;
@@ -311,7 +313,7 @@ void supine_patient_model(const supine_patient_field *field, supine_model *model
 
 /* --- the scan -------------------------------------------------------------------------------- */
 
-/* The largest difference between a surface's box and a state's, of the state's width. */
+/* Find the largest difference between a surface's box and a state's, over the state's width. */
 static double box_distance(const supine_patient_record *record, size_t state,
                            const supine_lungs *lungs) {
   const supine_patient_frame *frame = &record->patient.frame;
@@ -332,9 +334,10 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   *state = box_distance(record, 1, lungs) < box_distance(record, 0, lungs) ? 1 : 0;
   if (frame->only_side != 0 && frame->only_side != only_side) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the patient's law is of the %s lung alone: it moves no other",
-                            frame->only_side > 0 ? "left" : "right");
+    return supine_error_set(
+        error, SUPINE_ERROR_MESH,
+        "the patient's law was fitted to the %s lung alone: give that lung, or fit both",
+        frame->only_side > 0 ? "left" : "right");
   }
   for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
     const double low = *state == 0 ? frame->minimum[k] : record->emptier[0][k];
@@ -346,8 +349,8 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
         size < 1.0 / size_most[record->from_surface]) {
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "the patient's law was fitted between %c = %.0f and %.0f mm, the surface reaches from "
-          "%.0f to %.0f: another frame, unit or person",
+          "the patient's law was fitted between %c = %.0f and %.0f mm, but the surface reaches "
+          "from %.0f to %.0f: give both in one frame and unit, of one person",
           "xyz"[k], low, high, lungs -> minimum[k], lungs -> maximum[k]);
     }
   }

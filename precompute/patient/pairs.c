@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Matched points: read. */
+/* Read matched points. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@ enum { COLUMNS = 12, COORDINATES = 6 };
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
 
-/* A point with the line that it stands in, to find those that are there twice. */
+/* A point and its line number, to find duplicates. */
 typedef struct placed {
   const double *point;
   size_t line;
@@ -54,11 +54,11 @@ static supine_status refuse_doubles(const char *path, const double *points, cons
   return status;
 }
 
-/* The six columns of the two points, first the one at rest. */
+/* Find the six columns of the two points, the one at rest first. */
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
                                   supine_error *error) {
   const size_t first = supine_csv_text(csv, 0) != NULL ? 0 : COORDINATES;
-  const bool swap = (first == COORDINATES) != reverse; /* image 2 is the one at rest */
+  const bool swap = (first == COORDINATES) != reverse; /* image 2 is at rest */
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
     if (supine_csv_text(csv, first + k) == NULL) {
@@ -111,7 +111,8 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
   }
   status = read_rows(&csv, reverse, &made, &lines, error);
   if (status == SUPINE_OK && made.count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no pairs of points", path);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: no pairs of points: give one in each line", path);
   }
   if (status == SUPINE_OK) {
     status = refuse_doubles(path, made.from, lines, made.count, error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law, evaluated. */
+/* Evaluate a patient's law. */
 #include <math.h>
 
 #include "precompute/patient/krige.h"
@@ -8,8 +8,8 @@
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
 
-/* Distance that a lung extends beyond its landmarks, mm: on ten pairs of images the outermost are
- * 5 to 15 mm inside. */
+/* Distance that a lung extends beyond its landmarks, mm: in ten pairs of images the outermost
+ * landmarks are 5 to 15 mm inside. */
 static const double landmark_margin = 10.0;
 
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],

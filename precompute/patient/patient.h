@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * A patient's own law of displacement, from that person's scans and landmarks ([Santhanam2008]
- * IV-B): a law of nine constants, and a correction that carries what it leaves of this person.
+/** @file A patient's own law of displacement, from that person's scans and landmarks
+ * ([Santhanam2008] IV-B): a law of nine constants, and a correction that interpolates its
+ * residual.
  *
- * With X, Y, Z the box coordinates of lungs.h over the fuller of two states, side +1 left and -1
- * right, u is the displacement from the fuller state to the emptier one:
+ * With X, Y, Z the box coordinates of lungs.h in the box of the fuller of two states, side +1
+ * left and -1 right, u is the displacement from the fuller state to the emptier one:
  *
  *     u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6) + r
  *
- * `deep` takes c2, c4, c6 to c9 and the ratios of the lengths from the deep law (model.h), `paper`
- * fits all nine. The correction r is a sum of kernels (krige.h). The force is scaled to 1 at the
- * box's centre, as only its product with the directions shows. */
+ * `deep` takes c2, c4, c6 to c9 and the ratios of the lengths from the deep law (model.h),
+ * `paper` fits all nine. The correction r is a sum of kernels (krige.h). The force is scaled to
+ * 1 at the box's centre, as only its product with the directions is observable. */
 #ifndef SUPINE_PATIENT_H
 #define SUPINE_PATIENT_H
 
@@ -32,11 +32,11 @@ extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
   double midline;
-  int only_side; /**< +1 left or -1 right where one lung alone is there; else 0 */
+  int only_side; /**< +1 left or -1 right if there is only one lung; else 0 */
 } supine_patient_frame;
 
 enum {
-  SUPINE_PATIENT_POWERS = 6, /**< c2, c4, c6, c7, c8, c9: not linear in the displacement */
+  SUPINE_PATIENT_POWERS = 6, /**< c2, c4, c6, c7, c8, c9: nonlinear parameters */
   SUPINE_PATIENT_CONSTANTS = 9,
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
@@ -44,8 +44,8 @@ enum {
 /** A kernel of the correction. */
 typedef struct supine_patient_centre {
   double at[3];     /**< mm */
-  double side;      /**< of its lung */
-  double size;      /**< of the law's displacement there, mm */
+  double side;      /**< of its lung: +1 left, -1 right */
+  double size;      /**< law's displacement there, mm */
   double weight[3]; /**< 1/mm */
 } supine_patient_centre;
 
@@ -58,24 +58,24 @@ typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   double powers[SUPINE_PATIENT_POWERS]; /**< c2, c4, c6, c7, c8, c9 */
-  double lengths[3];                    /**< c1, c3, c5, mm; negative where the lung empties */
+  double lengths[3];                    /**< c1, c3, c5, mm; negative if the lung empties */
   double motion[6]; /**< between the scans: translation (mm), small rotation (rad) about the box's
                        centre; u + motion is what was measured */
   supine_patient_correction correction;
 } supine_patient;
 
-/** A place as the laws see it. */
+/** A point in the coordinates of the laws. */
 typedef struct supine_patient_place {
   double box[3]; /**< X, Y, Z; 0 to 1 inside */
   double side;   /**< +1 left, -1 right */
   double arm[3]; /**< from the box's centre, mm */
 } supine_patient_place;
 
-/** @param side  of the point's lung, +1 or -1; 0: that of the midline */
+/** @param side  of the point's lung, +1 or -1; 0: by the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
 
-/** The frame of points alone: their box, and 10 mm more on every side, as lungs end beyond their
+/** Make a frame from points: their box, 10 mm larger on every side, as lungs extend beyond
  * landmarks.
  * @param midline  mm, or NULL: the box's centre */
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
@@ -84,7 +84,7 @@ supine_patient_frame supine_patient_frame_of_points(size_t count, const double *
 /** Compute the nine constants, the force scaled to 1 at the box's centre. */
 void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]);
 
-/** Compute (18) of the law at a place; outside the box as at its nearest face. */
+/** Compute (18) of the law at a place; outside the box, the value at the nearest face. */
 double supine_patient_force_at(const supine_patient *patient, const supine_patient_place *place);
 
 /** Compute (15)-(17) of the law at a place, without the force, mm. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* patient.json, written and read. */
+/* Write and read patient.json. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -37,7 +37,7 @@ static json_t *scores(const supine_patient_scores *of) {
                    "affine", of->affine, "law", of->law, "corrected", of->corrected);
 }
 
-/* Seven numbers a centre: place, side, size and weights. */
+/* Encode the centres, seven numbers each: place, side, size and weights. */
 static json_t *correction(const supine_patient_correction *of) {
   json_t *all = json_array();
   for (size_t i = 0; i < of->count; ++i) {
@@ -202,7 +202,7 @@ supine_status supine_patient_write(const char *path, const supine_patient_record
 
 /* --- reading --------------------------------------------------------------------------------- */
 
-/* Finite numbers of an array; false where they are not there. */
+/* Read the finite numbers of an array; false if any is missing. */
 static bool take_numbers(const json_t *array, size_t count, double *values) {
   bool right = json_array_size(array) == count;
   for (size_t i = 0; right && i < count; ++i) {
@@ -286,7 +286,7 @@ static bool take_force(const json_t *object, supine_force_law *force) {
          isfinite(force->gain) && take_numbers(json_object_get(object, "box"), 3, force->box);
 }
 
-/* The modes of each side that the file has. */
+/* Read the regions of each side. */
 static bool take_stiffness(const json_t *object, supine_patient_stiffness *stiffness) {
   bool right = true;
   for (size_t side = 0; side < 2; ++side) {
@@ -317,7 +317,7 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   if (found == NULL || strcmp(found, format) != 0 || number(root, "version") != VERSION) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: not a patient's file of version %d: make it anew with 'supine fit'", name, VERSION);
+        "%s: not a patient file of version %d: make a new one with 'supine fit'", name, VERSION);
   }
   memset(record, 0, sizeof *record);
   if (!take_frame(json_object_get(root, "frame"), record)) {
@@ -342,7 +342,8 @@ static supine_status decode(const char *name, const json_t *root, supine_patient
   }
   if (wrong != NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: \"%s\" is missing or not as 'supine fit' writes it", name, wrong);
+                            "%s: \"%s\" is missing or invalid: make a new file with 'supine fit'",
+                            name, wrong);
   }
   const char *whose = json_string_value(json_object_get(root, "name"));
   (void)snprintf(record->name, sizeof record->name, "%s", whose != NULL ? whose : "unnamed");

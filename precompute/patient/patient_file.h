@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * patient.json: a patient's law with the force and the states that go with it, how it was fitted
- * and how well it held out; and the model that it makes of a surface. */
+/** @file patient.json: a patient's law with its force and states, how it was fitted and its
+ * held-out error; and the model that it gives for a surface. */
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
 
@@ -15,48 +14,49 @@
 
 enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
-/** What a further state told. */
+/** Fit of a further state. */
 typedef struct supine_patient_told {
   supine_state state;
-  double scale;              /**< 1 where it is as far from the fuller state as the emptier one */
-  double left, left_without; /**< mm RMS, with the gain and without */
+  double scale;              /**< 1 if it is as far from the fuller state as the emptier one */
+  double left, left_without; /**< RMS residual, mm, with the gain and without */
 } supine_patient_told;
 
 /** What patient.json holds. */
 typedef struct supine_patient_record {
-  char name[SUPINE_PATIENT_TEXT]; /**< whose */
+  char name[SUPINE_PATIENT_TEXT]; /**< name of the patient */
   supine_patient patient;
   supine_force_law force; /**< 1 at the box's centre in the emptier state's posture */
   double reach;           /**< spreading length of the force, mm */
   supine_state state[2];  /**< the fuller and the emptier */
-  double volume[2];       /**< mL; 0: not known */
-  double emptier[2][3];   /**< its box, mm; the fuller one's is the frame */
-  bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
+  double volume[2];       /**< mL; 0: unknown */
+  double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
+  bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
   size_t points;
-  double held_out, held_out_baseline, fitted, explained; /**< mm RMS and share */
+  double held_out, held_out_baseline, fitted, explained; /**< mm RMS; explained: share */
   double expected_constant;            /**< mm: expected square error per mm of displacement */
-  double expected, band;               /**< mm RMS expected, share within the 95 % band; held out */
-  supine_patient_stiffness stiffness;  /**< counts 0: even */
-  supine_patient_expand_report expand; /**< written, where it was tried; not read */
-  supine_patient_applied applied;      /**< written, where there are blocks; not read */
+  double expected, band;               /**< held out: expected error, mm RMS; share within the 95
+                                        * % band */
+  supine_patient_stiffness stiffness;  /**< counts are 0: even tissue */
+  supine_patient_expand_report expand; /**< written if it was tried; not read */
+  supine_patient_applied applied;      /**< written if there are blocks; not read */
   size_t told_count;                   /**< further states; written, not read */
   supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_told;    /**< some of them in another posture */
-  bool gain_open;    /**< they do not determine it: it ended at a bound */
+  bool gain_told;    /**< some further state was in another posture */
+  bool gain_open;    /**< the further states do not determine the gain */
   double gain_error; /**< standard error of the gain */
 } supine_patient_record;
 
-/** Whether the record has a stiffness of its own. */
+/** Report whether the record has its own stiffness. */
 bool supine_patient_is_uneven(const supine_patient_record *record);
 
-/** Compute the force of a patient's law, of whose slopes `gain` turns with gravity. Seen in one
- * posture, any gain gives the same field. */
+/** Compute the force of a patient's law, whose slopes turn with gravity by the share `gain`. In
+ * the fitted posture the field does not depend on the gain. */
 supine_force_law supine_patient_force(const supine_patient *patient, double gain,
                                       const double gravity[3]);
 
 /** Write the record whole or not at all.
  * @param report   optional: scores, starts, constants and their intervals
- * @param made_by  how
+ * @param made_by  command line
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const supine_patient_fit_report *report, const char *made_by,
@@ -66,20 +66,21 @@ supine_status supine_patient_write(const char *path, const supine_patient_record
 char *supine_patient_text(const supine_patient_record *record,
                           const supine_patient_fit_report *report, const char *made_by);
 
-/** @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (what is missing or wrong is named) */
+/** @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (names what is missing or wrong) */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** How a person's law moves the vertices of a surface, by (15)-(17) and the correction. */
+/** Displacement of a surface's vertices by a patient's law, (15)-(17) and the correction. */
 typedef struct supine_patient_field {
-  const supine_patient_record *record; /**< the caller's, to be kept */
-  double way[3];                       /**< of that from full inflation to rest, by axis */
-  double *moved;                       /**< [N, 3] mm to rest, for a force of 1 that comes to 1 */
+  const supine_patient_record *record; /**< owned by the caller; must outlive the field */
+  double way[3];                       /**< share of full inflation to rest, by axis */
+  double *moved;                       /**< [N, 3] displacement to rest, mm, for a spread force
+                                        * of 1 */
 } supine_patient_field;
 
-/** Find the displacement of every vertex between the two states that were fitted; free it.
- * @param resting    shares at rest
- * @param state      that the surface shows: 0 the fuller, 1 the emptier
+/** Find the displacement of every vertex between the two fitted states; free it afterwards.
+ * @param resting    volumes at rest
+ * @param state      of the surface: 0 the fuller, 1 the emptier
  * @param stiffness  optional [N]: E, relative, of a record that has one
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_field_find(const supine_patient_record *record,
@@ -88,14 +89,14 @@ supine_status supine_patient_field_find(const supine_patient_record *record,
                                         supine_patient_field *field, supine_error *error);
 void supine_patient_field_free(supine_patient_field *field);
 
-/** Set force, directions and reach of a model to the patient's. The field is kept by the caller for
- * as long as the model. With u the displacement and f the force in the fitted posture, at least 0.2
- * of its mean, the directions are
+/** Set force, directions and reach of a model to the patient's. The field must outlive the
+ * model. With u the displacement and f the force in the fitted posture, at least 0.2 of its
+ * mean, the directions are
  *
- *     d = -u / f               so that f d is what the person's lungs move by */
+ *     d = -u / f               so that f d is the person's displacement */
 void supine_patient_model(const supine_patient_field *field, supine_model *model);
 
-/** Find the state that a surface shows, by its box.
+/** Find the state of a surface from its box.
  * @param state  0 the fuller, 1 the emptier
  * @retval SUPINE_ERROR_MESH  the surface lies elsewhere, or is the other lung */
 supine_status supine_patient_check_place(const supine_patient_record *record,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Rows of landmarks, and the blocks that they are held out by. */
+/* Rows of landmarks, and the blocks that are held out together. */
 #include <math.h>
 #include <string.h>
 
@@ -8,11 +8,11 @@
 
 #include "precompute/patient/rows.h"
 
-/* Side of a block, mm: neighbours within it are left out together. Landmarks a third of that apart
- * move alike to a few mm, so single ones left out would look better than they are. */
+/* Side of a block, mm: neighbours within it are left out together. Landmarks a third of that
+ * apart move alike to a few mm, so leaving out single ones would understate the error. */
 static const double block_side = 40.0;
 
-/* How well a landmark is placed, mm per axis. */
+/* Standard deviation of a landmark, mm per axis. */
 static const double landmark_noise = 2.0;
 
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
@@ -52,7 +52,7 @@ void supine_patient_row_displacement(const supine_patient *patient, const supine
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
-  enum { CELLS = 64 }; /* a side: 2.5 m */
+  enum { CELLS = 64 }; /* cells of the grid on a side: 2.5 m */
   size_t blocks = 0;
   double origin[3];
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -73,7 +73,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
     }
     rows[i].block = cell;
   }
-  /* Cells to blocks numbered as they first appear. */
+  /* Marks cells that have a block number, in order of first appearance. */
   static const size_t numbered = (size_t)1 << 40;
   for (size_t i = 0; i < count; ++i) {
     if (rows[i].block < numbered) {
@@ -139,7 +139,8 @@ bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, con
   }
   const lapack_int size = translation ? 3 : N;
   for (size_t a = 0; a < N; ++a) {
-    matrix[a * N + a] += 1e-9 * trace; /* enough to solve where rows leave a term open */
+    matrix[a * N + a] += 1e-9 * trace; /* keeps the matrix regular where rows leave a term
+                                        * undetermined */
     map[a] = a < (size_t)size ? map[a] : 0.0;
   }
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, N, map, N) == 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What was measured, as rows: axis . (u + motion) = value. A landmark gives three, a point of a
- * surface one, along the normal of the other surface. And the laws' fits to rows. */
+/* Measurements as rows: axis . (u + motion) = value. A landmark gives three rows, a point of a
+ * surface one, along the normal of the other surface. And fits of the laws to rows. */
 #ifndef SUPINE_PATIENT_ROWS_H
 #define SUPINE_PATIENT_ROWS_H
 
@@ -8,22 +8,22 @@
 
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double force[4]; /* what the force 1, X - 1/2, Y - 1/2, Z - 1/2 comes to here */
+  double force[4]; /* spread force 1, X - 1/2, Y - 1/2, Z - 1/2 at the point */
   double axis[3];
   double value;  /* mm */
-  double weight; /* of its square */
+  double weight; /* of the squared residual */
   double noise;  /* standard deviation, mm */
   size_t block;
 } supine_patient_row;
 
-/* Which motion between the scans is to be found with the law. */
+/* Which motion between the scans is fitted with the law. */
 typedef enum supine_patient_moved {
   SUPINE_PATIENT_STILL = 0,
   SUPINE_PATIENT_TRANSLATION,
   SUPINE_PATIENT_RIGID
 } supine_patient_moved;
 
-/* Three rows a pair into rows [3 count]. */
+/* Make three rows of each pair into rows [3 count]. */
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
@@ -31,12 +31,12 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 void supine_patient_row_displacement(const supine_patient *patient, const supine_patient_row *row,
                                      double u[3]);
 
-/* Gives each row its block, a cube of 40 mm, the grid's origin drawn from the seed; the number of
+/* Assign each row to a block, a cube of 40 mm of a grid with random origin; return the number of
  * blocks. */
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
-/* Deals blocks at random to so many folds, [blocks].
+/* Assign blocks at random to folds, [blocks].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned long seed,
                                        size_t *fold_of);
@@ -56,21 +56,21 @@ typedef struct supine_patient_power {
 extern const double supine_patient_exponent_least, supine_patient_exponent_most,
     supine_patient_slope_most;
 
-/* Compute what each unknown moves along a row, per unit; returns what the law leaves of it, mm. */
+/* Compute the derivative of a row by each unknown, and return the law's residual, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* Take a law and the motion into a patient, without a correction. */
+/* Write a law and the motion into a patient, without a correction. */
 void supine_patient_take(const supine_patient_power *law, supine_patient *patient);
 
-/* What a fit leaves of a row, mm. */
+/* Compute the residual of a row, mm. */
 double supine_patient_power_residual(const supine_patient_power *fit,
                                      const supine_patient_row *row);
 
-/* How far a force of 1 moves a row's point along its axis, mm. */
+/* Compute the displacement of a row's point along its axis for a force of 1, mm. */
 double supine_patient_power_along(const supine_patient_power *fit, const supine_patient_row *row);
 
-/* The law's displacement at a row's point, mm, without the motion. */
+/* Compute the law's displacement at a row's point, mm, without the motion. */
 void supine_patient_power_displacement(const supine_patient_power *fit,
                                        const supine_patient_row *row, double u[3]);
 
@@ -86,13 +86,13 @@ supine_status supine_patient_scale_fit(const supine_patient_row *rows, size_t co
 
 enum { SUPINE_PATIENT_AFFINE = 12 };
 
-/* Fit a translation or an affine map x -> t + M x, about the box's centre, to the rows of which
- * fold_of is not `without` (NULL: all).
- * @return false where the rows do not determine it */
+/* Fit a translation or an affine map x -> t + M x, about the box's centre, to the rows whose
+ * fold_of is not `without` (NULL: all rows).
+ * @return false if the rows do not determine it */
 bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, const size_t *fold_of,
                                size_t without, bool translation, double map[SUPINE_PATIENT_AFFINE]);
 
-/* What a map leaves of a row, mm. */
+/* Compute a map's residual of a row, mm. */
 double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
                                       const supine_patient_row *row);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Smooth regions of expandability over a lung. */
+/* Smooth regions of expandability in a lung. */
 #include <math.h>
 #include <string.h>
 
@@ -7,10 +7,11 @@
 
 #include "sh/base/vec3.h"
 
-static const double apart = 35.0;      /* mm, that every vertex is from a centre at most */
+static const double apart = 35.0;      /* largest distance of a vertex from its nearest centre,
+                                        * mm */
 static const double overlapping = 1.5; /* radius over that distance */
 
-enum { LOOKED_AT = 8192 }; /* vertices that centres are spread over */
+enum { LOOKED_AT = 8192 }; /* most vertices considered as centres */
 
 static double weight_at(const supine_patient_mode *mode, const double point[3]) {
   const double t = supine_distance(mode->centre, point) / mode->radius;
@@ -23,7 +24,7 @@ size_t supine_patient_side_of(const supine_lungs *lungs, size_t vertex) {
   return lungs->side[lung] > 0 ? 0 : 1;
 }
 
-/* The vertex of a side that is farthest from the side's centres so far, and how far, mm. */
+/* Find the vertex of a side farthest from the side's centres, and its distance, mm. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        size_t side, double *distance) {
   size_t found = 0;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * A patient's expandability a = 1/E ([Santhanam2008] VI) as a mean of a few regions of each lung,
- * which any meshing of it can be given:
+/** @file A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
+ * regions of each lung, independent of the mesh:
  *
  *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k / sum over k of w(|p - centre_k| /
  * radius_k) w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
@@ -15,9 +14,10 @@ enum { SUPINE_PATIENT_MODES = 128 };
 
 typedef struct supine_patient_mode {
   double value;     /**< a_k > 0 */
-  double centre[3]; /**< mm, where the surface is at rest */
+  double centre[3]; /**< mm, in the reference surface */
   double radius;    /**< mm, > 0 */
-  double seen;      /**< how much of it the surfaces told, 0 to 1; the rest is its neighbours' */
+  double seen;      /**< contribution of the surfaces, 0 to 1; the remainder comes from
+                     * neighbouring regions */
 } supine_patient_mode;
 
 /** The regions of the left lung and of the right. Both counts 0: even tissue. */
@@ -30,14 +30,14 @@ typedef struct supine_patient_stiffness {
 void supine_patient_stiffness_spread(const supine_lungs *lungs,
                                      supine_patient_stiffness *stiffness);
 
-/** Shares [count of the side] of a side's regions in a at a point: they sum to 1. */
+/** Find the weights [count of the side] of a side's regions at a point: they sum to 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness, size_t side,
                                      const double point[3], double *shares);
 
-/** The side of a vertex as the regions count: 0 left, 1 right. */
+/** Find the side of a vertex: 0 left, 1 right. */
 size_t supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 
-/** E [N] of every vertex, relative. */
+/** Find E [N] of every vertex, relative. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A law from surfaces: closest points, point to plane, robust, over and over. */
+/* Fit a law to surfaces by iterated nearest points, point to plane, with robust weights. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,35 +11,35 @@
 #include "sh/base/parallel.h"
 
 enum {
-  VERTICES_MAX = 600,  /* that take part: kriging is of 90 mm */
-  EXPANDED_MAX = 2000, /* the same where regions some 45 mm apart are to be found */
+  VERTICES_MAX = 600,  /* most vertices of a fit: kriging has a length of 90 mm */
+  EXPANDED_MAX = 2000, /* the same if expandability is fitted, of regions some 45 mm apart */
   ROUNDS_MAX = 60,
   GRAIN = 64
 };
 
-static const double settled = 2e-3; /* mm RMS between two rounds */
-static const double near_by = 0.5;  /* the same, where a law of known shape is near enough */
-static const double outlying = 1.0; /* mm: distances that are none, at least. Kriging carries what a
-                                       law misses, and would leave what is weighted down */
-static const double same_state = 0.02;   /* mm RMS */
-static const double overlap_least = 0.5; /* of the smaller box, along each axis */
+static const double settled = 2e-3;      /* RMS change between rounds that ends the fit, mm */
+static const double near_by = 0.5;       /* the same, for the first fit of a law of known shape */
+static const double outlying = 1.0;      /* least cutoff of the weights, mm: kriging corrects the
+                                          * law's residual, which weights must not remove */
+static const double same_state = 0.02;   /* RMS distance of equal surfaces, mm */
+static const double overlap_least = 0.5; /* least overlap over the smaller box, along each axis */
 static const double size_most = 1.6;
 static const double matched_least = 0.3;
 static const double nearer_least =
-    0.6; /* of the distance as given: so near and reversed is no chance */
+    0.6; /* ratio of distances, reversed over given, that reveals reversed axes */
 
 typedef supine_patient_matching matching;
 
-/* Of the surface at rest and the other, mm. */
+/* Boxes of the reference surface and the other, mm. */
 typedef struct boxes {
   double low[2][3], high[2][3];
 } boxes;
 
-/* Where the law puts the vertices that take part. */
+/* Arguments of the pass that moves the vertices by the law. */
 typedef struct placing {
   matching *m;
   const supine_patient *patient;
-  double *square; /* [count] of how far each went, mm^2 */
+  double *square; /* [count] squared change of each position, mm^2 */
 } placing;
 
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -61,7 +61,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Fit the deep law's size to the rows; or, `shaped`, its constants and the correction. */
+/* Fit the deep law's size to the rows; or, if `shaped`, its constants and the correction. */
 static supine_status refit(const matching *m, const supine_patient_fit_options *wanted, bool shaped,
                            supine_patient_krige_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -87,7 +87,7 @@ static supine_status refit(const matching *m, const supine_patient_fit_options *
   return status;
 }
 
-/* Move the vertices; mm RMS by which they moved. */
+/* Move the vertices; return the RMS change of their positions, mm. */
 static supine_status place(matching *m, const supine_patient *patient, double *change,
                            supine_error *error) {
   placing w = {.m = m, .patient = patient, .square = calloc(m->count, sizeof(double))};
@@ -104,12 +104,12 @@ static supine_status place(matching *m, const supine_patient *patient, double *c
   return SUPINE_OK;
 }
 
-/* The first rows: each lung's box brought to the state's, axis by axis. */
+/* Make the first rows by mapping each lung's box to the other state's, axis by axis. */
 static void start_rows(matching *m, const boxes *b) {
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_row *row = &m->rows[i];
     const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
-    const size_t k = i % 3; /* one axis each, in turn */
+    const size_t k = i % 3; /* one axis for each vertex, in turn */
     const double t = (from[k] - b->low[0][k]) / (b->high[0][k] - b->low[0][k]);
     row->axis[0] = row->axis[1] = row->axis[2] = 0.0;
     row->axis[k] = 1.0;
@@ -118,8 +118,8 @@ static void start_rows(matching *m, const boxes *b) {
   }
 }
 
-/* Rows of the nearest points and the fit to them by turns: the law's size first, so that what the
- * surfaces do not show, the motion along them, begins with the law's. */
+/* Alternate between nearest points and the fit. Fit the law's size first: the motion along the
+ * surfaces, which they do not show, then starts from the law's. */
 static supine_status settle(matching *m, const boxes *b, const supine_patient_fit_options *wanted,
                             supine_patient *patient, supine_patient_surface_report *report,
                             supine_error *error) {
@@ -138,10 +138,11 @@ static supine_status settle(matching *m, const boxes *b, const supine_patient_fi
       supine_patient_matching_find(m);
       report->matched = supine_patient_matching_weigh(m, outlying, &report->after);
       if (report->matched < matched_least) {
-        status = supine_error_set(error, SUPINE_ERROR_MESH,
-                                  "only %.0f %% of the vertices find the other surface facing the "
-                                  "same way: other axes, another person, or triangles inwards",
-                                  100.0 * report->matched);
+        status = supine_error_set(
+            error, SUPINE_ERROR_MESH,
+            "only %.0f %% of the vertices find the other surface facing the same way: check that "
+            "axes and person are the same, and that no triangles face inwards",
+            100.0 * report->matched);
       }
     }
     if (change < (shaped ? settled : near_by)) {
@@ -161,13 +162,13 @@ static supine_status check_boxes(const boxes *b, supine_error *error) {
     if (!(size[1] > 0.0) || size[1] > size_most * size[0] || size[0] > size_most * size[1]) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "along %c the lungs are %.3g mm at rest and %.3g mm in the other "
-                              "state: different units, or not the same lungs?",
+                              "state: check that units and lungs are the same",
                               "xyz"[k], size[0], size[1]);
     }
     if (overlap < overlap_least * fmin(size[0], size[1])) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
-                              "%.0f mm): different frames or sides?",
+                              "%.0f mm): check that frames and sides are the same",
                               "xyz"[k], b -> low[0][k], b -> high[0][k], b -> low[1][k],
                               b -> high[1][k]);
     }
@@ -175,7 +176,7 @@ static supine_status check_boxes(const boxes *b, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* How far rest is from the state, box laid on box, some axes reversed; mm RMS to nearest points. */
+/* Find the RMS distance of the surfaces with their boxes matched and some axes reversed, mm. */
 static double laid_distance(const matching *m, const boxes *b, const bool reversed[3]) {
   double square = 0.0;
   for (size_t i = 0; i < m->count; ++i) {
@@ -193,7 +194,7 @@ static double laid_distance(const matching *m, const boxes *b, const bool revers
   return sqrt(square);
 }
 
-/* Refuses lungs that are the same but for the sign of axes: RAS beside LPS, a mirror image. */
+/* Refuse lungs that match better with reversed axes: RAS for LPS, or a mirror image. */
 static supine_status check_axes(const matching *m, const boxes *b, supine_error *error) {
   static const struct {
     const char *name;
@@ -201,7 +202,7 @@ static supine_status check_axes(const matching *m, const boxes *b, supine_error 
   } ways[] = {{"x", {true, false, false}},
               {"y", {false, true, false}},
               {"z", {false, false, true}},
-              {"x and y", {true, true, false}}}; /* the last is RAS beside LPS */
+              {"x and y", {true, true, false}}}; /* the last is RAS for LPS */
   const double given = laid_distance(m, b, (const bool[3]){false, false, false});
   double least = given;
   size_t nearest = 0;
@@ -212,13 +213,14 @@ static supine_status check_axes(const matching *m, const boxes *b, supine_error 
   }
   return least >= nearer_least * given
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the other surface is %.1f mm from the one at rest, box on box, "
-                                "and %.1f mm with %s reversed: are both in the same axes (--axes)?",
-                                given, least, ways[nearest].name);
+             : supine_error_set(
+                   error, SUPINE_ERROR_MESH,
+                   "with boxes matched, the other surface is %.1f mm from the one at rest, but "
+                   "%.1f mm with %s reversed: give both in the same axes (--axes)",
+                   given, least, ways[nearest].name);
 }
 
-/* How far the surfaces are apart at rest; nothing to fit where they are not. */
+/* Find the distance of the surfaces before the fit; fail if they are equal. */
 static supine_status look_at_rest(matching *m, supine_patient_surface_report *report,
                                   supine_error *error) {
   report->vertices = m->count;
@@ -235,8 +237,8 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
                                 report->before);
 }
 
-/* The stiffness, and the rows of the law with it. What is held out is then counted as the
- * expandability's blocks have it, as their stiffness had not seen them either. */
+/* Fit the expandability and the law with it. The held-out error is then that of the
+ * expandability's own blocks, which its fit did not use. */
 static supine_status expand(matching *m, const supine_patient_surface_task *task,
                             supine_patient_surface_fit *fit, supine_error *error) {
   const supine_patient_expand_task wanted = {task->options.moved, task->model, task->gravity,
@@ -249,7 +251,7 @@ static supine_status expand(matching *m, const supine_patient_surface_task *task
   return status;
 }
 
-/* The report on all laws, and the force that the displacement shows. */
+/* Fill the report of all laws, and the force that the displacement implies. */
 static supine_status judge(matching *m, const supine_patient_surface_task *task,
                            const supine_patient_fit_options *wanted,
                            supine_patient_surface_fit *fit, supine_error *error) {
@@ -276,7 +278,7 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
   return status;
 }
 
-/* Nearest points, then all that is to be said of the law. */
+/* Match the nearest points, then fit and judge the law. */
 static supine_status run(matching *m, const supine_patient_surface_task *task, const boxes *b,
                          const supine_patient_fit_options *wanted, supine_patient_surface_fit *fit,
                          supine_error *error) {
@@ -300,7 +302,7 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
   supine_patient_fit_options wanted = task->options;
   boxes b;
   memcpy(wanted.gravity, task->gravity, sizeof wanted.gravity);
-  if (task->expandability) { /* stiffness carries what the law leaves */
+  if (task->expandability) { /* the stiffness replaces the correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }

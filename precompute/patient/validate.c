@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A prediction against another state of the same lungs. */
+/* Compare a prediction with another state of the same lungs. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,14 +31,15 @@ static void apply(const map *by, const double *from, double *to) {
   }
 }
 
-/* Below this, mm RMS, nothing moved: landmarks and surfaces are not placed better. */
+/* RMS motion, mm, below which nothing moved: landmarks and surfaces are less precise. */
 static const double still = 0.05;
 
-/* A similarity whose scale is 1, beside the maps that are shown. */
+/* A similarity with scale 1, not among the maps that are reported. */
 static const supine_patient_map rigid = SUPINE_PATIENT_MAP_COUNT;
 
-/* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, the last column of U
- * turned where that would mirror; scale tr(S) over the spread, or 1 where that is 0. */
+/* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, with the sign of the
+ * last column of U changed if R would mirror; the scale is tr(S) over the spread, or 1 if that
+ * is 0. */
 static bool similarity(double cross[9], double spread, double m[9]) {
   double s[3];
   double u[9];
@@ -55,7 +56,7 @@ static bool similarity(double cross[9], double spread, double m[9]) {
   return true;
 }
 
-/* The map of a kind that brings points nearest to others, in least squares. */
+/* Fit the map of a kind that brings points nearest to others, in least squares. */
 static bool fit_map(supine_patient_map kind, size_t count, const double *from, const double *to,
                     map *found) {
   double mean[2][3] = {{0.0}};
@@ -83,7 +84,7 @@ static bool fit_map(supine_patient_map kind, size_t count, const double *from, c
     const double spread = scatter[0] + scatter[4] + scatter[8];
     right = similarity(cross, kind == rigid ? 0.0 : spread, found->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    /* by columns, the rows of the map are the right-hand sides */
+    /* In column-major order the right-hand sides are the rows of the map. */
     right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter, 3, cross, 3) == 0;
     memcpy(found->m, cross, sizeof cross);
   }
@@ -117,7 +118,7 @@ static void explain(supine_patient_moved moved,
   }
 }
 
-/* The map that takes a motion between the scans out. */
+/* Give the map that removes a motion between the scans. */
 static supine_patient_map map_of(supine_patient_moved moved) {
   return moved == SUPINE_PATIENT_RIGID         ? rigid
          : moved == SUPINE_PATIENT_TRANSLATION ? SUPINE_PATIENT_MAP_TRANSLATION
@@ -137,10 +138,10 @@ supine_status supine_patient_validate_points(
     const double *from = own ? predicted : pairs->from;
     if (!fit_map(own ? map_of(moved) : (supine_patient_map)k, pairs->count, from, pairs->to, &by)) {
       free(space);
-      return supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "the points determine no %s map: they lie in one plane, or memory is short",
-          own ? "rigid" : supine_patient_map_names[k]);
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the points do not determine a map of kind '%s': they lie in one "
+                              "plane, or memory is short",
+                              own ? "rigid" : supine_patient_map_names[k]);
     }
     for (size_t i = 0; i < pairs->count; ++i) {
       double at[3];
@@ -157,7 +158,7 @@ supine_status supine_patient_validate_points(
 
 /* --- surfaces -------------------------------------------------------------------------------- */
 
-/* Both ways, pooled. */
+/* Pool the distances in both directions. */
 static supine_status surface_distance(const supine_mesh *rest, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
@@ -179,7 +180,7 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
   return status;
 }
 
-/* Vertices moved by the map of a kind that nearest points settle on. */
+/* Fit the map of a kind to surfaces by iterated nearest points. */
 static bool settle(supine_patient_map kind, size_t n, const double *vertices,
                    const supine_inside_surface *tree, double *space, double *moved) {
   const size_t count = n < FITTED_MAX ? n : FITTED_MAX;
@@ -216,7 +217,7 @@ static supine_status check_overlap(const supine_mesh *rest, const supine_mesh *s
     if (fmin(high[0][k], high[1][k]) <= fmax(low[0][k], low[1][k])) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
-                              "%.0f mm): different frames, units or sides?",
+                              "%.0f mm): check that frames, units and sides are the same",
                               "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
     }
   }
@@ -245,9 +246,10 @@ supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved mo
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     if (!settle(own ? map_of(moved) : (supine_patient_map)k, n, own ? predicted : rest->vertices,
                 tree, space, at)) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the surface determines no %s map, or memory is short",
-                                own ? "rigid" : supine_patient_map_names[k]);
+      status =
+          supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                           "the surface does not determine a map of kind '%s', or memory is short",
+                           own ? "rigid" : supine_patient_map_names[k]);
     } else {
       status = surface_distance(rest, at, state, tree, own ? nearest : NULL, &distance[k], error);
     }

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * How far a prediction is from another state of the same lungs, beside what no model needs. */
+/** @file Error of a prediction against another state of the same lungs, beside maps that need no
+ * model. */
 #ifndef SUPINE_PATIENT_VALIDATE_H
 #define SUPINE_PATIENT_VALIDATE_H
 
 #include "mesh/mesh.h"
 #include "precompute/patient/rows.h"
 
-/** The prediction, and maps of the state at rest that are fitted to the other state itself: what a
- * prediction has to be better than. */
+/** The prediction, and its baselines: maps of the state at rest fitted to the other state
+ * itself. */
 typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,
@@ -24,7 +24,7 @@ extern const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT];
 /** Distances, mm. */
 typedef struct supine_patient_distance {
   double mean, rms, p95;
-  double largest;   /**< of surfaces: the Hausdorff distance */
+  double largest;   /**< of surfaces: Hausdorff distance */
   double explained; /**< share of the squared distance without any map, or of a translation where
                          the motion between the scans is taken out; NAN where nothing moved */
 } supine_patient_distance;

@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What full lungs hold, and doubts about a scan's state. */
+/* Volume at full inflation, and warnings about an implausible scan state. */
 #include <math.h>
 #include <stdio.h>
 
 #include "precompute/physics/capacity.h"
 #include "sh/base/text.h"
 
-static const double tissue = 860.0; /* mL */
+static const double tissue = 860.0; /* of both lungs, mL */
 
-/* Below this share of what they should hold, or below this volume, lungs are not likely full; above
- * that, no adult's. */
+/* Least share of the expected full volume, and least and largest volumes of an adult: outside,
+ * the stated scan state is doubtful. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-static const double left_part = 0.45; /* of both lungs */
+static const double left_part = 0.45; /* left lung's share of both lungs' volume */
 
-/* Volumes of rest that differ by more than this share contradict each other. */
+/* Largest relative difference of two volumes at rest that still agree. */
 static const double contradicts = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
     double slope, offset;                                                 /* L per m, L */
-    double usual[2];                                                      /* heights, cm */
+    double usual[2];                                                      /* usual heights, cm */
   } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* women, men */
   range[0] = INFINITY;
   range[1] = 0.0;
@@ -40,7 +40,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* What the lungs of a reference have of a pair's volume. */
+/* Find the share of both lungs' volume that the reference's lungs hold. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0 : reference->side[0] > 0 ? left_part : 1.0 - left_part;
 }
@@ -51,8 +51,8 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
   double range[2];
   supine_reference_capacity(person, range);
   const bool known = person->height > 0.0 && person->sex != SUPINE_SEX_UNKNOWN;
-  supine_text_add(text, size, known ? "expected %.0f" : "an adult's %.0f to %.0f", part * range[0],
-                  part * range[1]);
+  supine_text_add(text, size, known ? "expected %.0f" : "an adult's lungs hold %.0f to %.0f",
+                  part * range[0], part * range[1]);
 }
 
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
@@ -74,10 +74,10 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
     const double ml = told->ml[axis] + state->volume.ml;
     if (along > 1.0 - 1e-9 && told->ml[axis] > 0.0 && fabs(held - ml) > contradicts * ml) {
-      supine_text_add(text, size,
-                      "the scan holds %.0f mL, where --resting and --scanned say %.0f mL: change "
-                      "one of them",
-                      held, ml);
+      supine_text_add(
+          text, size,
+          "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",
+          held, ml);
     }
   }
   const char *also = text[0] == '\0' ? "" : "; ";

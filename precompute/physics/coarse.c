@@ -7,12 +7,12 @@
 
 #include "precompute/physics/coarse.h"
 
-/* Share of a vertex that smoothing passes on to its neighbours' aggregates: 4 / 3 over the largest
+/* Share of a vertex that smoothing gives to its neighbours' aggregates: 4 / 3 over the largest
  * eigenvalue of the scaled Laplacian, which is 1.5 on a lattice of triangles and at most 2. */
 static const double smoothing = 0.8;
 
-/* A link weaker than this share of both its ends' strongest does not bring them together: across
- * it, errors are not smooth (slivers). */
+/* Least strength of a link, relative to the strongest link of both its ends, that joins them:
+ * across weaker links errors are not smooth (slivers). */
 static const float strong = 0.33F;
 
 static const uint32_t none = UINT32_MAX;
@@ -25,8 +25,8 @@ static float strongest(const supine_rows *links, size_t i) {
   return most;
 }
 
-/* Aggregates of a vertex and all its neighbours where none of them is taken; who is left joins the
- * neighbour it is most strongly linked to. Returns their number. */
+/* Aggregate each vertex with all its neighbours if none is taken; add every other vertex to its
+ * most strongly linked neighbour's aggregate. Return the number of aggregates. */
 static size_t aggregate(const supine_rows *links, const float *least, uint32_t *of) {
   size_t count = 0;
   memset(of, 0xff, links->count * sizeof *of);
@@ -46,7 +46,7 @@ static size_t aggregate(const supine_rows *links, const float *least, uint32_t *
     }
     ++count;
   }
-  const size_t whole = count; /* those who are left do not join each other */
+  const size_t whole = count; /* vertices added later do not attract others */
   for (size_t i = 0; i < links->count; ++i) {
     float most = 0.0F;
     uint32_t best = none;
@@ -82,7 +82,7 @@ static void sum_part(const void *context, size_t i, supine_row *row) {
   }
 }
 
-/* Row a of -P^T L P, whose diagonal goes without saying: rows of L sum to 0, and so do these. */
+/* Row a of -P^T L P without its diagonal, which follows: rows sum to 0 as those of L do. */
 static void sum_links(const void *context, size_t a, supine_row *row) {
   const level_work *work = context;
   const supine_rows *links = work->links;
@@ -111,7 +111,7 @@ static void sum_links(const void *context, size_t a, supine_row *row) {
   }
 }
 
-/* The next level; its links have no rows where nothing comes of it. */
+/* Build the next level; without rows of links if coarsening stops here. */
 static supine_status coarsen(supine_level *level, supine_rows *coarse) {
   const size_t n = level->links.count;
   uint32_t *of = malloc((n + 1) * sizeof *of);
@@ -176,7 +176,7 @@ supine_status supine_physics_hierarchy_create(const supine_rows *links,
 void supine_physics_hierarchy_destroy(supine_hierarchy *hierarchy) {
   if (hierarchy != NULL) {
     for (size_t k = 0; k < hierarchy->level_count; ++k) {
-      if (k > 0) { /* the first's are the network's */
+      if (k > 0) { /* the first level's belong to the network */
         supine_physics_rows_free(&hierarchy->level[k].links);
       }
       supine_physics_rows_free(&hierarchy->level[k].part);

@@ -8,7 +8,7 @@
 
 typedef struct pass {
   const supine_gradients *work;
-  float first; /* share of inverse times residual that a cycle, or no cycle, starts at */
+  float first; /* factor on inverse times residual that the cycle starts from */
   float alpha[SUPINE_RHS_MAX], beta[SUPINE_RHS_MAX];
   double step[SUPINE_RHS_MAX]; /* alpha in the solution's units */
 } pass;
@@ -88,7 +88,7 @@ SUPINE_CLONES static void update_range(void *context, size_t begin, size_t end, 
   SUPINE_FOR_LANES(p->work->system->lanes, update_rows, p, begin, end);
 }
 
-/* z of the residual as it is given, and nothing behind it. */
+/* Find z of the given residual, with no earlier directions. */
 static void begin_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const pass *p = context;
@@ -121,7 +121,7 @@ size_t supine_physics_conjugate_gradients(const supine_gradients *work, size_t s
       const double zw = supine_physics_gradients_total(work->sums, rows, lanes, 1, r);
       const double beta = last_rz[r] == 0.0 ? 0.0 : rz / last_rz[r];
       const double alpha = rz / (beta == 0.0 ? zw : zw - beta * rz / last_alpha[r]);
-      done[r] = done[r] || !isfinite(alpha) || alpha <= 0.0; /* nothing left, or lost to rounding */
+      done[r] = done[r] || !isfinite(alpha) || alpha <= 0.0; /* converged, or lost to rounding */
       p.alpha[r] = done[r] ? 0.0F : (float)alpha;
       p.beta[r] = done[r] ? 0.0F : (float)beta;
       p.step[r] = done[r] ? 0.0 : alpha * work->unit[r];

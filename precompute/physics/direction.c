@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The direction of displacement (15)-(17), and two plain alternatives. */
+/* The direction of displacement (15)-(17), and two simple alternatives. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -67,7 +67,8 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     break;
   case SUPINE_DIRECTION_VECTORS:
     if (law->vectors == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no direction vectors");
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "the model has no direction vectors: give --directions-file");
     }
     for (size_t i = 0; i < 3 * n; ++i) {
       directions[i] = law->vectors[i];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Directions of displacement from a file. */
+/* Read directions of displacement from a file. */
 #include "precompute/physics/force.h"
 
 #include "sh/base/csv.h"
@@ -25,8 +25,10 @@ supine_status supine_physics_directions_load(const char *path, size_t count, dou
   }
   supine_csv_close(&csv);
   if (status == SUPINE_OK && rows < count) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: %zu rows, where the model has %zu vertices", path, rows, count);
+    status = supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: %zu rows, but the model has %zu vertices: give one row for each vertex", path, rows,
+        count);
   }
   return status;
 }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium of (5), (8), (12)-(14): springs eliminated, the matrix made symmetric, and solved
- * in single precision until the residual, which is taken in double, is as small as wanted. */
+/* The equilibrium of (5), (8), (12)-(14): eliminate the springs, make the matrix symmetric, and
+ * solve in single precision until the residual, computed in double, meets the tolerance. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "precompute/physics/conjugate_gradients.h"
 
-/* Steps of a solve at most, and the prefetch distance in rows. */
+/* Most steps of a solve, and prefetch distance in rows. */
 enum { STEPS_MAX = 400, AHEAD = 4 };
 
 /* Relative residual at which single-precision steps stop and the residual is recomputed in double.
@@ -20,13 +20,13 @@ static const double column_tolerance = 1e-14;
 struct supine_equilibrium {
   const supine_network *network;
   size_t rhs_max;
-  double *give;     /* [N] S of the operator, internal order: 1 / E, with a reach 1 */
-  double *load;     /* [N] what a force of 1 weighs on the right: 1, with a reach area / E */
+  double *give;     /* [N] S of the operator, internal order; with a reach 1 */
+  double *load;     /* [N] factor of a force on the right side: 1; with a reach area / E */
   bool prepared;    /* the system is set up for the stiffness */
   size_t count;     /* right-hand sides of this solve */
   double *solution; /* [N, count] t */
   supine_system system;
-  supine_rows links; /* without a reach: the network's, with values of the stiffness */
+  supine_rows links; /* without a reach: the network's links with the stiffness in their values */
   supine_gradients gradients;
 };
 
@@ -62,7 +62,7 @@ static bool allocate_stage(supine_stage *stage, size_t rows, size_t lanes) {
          stage->right != NULL && stage->work != NULL;
 }
 
-/* The stages: those of the network's hierarchy, or the network alone. */
+/* Allocate the stages: those of the network's hierarchy, or the network alone. */
 static bool allocate_system(supine_equilibrium *eq) {
   const supine_network *net = eq->network;
   supine_system *system = &eq->system;
@@ -124,7 +124,7 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        const double *stiffness,
                                                        supine_error *error) {
   const supine_network *net = equilibrium->network;
-  double *e = equilibrium->solution; /* [N] space, file's order */
+  double *e = equilibrium->solution; /* [N] work space, file's order */
   const supine_status status =
       supine_physics_stiffness_normalise(net->vertex_count, stiffness, e, error);
   for (size_t i = 0; status == SUPINE_OK && i < net->vertex_count; ++i) {
@@ -137,15 +137,15 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
   return status;
 }
 
-/* One solve. */
+/* Arguments of one solve. */
 typedef struct solve_pass {
   supine_equilibrium *eq;
   const double *force;           /* [N, lanes] */
   double *catch_;                /* [N, lanes] */
-  bool warm;                     /* catch_ holds a guess */
-  double unit[SUPINE_RHS_MAX];   /* norm of the force, that single precision counts in */
-  double wanted[SUPINE_RHS_MAX]; /* of the next round, squared */
-  double relative;               /* largest residual over the force's norm */
+  bool warm;                     /* catch_ holds the first guess */
+  double unit[SUPINE_RHS_MAX];   /* norm of the force: the unit in single precision */
+  double wanted[SUPINE_RHS_MAX]; /* squared residual that ends the next round */
+  double relative;               /* largest residual relative to the force */
 } solve_pass;
 
 static void run(const solve_pass *pass, supine_range_function *function) {
@@ -153,23 +153,23 @@ static void run(const solve_pass *pass, supine_range_function *function) {
                             (void *)pass);
 }
 
-/* 1 / value to 1e-14: a division in single precision and a step of Newton's, which take a fraction
- * of a division in double. */
+/* Find 1 / value to 1e-14 by a single-precision division and a Newton step, several times faster
+ * than a division in double. */
 SUPINE_INLINE double reciprocal(double value) {
   const double guess = (double)(1.0F / (float)value);
   return guess * (2.0 - value * guess);
 }
 
-/* Without a reach: c of a link of distance d, and what the link adds to the mass of its first end
- * beside S^2, which is what its spring catches. */
+/* Without a reach: find c of a link of length d, and its addition to the mass of its first end,
+ * S^2 excluded: the share that the spring catches. */
 SUPINE_INLINE void paper_link(double give, double other, double d, double *c, double *mass) {
   const double product = give * other;
-  const double share = reciprocal(2.0 * d * other * (d + 2.0 * product)); /* one for both */
+  const double share = reciprocal(2.0 * d * other * (d + 2.0 * product)); /* for both */
   *c = 2.0 * other * product * share;
   *mass = d * (give + other) * share;
 }
 
-/* Masses, and without a reach conductances. */
+/* Compute masses and, without a reach, conductances. */
 static void prepare_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
@@ -189,7 +189,7 @@ static void prepare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Sets the system up for the stiffness, where it is not. */
+/* Set the system up for the stiffness if it changed. */
 static void prepare(const solve_pass *pass) {
   supine_equilibrium *eq = pass->eq;
   supine_system *system = &eq->system;
@@ -201,7 +201,7 @@ static void prepare(const solve_pass *pass) {
   }
 }
 
-/* The norm of the right-hand side, and the t to begin with. */
+/* Compute the right-hand side's norm and the first t. */
 SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
   const supine_equilibrium *eq = pass->eq;
   for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
@@ -231,7 +231,7 @@ SUPINE_CLONES static void load_range(void *context, size_t begin, size_t end, si
   SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, begin, end);
 }
 
-/* The residual of t = 0: the right-hand side. */
+/* Set the residual of t = 0: the right-hand side. */
 static void force_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
@@ -245,7 +245,7 @@ static void force_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* The right-hand side less A t in double, for the next round in single precision. */
+/* Compute the residual, right-hand side minus A t, in double for the next round. */
 SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
   const supine_equilibrium *eq = pass->eq;
   const supine_network *net = eq->network;
@@ -258,7 +258,7 @@ SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, size_t be
       const double own = (net->area == NULL ? 1.0 : net->area[i]) * give * give;
       const double *force = pass->force + (size_t)net->order[i] * lanes;
       const double *t = eq->solution + i * lanes;
-      if (i + AHEAD < end) { /* in the file's order, which no prefetcher foresees */
+      if (i + AHEAD < end) { /* random access in the file's order */
         __builtin_prefetch(pass->force + (size_t)net->order[i + AHEAD] * lanes);
       }
       double out[SUPINE_RHS_MAX];
@@ -296,7 +296,7 @@ SUPINE_CLONES static void residual_range(void *context, size_t begin, size_t end
   SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, begin, end);
 }
 
-/* F = S^2 t, back in the file's order. */
+/* Store F = S^2 t in the file's order. */
 static void store_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const solve_pass *pass = context;
@@ -316,7 +316,7 @@ static double total(const solve_pass *pass, size_t lane) {
                                         lane);
 }
 
-/* What the next round shall bring the residual to. */
+/* Set the residual that the next round must reach. */
 static void aim(solve_pass *pass, double tolerance) {
   pass->relative = 0.0;
   for (size_t r = 0; r < pass->eq->count; ++r) {
@@ -327,12 +327,12 @@ static void aim(solve_pass *pass, double tolerance) {
   }
 }
 
-/* Rounds until the residual is as wanted, or no longer halves. */
+/* Repeat rounds until the residual meets the tolerance or no longer halves. */
 static size_t iterate(solve_pass *pass, double tolerance) {
   size_t steps = 0;
   double last = INFINITY;
   run(pass, pass->warm ? residual_range : force_range);
-  aim(pass, tolerance); /* cold, of the norms that are there already */
+  aim(pass, tolerance); /* cold start: the norms are known already */
   while (pass->relative > tolerance && pass->relative < 0.5 * last && steps < STEPS_MAX) {
     last = pass->relative;
     steps += supine_physics_conjugate_gradients(&pass->eq->gradients, STEPS_MAX - steps);
@@ -342,7 +342,7 @@ static size_t iterate(solve_pass *pass, double tolerance) {
   return steps;
 }
 
-/* Eight parameters: the system, its right-hand sides, how exactly, and what comes of it. */
+/* Eight parameters: the system, the right-hand sides, the tolerance and the results. */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double tolerance, bool warm,
                                                double *catch_, supine_solve_report *report,
@@ -351,7 +351,8 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
   const double wanted = tolerance > 0.0 ? tolerance : SUPINE_SOLVE_TOLERANCE;
   if (count < 1 || count > eq->rhs_max) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu right-hand sides in a solver made for %zu", count, eq->rhs_max);
+                            "%zu right-hand sides, but the solver was created for at most %zu",
+                            count, eq->rhs_max);
   }
   solve_pass pass = {.eq = eq, .force = force, .catch_ = catch_, .warm = warm};
   eq->count = count;
@@ -369,9 +370,10 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
     *report = made;
   }
   if (!(made.residual <= wanted)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "equilibrium: relative residual %.3g after %zu steps, %.3g wanted",
-                            made.residual, made.iterations, wanted);
+    return supine_error_set(
+        error, SUPINE_ERROR_NUMERICAL,
+        "equilibrium: the relative residual is %.3g after %zu steps, above the tolerance %.3g",
+        made.residual, made.iterations, wanted);
   }
   return SUPINE_OK;
 }
@@ -380,7 +382,8 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
                                              double *column, supine_error *error) {
   const size_t n = equilibrium->network->vertex_count;
   if (vertex >= n) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "vertex %zu of %zu: they count from 0",
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "vertex %zu is out of range: the mesh has %zu vertices, counted from 0",
                             vertex, n);
   }
   double *force = calloc(n, sizeof *force);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The applied force (18), turned with gravity. */
+/* The applied force (18) for any direction of gravity. */
 #include <math.h>
 #include <stddef.h>
 
@@ -15,7 +15,7 @@ typedef struct force_work {
   const supine_force_law *law;
   const supine_gravities *gravities;
   const size_t *vertices; /* NULL: all */
-  double middle[3];       /* mean position of all vertices: where h is its mean */
+  double middle[3];       /* mean position of all vertices, where h equals its mean */
   double *force;
 } force_work;
 

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * The force that gravity and breath apply to the mass nodes, (18) for any orientation, and the
- * direction that they move in, (15)-(17).
+/** @file The force that gravity and breath apply to the mass nodes, (18) for any orientation,
+ * and the direction that they move in, (15)-(17).
  *
  *     h_i(g) = (g.p_i - min_j g.p_j) / (max_j g.p_j - min_j g.p_j)      1 where most dependent
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
  * with X, Y, Z the box coordinates of lungs.h, and min and max over all lungs of the model. With
- * soften, dependent tissue is more expandable: the exponential is a factor on a = 1/E of geometric
- * mean 1, which stands beside the force in the equilibrium (equilibrium.h). */
+ * soften, dependent tissue is more expandable: the exponential is a factor on a = 1/E of
+ * geometric mean 1 and multiplies the force in the equilibrium (equilibrium.h). */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
@@ -19,20 +18,20 @@ typedef struct supine_force_law {
   double base;
   double gain;   /**< the part that turns with gravity */
   double box[3]; /**< cx, cy, cz: fixed to the body */
-  double soften; /**< how much softer dependent tissue is; needs a reach (model.h) */
-  bool pair;     /**< a lung alone has the heights of the pair that it and its mirror image in the
-                      midline make, so that it moves as beside its fellow; false: its own */
+  double soften; /**< softening of dependent tissue; needs a reach (model.h) */
+  bool pair;     /**< true: a single lung gets the heights of the pair with its mirror image in
+                  * the midline, so that it moves as beside the other lung; false: its own */
 } supine_force_law;
 
 /** Find the smallest and largest g.p over all vertices, in mm, for each of `count` directions g
  * [count, 3], into minimum [count] and maximum [count]. Uses all cores.
- * @param pair  true: where one lung stands alone, of it and its mirror image (supine_force_law)
+ * @param pair  true: extend a single lung by its mirror image (supine_force_law)
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
                                           const double *directions, double *minimum,
                                           double *maximum);
 
-/** Directions of gravity and how far the lungs reach along each. The arrays are the caller's. */
+/** Directions of gravity and the range of heights along each; arrays are owned by the caller. */
 typedef struct supine_gravities {
   size_t count;
   const double *directions; /**< [count, 3] unit */
@@ -40,39 +39,40 @@ typedef struct supine_gravities {
   const double *maximum;    /**< [count] */
 } supine_gravities;
 
-/** f of some vertices for every direction, into force [vertex_count, gravities->count]. Uses all
- * cores.
- * @param vertices  [vertex_count] which; NULL: all of the lungs' */
+/** Compute f of the given vertices for every direction into force [vertex_count,
+ * gravities->count]. Uses all cores.
+ * @param vertices  [vertex_count] indices; NULL: all */
 void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law,
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** How vertices move. */
+/** Model of the direction of displacement. */
 typedef enum supine_direction_model {
   SUPINE_DIRECTION_BOX = 0, /**< (15)-(17): d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm */
   SUPINE_DIRECTION_NORMAL,  /**< the outward unit normal, 1 mm */
   SUPINE_DIRECTION_RADIAL,  /**< away from the centroid of the lung's vertices, 1 mm */
-  SUPINE_DIRECTION_VECTORS  /**< whatever the caller says, mm */
+  SUPINE_DIRECTION_VECTORS  /**< given by the caller, mm */
 } supine_direction_model;
 
 /** The model and the constants c1 to c6 of the box model (model.h has three sets of them). */
 typedef struct supine_direction_law {
   supine_direction_model model;
   double c[6];
-  const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; the caller's */
-  /** Corrects the directions [N, 3] of one person's lungs in place; NULL: they stay. */
+  const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; owned by the caller */
+  /** Correct the directions [N, 3] of one person's lungs in place; NULL: no correction. */
   void (*correct)(const void *context, const supine_lungs *lungs, double *directions);
-  const void *context; /**< of the correction; the caller's */
+  const void *context; /**< argument of `correct`; owned by the caller */
 } supine_direction_law;
 
-/** Reads vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each of
- * `count` vertices in the model's order, into vectors [count, 3].
+/** Read vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each
+ * of `count` vertices in the model's order, into vectors [count, 3].
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (line named), SUPINE_ERROR_MEMORY */
 supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
                                              supine_error *error);
 
-/** d [N, 3], mm; of any length, so that the fixed planes stay fixed.
- * @retval SUPINE_ERROR_ARGUMENT  a constant that is not finite, or an exponent that is not positive
+/** Compute d [N, 3], mm, not normalised.
+ * @retval SUPINE_ERROR_ARGUMENT  a constant that is not finite, or an exponent that is not
+ *   positive
  * @retval SUPINE_ERROR_MESH      no vertex would move */
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
                                         double *directions, supine_error *error);

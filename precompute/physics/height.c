@@ -9,15 +9,13 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Vertices are taken in blocks, each with its box. The box's own extent along a direction bounds
- * its vertices', so that only the few blocks that can hold an extreme are read: the result is
- * exact, and its cost next to nothing; boxes of boxes bound those. Blocks are of neighbours in
- * space, whatever the file's order: vertices are put in the order of a curve through 32 x 32 x 32
- * cells (Morton 1966). */
+/* Group the vertices into blocks with bounding boxes, and the blocks into groups. The bounds
+ * leave few blocks that can hold an extreme, so the exact search is fast. Blocks hold neighbours
+ * in space: vertices are sorted along a curve through 32 x 32 x 32 cells (Morton 1966). */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
 
-/* Directions of a run, the vertices that may be highest along one of them, and the cosine of the
- * largest angle from its first. */
+/* Directions searched together, most candidate vertices of such a run, and least cosine of the
+ * angle to its first direction. */
 enum { RUN = 8, CANDIDATES = 4096 };
 static const double run_cosine = 0.985;
 
@@ -46,7 +44,7 @@ static block_box box_of(const double *vertices, size_t count) {
       high = fmax(high, vertices[3 * i + k]);
     }
     box.centre[k] = 0.5 * (low + high);
-    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* never less for rounding */
+    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* wide enough for rounding */
   }
   return box;
 }
@@ -60,7 +58,7 @@ static double bound_of(const block_box *box, const double *g, const double *size
   return supine_dot(g, box->centre) + supine_dot(size, box->half);
 }
 
-/* The highest vertex along a direction so far, and the block that holds it. */
+/* The highest vertex found along a direction, and its block. */
 typedef struct summit {
   double height;
   const double *point;
@@ -77,7 +75,7 @@ static void look_into(const range_work *work, const double *g, size_t block, sum
   }
 }
 
-/* Finds the largest g.p, starting from `seed`, a block that held a similar direction's. */
+/* Find the largest g.p, starting from block `seed`, the result for a similar direction. */
 static summit highest(const range_work *work, const double *g, size_t seed) {
   const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
   summit best = {.height = -INFINITY};
@@ -95,17 +93,17 @@ static summit highest(const range_work *work, const double *g, size_t seed) {
   return best;
 }
 
-/* How far below the summit along a direction a box may reach up within a cone about it that opens
- * by `slope`: negative where nothing in it can be highest along a direction in the cone. */
+/* Bound how far a box rises above the highest vertex along any direction in a cone of tangent
+ * `slope` about the given one, negative if it holds no highest vertex. */
 static double margin_of(const block_box *box, const double *g, const double *size,
                         const summit *top, double slope) {
   const double far = supine_distance(box->centre, top->point) + supine_length(box->half);
   return bound_of(box, g, size) - top->height + slope * far;
 }
 
-/* Copies the vertices that may be highest along some direction within an angle of g, whose tangent
+/* Copy the vertices that may be highest along some direction within an angle of g, whose tangent
  * is `slope`: with p the highest along g, q rises above it only if g.(p - q) <= slope |p - q|.
- * Returns their number; CANDIDATES + 1: too many. */
+ * Return their number; CANDIDATES + 1: too many. */
 static size_t find_candidates(const range_work *work, const double *g, double slope,
                               const summit *top, double *points) {
   const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
@@ -133,7 +131,7 @@ static size_t find_candidates(const range_work *work, const double *g, double sl
   return count;
 }
 
-/* Largest sign g.p for a run of neighbouring directions, which share their few candidates. */
+/* Find the largest sign g.p for a run of neighbouring directions, which share candidates. */
 static void search_run(const range_work *work, size_t begin, size_t end, double sign, size_t *seed,
                        double *out) {
   const double *centre = work->directions + 3 * (begin + (end - begin) / 2);
@@ -145,7 +143,8 @@ static void search_run(const range_work *work, size_t begin, size_t end, double 
   for (size_t d = begin; d < end; ++d) {
     least = fmin(least, supine_dot(centre, work->directions + 3 * d));
   }
-  const double slope = sqrt(fmax(0.0, 1.0 - least * least)) / least + 1e-7; /* for rounding */
+  const double slope = sqrt(fmax(0.0, 1.0 - least * least)) / least + 1e-7; /* margin for
+                                                                             * rounding */
   const size_t count = end - begin == 1 ? 0 : find_candidates(work, g, slope, &top, points);
   for (size_t d = begin; d < end; ++d) {
     const double *at = work->directions + 3 * d;
@@ -179,7 +178,7 @@ static void height_range(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
-/* Which cell of the mesh's box a vertex lies in, along the curve. */
+/* Find the cell of the mesh's box that holds a vertex, numbered along the curve. */
 static size_t cell_of(const block_box *box, const double *p) {
   size_t cell = 0;
   for (size_t k = 0; k < 3; ++k) {
@@ -192,7 +191,7 @@ static size_t cell_of(const block_box *box, const double *p) {
   return cell;
 }
 
-/* The vertices along the curve, by counting. */
+/* Sort the vertices along the curve by counting sort. */
 static void sort_vertices(const supine_mesh *mesh, size_t *begin, double *sorted) {
   const block_box box = box_of(mesh->vertices, mesh->vertex_count);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
@@ -237,8 +236,8 @@ static supine_status range_of(const supine_mesh *mesh, size_t count, const doubl
   return status;
 }
 
-/* With the mirror image too: that of p in the plane x = m has the height g'.p + 2 m g_x, where g'
- * is the mirror image of g. */
+/* Extend the range by the mirror image: p mirrored in the plane x = m has the height g'.p + 2 m
+ * g_x, where g' is the mirror image of g. */
 static supine_status pair_range(const supine_lungs *lungs, size_t count, const double *directions,
                                 double *minimum, double *maximum) {
   double *mirrored = malloc(5 * count * sizeof *mirrored);

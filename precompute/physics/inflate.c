@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From a scan up to full inflation: Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of
- * p_j -> scan_j - A_j F(g; p) d_j(p). Of the last steps' residuals r that combination is taken
- * which leaves least, and the same combination of their images is where the next step begins. */
+/* Move a scan to full inflation: Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of
+ * p_j -> scan_j - A_j F(g; p) d_j(p). The next step starts from the combination of the last
+ * images whose combined residual r is least. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,16 +17,15 @@
 
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
-/* Steps end where the residual's RMS is as small, mm, or no longer halves below the larger bound:
- * where a triangle all but closes on the way up, a few vertices about it go on trembling by some
- * 0.03 mm. */
+/* RMS residual, mm, that ends the iteration, and a larger one that ends it if it no longer
+ * halves: near an almost degenerate triangle a few vertices oscillate by some 0.03 mm. */
 static const double settled = 5e-4;
 static const double trembling = 5e-3;
-static const double folded_share = 0.01; /* of the triangles: the surface is no lung's any more */
-static const double ridge = 1e-12;       /* relative, so that equal residuals do no harm */
+static const double folded_share = 0.01; /* folded triangles that make a surface invalid */
+static const double ridge = 1e-12;       /* relative; regularises equal residuals */
 
 typedef struct ascent {
-  supine_lungs lungs; /* as far as they are, with vertices of the caller's */
+  supine_lungs lungs; /* present estimate; vertices are the caller's */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
@@ -35,12 +34,12 @@ typedef struct ascent {
   double *last;          /* [size] the image before */
   double *residual;      /* [size] the residual before */
   double rms;            /* of the residual, mm */
-  double *images;        /* [DEPTH, size] differences of images */
-  double *residuals;     /* [DEPTH, size] of residuals */
-  size_t begun, history; /* differences ever kept; in use */
+  double *images;        /* [DEPTH, size] differences of successive images */
+  double *residuals;     /* [DEPTH, size] differences of successive residuals */
+  size_t begun, history; /* differences stored so far; in use */
 } ascent;
 
-/* Refuse a way up on which the surface folds, with the volume at which it does. */
+/* Fail if the surface folds on the way up, with the volume where it does. */
 static supine_status check_folds(const ascent *a, double gain, supine_error *error) {
   const double *from = a->scan.mesh.vertices;
   const double *to = a->lungs.mesh.vertices;
@@ -64,14 +63,14 @@ static supine_status check_folds(const ascent *a, double gain, supine_error *err
                                 100.0 * share, 100.0 * folded_share, folded * gain, gain);
 }
 
-/* Find the gains of one lung's scan, A = s (sigma + 2 bend e(sigma)), with the field's form on the
- * scan: at -A the lung holds `lacks` more, its reference volume, and at s - A, at rest, `to_rest`
- * more. s follows from the former at any sigma; sigma by secants from the latter. */
+/* Find the gains of one lung's scan, A = s (sigma + 2 bend e(sigma)), with the field's form on
+ * the scan: gains of -A add `lacks` (full inflation), gains of s - A add `to_rest` (rest). The
+ * first equation gives s for any sigma; secant steps on the second give sigma. */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double lacks, double to_rest, double gains[3],
                                      supine_error *error) {
   enum { STEPS = 50 };
-  static const double met = 1e-9; /* mL */
+  static const double met = 1e-9; /* tolerance of volumes, mL */
   const bool straight = at_rest || (bend[0] == 0.0 && bend[1] == 0.0 && bend[2] == 0.0);
   double sigma = straight ? 1.0 : lacks / (lacks - to_rest);
   double last_sigma = 0.0;
@@ -101,7 +100,8 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
     sigma = next;
   }
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "no path from full inflation through the scan to rest was found");
+                          "no path from full inflation through the scan to rest was found: change "
+                          "--scanned or --resting");
 }
 
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
@@ -125,7 +125,7 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* The field of the lungs so far, laid on the scan, each lung with the gains at which it holds its
+/* Apply the field of the present lungs to the scan, with the gains that give each lung its
  * reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution field = {0};
@@ -160,7 +160,7 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Keep the step's differences to the one before. */
+/* Store the differences to the previous step. */
 static void remember(ascent *a) {
   double *images = a->images + a->begun % DEPTH * a->size;
   double *residuals = a->residuals + a->begun % DEPTH * a->size;
@@ -178,7 +178,7 @@ static void remember(ascent *a) {
   }
 }
 
-/* Put the lungs where the next step begins. */
+/* Move the lungs to the start of the next step. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -222,7 +222,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
     if (status == SUPINE_OK) {
       remember(a);
       status = advance(a, error);
-    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) { /* too bold a step */
+    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) { /* too long a step */
       a->history = 0;
       a->begun = 0;
       memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));
@@ -247,7 +247,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
               .size = 3 * lungs->mesh.vertex_count};
   const size_t bytes = a.size * sizeof(double);
   supine_status status = SUPINE_OK;
-  a.model.share[0] = a.model.share[1] = 1.0; /* taken after the field was found */
+  a.model.share[0] = a.model.share[1] = 1.0; /* the shares scale the field after the solve */
   a.scan.mesh.vertices = malloc(bytes);
   a.image = malloc(bytes);
   a.last = calloc(a.size, sizeof *a.last);

@@ -5,13 +5,13 @@
 
 #include "precompute/physics/reference.h"
 
-/* Take lungs as scanned to their reference volumes, in place. `found` brings the scan and the
- * volumes, and gets gains, solves and the largest move. Statuses as supine_reference_find. */
+/* Move scanned lungs to their reference volumes, in place. `found` holds the scan and the
+ * volumes; gains, solves and the largest move are written. Statuses as supine_reference_find. */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *found, supine_error *error);
 
-/* Find the gains of the scan, where the field counts from the reference surface but is laid on the
- * scan: the volumes of full inflation, of rest and of the scan are then all met.
+/* Find the gains of the scan, for a field of the reference surface applied to the scan, that
+ * match the volumes of full inflation, of rest and of the scan.
  * @param scan        lungs with the scan's vertices
  * @param directions  [N, 3] d, mm
  * @param amounts     [N] F along the scan's gravity

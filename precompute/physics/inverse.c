@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From catch to force. */
+/* Find the applied force from the catch. */
 #include <stdlib.h>
 
 #include "precompute/physics/inverse.h"
 #include "precompute/physics/network.h"
 
-/* f of vertex i without a reach: its catch, what passes over its links and what their springs
- * catch. give [N]: S, file's order. */
+/* f of vertex i without a reach: its catch, the flow over its links and the catch of their
+ * springs. give [N]: S, file's order. */
 static double paper_force(const supine_network *net, const double *give, const double *catch_,
                           size_t i) {
   const uint32_t v = net->order[i];

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * The equilibrium backwards ([Santhanam2008] IV-B.3): the force that a catch shows, f = A t / load
- * in equilibrium.h's words, one pass over the links. */
+/** @file Invert the equilibrium ([Santhanam2008] IV-B.3): f = A t / load in the notation of
+ * equilibrium.h, one pass over the links. */
 #ifndef SUPINE_INVERSE_H
 #define SUPINE_INVERSE_H
 
 #include "precompute/physics/equilibrium.h"
 
-/** The force f [N] under which a catch F [N] is the equilibrium.
+/** Find the force f [N] whose equilibrium is the catch F [N].
  * @param stiffness  [N] E > 0, relative, or NULL: 1 everywhere
  * @param catch_     [N] F
  * @param force      [N] f; written
