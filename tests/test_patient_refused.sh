@@ -121,7 +121,7 @@ changed_pair breath 'y *= 1.05; z *= 1.08'
 changed_pair mirrored 'x = -x; y *= 1.05; z *= 1.08'
 refused 2 'mm with x reversed' pair.obj mirrored.obj
 changed_pair ras 'x = -x; y = (-310 - y) * 1.05; z *= 1.08'
-refused 2 'mm with x and y reversed: are both in the same axes' pair.obj ras.obj
+refused 2 'mm with x and y reversed: give both in the same axes' pair.obj ras.obj
 sed '5s/[-0-9.e]*$/nan/' state.obj >broken.obj
 refused 2 'broken.obj' rest.obj broken.obj
 refused 2 'No such file' rest.obj absent.obj

@@ -247,7 +247,7 @@ static void test_other_frames_units_and_sides_are_refused(void **state_) {
   for (size_t i = 0; i < n; ++i) {
     state.vertices[i] = 0.1 * rest.mesh.vertices[i];
   }
-  refused(&rest, &state, "different units");
+  refused(&rest, &state, "check that units");
   for (size_t i = 0; i < n; ++i) {
     state.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }

@@ -231,7 +231,7 @@ static void test_scanned_state_and_frame_come_back(void **state) {
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");
-  EXPECT(0, "the scan holds 4000 mL, where --resting and --scanned say 3000 mL",
+  EXPECT(0, "the scan holds 4000 mL, but --resting and --scanned say 3000 mL",
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
   EXPECT(0, "deep law; scan supine at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
@@ -355,7 +355,7 @@ static void test_direction_file_moves_vertices_along_it(void **state) {
          "solve tetra.obj --direction d.csv --posture inverted --scale 5 -o i.ply");
   EXPECT(0, "one lung", "precompute tetra.obj --direction d.csv -o i.safetensors --band 3");
   write_text("d.csv", "dx,dy,dz\n0,0,0\n3,0,4\n");
-  EXPECT(2, "2 rows, where the model has 4", "solve tetra.obj --direction d.csv --tilt 9 -o j.ply");
+  EXPECT(2, "2 rows, but the model has 4", "solve tetra.obj --direction d.csv --tilt 9 -o j.ply");
   write_text("d.csv", "dx,dy,dz\n0,0,0\n3,nan,4\n");
   EXPECT(2, "d.csv:3", "solve tetra.obj --direction d.csv --tilt 9 -o j.ply");
   EXPECT(1, "--direction takes", "solve tetra.obj --direction sideways --tilt 9 -o j.ply");
@@ -368,7 +368,7 @@ static void test_solve_unit_force_writes_column(void **state) {
   EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");
   text[take_file("column.csv", text, sizeof text - 1)] = '\0';
   assert_non_null(strstr(text, "vertex,x_mm,y_mm,z_mm,response\n0,"));
-  EXPECT(1, "they count from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
+  EXPECT(1, "counted from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
 }
 
 static int sweep_failures;

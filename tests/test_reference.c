@@ -369,7 +369,7 @@ static void test_doubt_names_the_option(void **state) {
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned supine:rest"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
-               {"supine:rest", 3000.0, 2400.0, "where --resting and --scanned say 2400 mL"},
+               {"supine:rest", 3000.0, 2400.0, "but --resting and --scanned say 2400 mL"},
                {"supine:rest", 3000.0, 2600.0, NULL},
                {"supine:rest+300", 3000.0, 2300.0, NULL},
                {"prone:rest", 3000.0, 2000.0, NULL}};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faces of any number of corners on their way into a mesh: checked, and cut into triangles. */
+/* Check faces with any number of corners, and cut them into triangles. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,14 +7,14 @@
 
 #include "mesh/io/read.h"
 
-/* Twice the area of the triangle abc, seen from where `normal` points to. */
+/* Find twice the area of the triangle abc, signed as seen against `normal`. */
 static double turn(const double normal[3], const double *a, const double *b, const double *c) {
   const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   const double v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
   return supine_triple(normal, u, v);
 }
 
-/* Sum of the corners' cross products about the first. */
+/* Sum the corners' cross products about the first. */
 static void find_normal(const double *vertices, const uint32_t *corner, size_t count,
                         double normal[3]) {
   const double *o = vertices + 3 * (size_t)corner[0];
@@ -30,7 +30,7 @@ static void find_normal(const double *vertices, const uint32_t *corner, size_t c
   }
 }
 
-/* Can the corner i be cut off: does the face turn left there, with no other corner inside? */
+/* Report whether corner i can be cut off: a left turn there, with no other corner inside. */
 static bool is_ear(const double *vertices, const uint32_t *corner, size_t count, size_t i,
                    const double normal[3]) {
   const double *a = vertices + 3 * (size_t)corner[(i + count - 1) % count];
@@ -45,8 +45,8 @@ static bool is_ear(const double *vertices, const uint32_t *corner, size_t count,
   return ear;
 }
 
-/* Cuts one ear after the other, the first from corner 1 on; where there is none, as in a face that
- * crosses itself, the corner at hand. `corner` is used up; `out` takes 3 (count - 2). */
+/* Cut one ear after another, starting at corner 1; in a face that crosses itself and has no ear,
+ * cut the present corner. `corner` is overwritten; `out` takes 3 (count - 2). */
 static void cut(const double *vertices, uint32_t *corner, size_t count, uint32_t *out) {
   double normal[3];
   find_normal(vertices, corner, count, normal);
@@ -101,7 +101,7 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
     }
     corner[k] = (uint32_t)corners[k];
   }
-  if (count < 3) { /* a point, a line */
+  if (count < 3) { /* a point or a line */
     ++faces->dropped;
     return SUPINE_OK;
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A mesh file's format and bytes. */
+/* Read a mesh file's bytes and find its format. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* With its dot; "" where the name has none. */
+/* Find the ending with its dot; "" if the name has none. */
 static const char *ending_of(const char *path) {
   const char *slash = strrchr(path, '/');
   const char *dot = strrchr(slash == NULL ? path : slash, '.');
@@ -41,7 +41,7 @@ static bool format_of_ending(const char *ending, mesh_format *format) {
   return *ending != '\0' && supine_mesh_import_knows(ending);
 }
 
-/* Names without a known ending are read where the first word leaves no doubt. */
+/* Find the format by the first word, if that is unambiguous; for names without a known ending. */
 static bool format_of_bytes(const unsigned char *bytes, size_t size, mesh_format *format) {
   mesh_text text = {bytes, bytes + size};
   mesh_text word;

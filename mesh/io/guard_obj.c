@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Are the coordinates of an OBJ file numbers? */
+/* Check that the coordinates of an OBJ file are numbers. */
 #include "mesh/io/read.h"
 
-/* A surface needs no colours: makes a line that names a file of materials a comment. */
+/* Turn a line that names a file of materials into a comment: a surface needs no colours. */
 static void drop_materials(mesh_file *file, mesh_text word) {
   if (supine_mesh_text_is(word, "mtllib")) {
     file->bytes[word.at - file->bytes] = '#';
@@ -24,7 +24,7 @@ supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error) {
     double position[3];
     if (supine_mesh_text_is(word, "v") && !supine_mesh_text_position(&line, position)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu: a vertex wants three numbers", file->path, number);
+                              "%s: line %zu: a vertex needs three numbers", file->path, number);
     }
   }
   return SUPINE_OK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Bytes in a text that importers stumble over: they look for the LF after every CR, and end words
- * at a NUL. */
+/* Refuse bytes in a text that importers mishandle: they look for the LF after every CR, and end
+ * words at a NUL. */
 #include <string.h>
 
 #include "mesh/io/read.h"
@@ -10,7 +10,8 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
   const unsigned char *nul = memchr(file->bytes, '\0', file->size);
   if (nul != NULL) {
     (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s: a NUL byte in a text; save it as plain ASCII or UTF-8", file->path);
+                           "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8",
+                           file->path);
     return false;
   }
   for (const unsigned char *at = file->bytes; (at = memchr(at, '\r', (size_t)(end - at))) != NULL;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* assimp, in a process of its own: on a bent file its importers may crash, leak, or take all time
- * and memory, and that process alone bears it. */
+/* Run assimp in its own process: on a corrupt file its importers may crash, leak, or use all
+ * time and memory, which then ends only that process. */
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -27,21 +27,21 @@
   EACH(ai, MultiplyMatrix4) EACH(ai, Matrix4Determinant)
 /* clang-format on */
 
-/* assimp, which takes longer to load than most commands run. */
+/* Functions of assimp, loaded when needed: loading takes longer than most commands run. */
 typedef struct assimp {
   FUNCTIONS(SUPINE_LIBRARY_MEMBER)
 } assimp;
 
-/* What an importer may take: far beyond what it needs for a lung. */
+/* Limits of an importer, far above what it needs for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* What the child leaves, in memory that both processes have. */
+/* Result of the child process, in memory shared with it. */
 typedef struct outcome {
   supine_error error;
   size_t dropped;
 } outcome;
 
-/* In the child: the scene's surface, node by node. */
+/* Output of the child: the scene's surface, node by node. */
 typedef struct sink {
   assimp ai;
   const char *path;
@@ -52,7 +52,6 @@ typedef struct sink {
   outcome *outcome;
 } sink;
 
-/* assimp's words as one line. */
 static supine_status import_fail(const char *path, const char *words, supine_error *error) {
   char line[256];
   size_t length = 0;
@@ -67,11 +66,11 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* The bytes that a guard has seen; a path where none has. */
+/* Import the bytes that a guard has checked, or a path if there is no guard. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file) {
   const unsigned steps = aiProcess_Triangulate;
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
-  /* Else importers make up a surface for files that hold bones alone. */
+  /* Otherwise importers make up a surface for files that hold only bones. */
   ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
   const struct aiScene *scene =
       file->format == MESH_FORMAT_OTHER
@@ -95,7 +94,7 @@ static void put_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *to
   }
 }
 
-/* Importers check no index. */
+/* Check every index, as importers do not. */
 static bool put_triangles(const struct aiMesh *part, bool mirrored, sink *out) {
   for (unsigned f = 0; f < part->mNumFaces; ++f, ++out->face_count) {
     const struct aiFace *face = &part->mFaces[f];
@@ -143,15 +142,15 @@ static void confine(size_t bytes) {
   const struct rlimit none = {0, 0};
   (void)setrlimit(RLIMIT_CPU, &time);
   (void)setrlimit(RLIMIT_CORE, &none);
-#ifndef SUPINE_SANITIZED /* sanitizers map terabytes */
+#ifndef SUPINE_SANITIZED /* sanitizers reserve terabytes */
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif
   static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    (void)signal(signals[i], SIG_DFL); /* not the program's own, which clear its outputs away */
+    (void)signal(signals[i], SIG_DFL); /* the program's own handlers delete its outputs */
   }
-  (void)alarm(10 * (unsigned)seconds); /* where it waits */
+  (void)alarm(10 * (unsigned)seconds); /* ends it if it blocks */
   (void)freopen("/dev/null", "w", stderr);
 }
 
@@ -177,10 +176,10 @@ static _Noreturn void be_child(const mesh_file *file, const int streams[2], size
       fclose(out.vertices) == 0 && fclose(out.triangles) == 0) {
     left->error.status = SUPINE_OK;
   }
-  _exit(0); /* and the scene with it */
+  _exit(0); /* also frees the scene */
 }
 
-/* All that the child wrote, in items of `size` bytes; false where memory is short. */
+/* Read all that the child wrote, in items of `size` bytes; false if out of memory. */
 static bool collect(int stream, size_t size, void **items, size_t *count) {
   const off_t end = lseek(stream, 0, SEEK_END);
   *count = end < 0 ? 0 : (size_t)end / size;
@@ -210,8 +209,8 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
   }
   (void)stat(file->path, &about);
   (void)supine_error_set(&left->error, SUPINE_ERROR_FORMAT,
-                         "%s: malformed: the importer crashed, or took too much time or memory; "
-                         "save the mesh as PLY or STL",
+                         "%s: malformed: the importer crashed or exceeded its time or memory; save "
+                         "the mesh as PLY or STL",
                          file->path);
   const pid_t child = fork();
   if (child == 0) {

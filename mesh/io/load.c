@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From a file to a welded surface in millimetres, LPS. */
+/* Load a file into a welded surface in millimetres, LPS. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -43,11 +43,11 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   return SUPINE_OK;
 }
 
-/* Farthest coordinate that can be of a patient, mm; single precision is good for 1 mm there. */
+/* Largest coordinate of a patient, mm, where single precision resolves 1 mm. */
 static const double farthest = 1e7;
 
-/* Converts to millimetres and LPS. Left-handed axes turn triangles inside out: they are turned
- * back. */
+/* Convert to millimetres and LPS. Left-handed axes reverse the triangles, which are reversed
+ * again. */
 static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,
                              supine_error *error) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
@@ -93,7 +93,8 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
   if (!(scale > 0.0) || !isfinite(scale)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: %g mm per unit is not a positive number", path, scale);
+                            "%s: %g mm per unit is not a positive number; correct --units", path,
+                            scale);
   }
   supine_mesh loaded = {0};
   supine_mesh_report found = {0};

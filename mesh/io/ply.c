@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* PLY: vertices and faces out of a body that may not hold what its header
- * promises. */
+/* Read vertices and faces of a PLY body, which may be shorter than its header says. */
 #include <stdlib.h>
 
 #include "mesh/io/ply.h"
 
-/* Where reading stands, and where what is read goes. */
 typedef struct ply_reader {
   const mesh_file *file;
   ply_header header;
-  mesh_text text; /* what is left; in ASCII, `line` what is left of the item's line */
+  mesh_text text; /* text not yet read; in ASCII, `line` is the unread part of the line */
   mesh_text line;
   size_t row_count;
   double *rows; /* [row_count, 3] x, y, z */
@@ -17,7 +15,7 @@ typedef struct ply_reader {
   supine_error *error;
 } ply_reader;
 
-/* A number of this type, least significant byte first. */
+/* Decode a number of this type, least significant byte first. */
 static double decode(const unsigned char bytes[8], const ply_type *type) {
   union {
     uint64_t bits;
@@ -77,11 +75,11 @@ static bool take(ply_reader *in, const ply_type *type, double *value) {
 
 static supine_status cut_short(const ply_reader *in, const ply_element *element, uint64_t item) {
   static const char *const names[] = {"vertex", "face", "tristrips", "item"};
-  return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                          "%s: truncated or malformed at %s %llu of the %llu that the PLY header "
-                          "promises",
-                          in->file->path, names[element->kind], (unsigned long long)item,
-                          (unsigned long long)element->count);
+  return supine_error_set(
+      in->error, SUPINE_ERROR_FORMAT,
+      "%s: truncated or malformed at %s %llu of the %llu in the PLY header; save the mesh again",
+      in->file->path, names[element->kind], (unsigned long long)item,
+      (unsigned long long)element->count);
 }
 
 static supine_status take_list(ply_reader *in, const ply_element *element, uint64_t item,
@@ -92,10 +90,11 @@ static supine_status take_list(ply_reader *in, const ply_element *element, uint6
     return cut_short(in, element, item);
   }
   if (length < 0.0) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: a list of %.0f numbers",
-                            in->file->path, length);
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                            "%s: the length of a list is %.0f; save the mesh again", in->file->path,
+                            length);
   }
-  const uint64_t count = (uint64_t)length; /* below 2^63, and the file ends sooner */
+  const uint64_t count = (uint64_t)length; /* below 2^63: the file ends first */
   for (uint64_t k = 0; k < count; ++k) {
     double value = 0.0;
     if (!take(in, property->type, &value)) {
@@ -112,7 +111,7 @@ static supine_status take_list(ply_reader *in, const ply_element *element, uint6
 
 static supine_status take_item(ply_reader *in, const ply_element *element, uint64_t item) {
   if (in->header.encoding == PLY_ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
-    return cut_short(in, element, item); /* an item is a line */
+    return cut_short(in, element, item); /* an item takes one line */
   }
   for (size_t p = 0; p < element->property_count; ++p) {
     const ply_property *property = &in->header.properties[element->first_property + p];
@@ -139,20 +138,21 @@ static supine_status take_items(ply_reader *in, const ply_element *element) {
   return status;
 }
 
-/* Room for the rows that the header promises, or for those that can be there. */
+/* Allocate the rows that the header announces, at most as many as the file can hold. */
 static supine_status take_vertices(ply_reader *in, const ply_element *element) {
-  uint64_t least = 0; /* bytes of an item */
+  uint64_t least = 0; /* bytes per item */
   for (size_t p = 0; p < element->property_count; ++p) {
     const ply_property *property = &in->header.properties[element->first_property + p];
-    least += in->header.encoding == PLY_ASCII ? 2 /* a digit, a blank */
+    least += in->header.encoding == PLY_ASCII ? 2 /* a digit and a blank */
              : property->count != NULL        ? property->count->size
                                               : property->type->size;
   }
   const uint64_t room = (uint64_t)(in->text.end - in->text.at) / least + 1;
   const uint64_t count = element->count < room ? element->count : room;
   if (count > MESH_VERTICES_MAX) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: more than %d vertices",
-                            in->file->path, MESH_VERTICES_MAX);
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                            "%s: more than %d vertices; give a coarser mesh", in->file->path,
+                            MESH_VERTICES_MAX);
   }
   in->row_count = (size_t)count;
   in->rows = malloc((size_t)count * 3 * sizeof *in->rows);
@@ -161,8 +161,8 @@ static supine_status take_vertices(ply_reader *in, const ply_element *element) {
              : take_items(in, element);
 }
 
-/* The vertices first, wherever they stand, as faces are checked and cut by them. Leaves the reader
- * behind them. */
+/* Read the vertices, wherever they are: faces are checked and cut with them. The reader ends up
+ * after them. */
 static supine_status read_vertices(ply_reader *in) {
   supine_status status = SUPINE_OK;
   for (size_t e = 0; status == SUPINE_OK; ++e) {
@@ -197,10 +197,11 @@ static supine_status begin(const mesh_file *file, ply_reader *in, supine_error *
   }
   in->text = (mesh_text){file->bytes + in->header.size, file->bytes + file->size};
   for (size_t e = 0; e < in->header.element_count; ++e) {
-    if (in->header.elements[e].property_count == 0) { /* no bytes, whatever the count */
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: element %zu of the PLY header has no property", file->path,
-                              e + 1);
+    if (in->header.elements[e].property_count == 0) { /* items without bytes, of any count */
+      return supine_error_set(
+          error, SUPINE_ERROR_FORMAT,
+          "%s: element %zu of the PLY header has no property; save the mesh again", file->path,
+          e + 1);
     }
     if (in->header.elements[e].kind == PLY_STRIPS && in->header.elements[e].count > 0) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,

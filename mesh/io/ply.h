@@ -12,17 +12,17 @@ typedef enum ply_encoding { PLY_ASCII, PLY_LITTLE, PLY_BIG } ply_encoding;
 typedef struct ply_type {
   const char *name;
   unsigned size;  /* bytes */
-  bool is_signed; /* of integers: may be negative */
+  bool is_signed; /* for integers: may be negative */
   bool is_real;
 } ply_type;
 
-/* The first three are columns of a vertex. */
+/* The first three are coordinates of a vertex. */
 typedef enum ply_role {
   PLY_X,
   PLY_Y,
   PLY_Z,
   PLY_CORNERS,
-  PLY_NOTHING /* what no surface needs */
+  PLY_NOTHING /* of no use to a surface */
 } ply_role;
 
 typedef struct ply_property {
@@ -42,15 +42,15 @@ typedef struct ply_element {
 
 typedef struct ply_header {
   ply_encoding encoding;
-  size_t size;      /* bytes, with the line end after end_header */
-  unsigned present; /* bit for each role that an element with items has */
+  size_t size;      /* bytes, up to the line end after end_header */
+  unsigned present; /* a bit for each role in an element with items */
   size_t element_count;
   size_t property_count;
   ply_element elements[PLY_ELEMENTS_MAX];
   ply_property properties[PLY_PROPERTIES_MAX];
 } ply_header;
 
-/** Reads the header at the start of `file`.
+/** Read the header at the start of `file`.
  * @retval SUPINE_ERROR_FORMAT */
 supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *header,
                                           supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a PLY file's header promises. */
+/* Read a PLY file's header. */
 
 #include "mesh/io/ply.h"
 
@@ -19,7 +19,7 @@ static const ply_type *find_type(mesh_text word) {
   return NULL;
 }
 
-/* Index of the word in a NULL-terminated list; that of NULL where it is not in it. */
+/* Find the index of a word in a NULL-terminated list, or of the NULL if it is not there. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
   while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
@@ -61,7 +61,7 @@ static bool read_element(mesh_text line, ply_header *header) {
   *element = (ply_element){.kind = (ply_kind)find_name(name, kinds),
                            .first_property = header->property_count};
   for (size_t e = 0; element->kind != PLY_OTHER && e < header->element_count; ++e) {
-    if (header->elements[e].kind == element->kind) { /* twice: which would it be? */
+    if (header->elements[e].kind == element->kind) { /* a second one would be ambiguous */
       return false;
     }
   }
@@ -106,7 +106,7 @@ static bool is_printable(mesh_text line) {
   return true;
 }
 
-/* Comments and words of no known meaning pass. */
+/* Read one line; skip comments and unknown keywords. */
 static bool read_line(mesh_text line, ply_header *header, bool *has_format) {
   mesh_text word;
   if (!is_printable(line)) {
@@ -131,8 +131,8 @@ supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *hea
   mesh_text line;
   bool has_format = false;
   if (!supine_mesh_text_line(&text, &line) || !supine_mesh_text_is(line, "ply")) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: does not begin with \"ply\"",
-                            file->path);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: does not begin with \"ply\"; give a PLY file", file->path);
   }
   for (size_t number = 2; supine_mesh_text_line(&text, &line); ++number) {
     mesh_text rest = line;
@@ -148,7 +148,7 @@ supine_status supine_mesh_ply_header_read(const mesh_file *file, ply_header *hea
                               "%s: line %zu of the PLY header is malformed", file->path, number);
     }
   }
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s: the PLY header has no end_header: the file is truncated",
-                          file->path);
+  return supine_error_set(
+      error, SUPINE_ERROR_FORMAT,
+      "%s: the PLY header has no end_header: the file is truncated; save it again", file->path);
 }

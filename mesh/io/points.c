@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points of CSV files and of 3D Slicer's markups. */
+/* Read points from CSV files and 3D Slicer's markups. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +24,7 @@ static supine_status no_memory(const reading *r) {
   return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
 }
 
-/* Adds a point that the file has in axes of its own. */
+/* Append a point given in the file's own axes. */
 static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
                          double unit) {
   supine_mesh_points *p = &r->points;
@@ -51,14 +51,14 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   if (p->names[p->count] == NULL) {
     return no_memory(r);
   }
-  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names become lines of lists */
+  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names are stored as lines */
     *c = (unsigned char)*c < ' ' ? ' ' : *c;
   }
   ++p->count;
   return SUPINE_OK;
 }
 
-/* "LPS", "RAS", and the numbers that older versions of Slicer wrote. */
+/* Parse "LPS", "RAS", and the numbers that older versions of Slicer wrote. */
 static supine_axes slicer_axes(const char *text) {
   supine_axes axes = SUPINE_AXES_LPS;
   if (strncmp(text, "0", 1) == 0) {
@@ -95,14 +95,14 @@ static supine_status read_csv(reading *r) {
   return status;
 }
 
-/* Lines "id,x,y,z,...,label at 11,..."; what is not data begins with a hash. */
+/* Read lines "id,x,y,z,...,label at 11,..."; comments begin with a hash. */
 static supine_status read_fcsv(reading *r) {
   enum { LABEL = 11 };
   FILE *file = fopen(r->path, "rb");
   char *line = NULL;
   size_t room = 0;
   size_t number = 0;
-  supine_axes axes = SUPINE_AXES_RAS; /* what Slicer wrote before it named them */
+  supine_axes axes = SUPINE_AXES_RAS; /* older versions of Slicer did not name the axes */
   supine_status status = SUPINE_OK;
   if (file == NULL) {
     return supine_error_set(r->error, SUPINE_ERROR_READ, "%s: cannot open", r->path);
@@ -133,14 +133,14 @@ static supine_status read_fcsv(reading *r) {
     }
     status = good ? add(r, at, label, axes, 1.0)
                   : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                                     "%s:%zu: no point: id,x,y,z,... is expected", r->path, number);
+                                     "%s:%zu: not a point: write id,x,y,z,...", r->path, number);
   }
   free(line);
   (void)fclose(file);
   return status;
 }
 
-/* The control points of one list. */
+/* Read the control points of one list. */
 static supine_status read_markup(reading *r, const json_t *markup) {
   const json_t *system = json_object_get(markup, "coordinateSystem");
   const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));
@@ -168,9 +168,10 @@ static supine_status read_markup(reading *r, const json_t *markup) {
     }
     status = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2])
                  ? add(r, at, json_string_value(json_object_get(point, "label")), axes, scale)
-                 : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                                    "%s: control point %zu has no position of three numbers",
-                                    r->path, i + 1);
+                 : supine_error_set(
+                       r->error, SUPINE_ERROR_FORMAT,
+                       "%s: control point %zu has no position of three numbers: place or delete it",
+                       r->path, i + 1);
   }
   return status;
 }
@@ -203,7 +204,7 @@ supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_o
                          : supine_text_ends_in_any_case(path, ".json") ? read_markups(&r)
                                                                        : read_csv(&r);
   if (status == SUPINE_OK && r.points.count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points in it", path);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points: give at least one", path);
   }
   if (status == SUPINE_OK) {
     *points = r.points;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Saving a surface in the format that the name's ending asks for. */
+/* Save a surface in the format of the name's ending. */
 #include <string.h>
 #include <strings.h>
 

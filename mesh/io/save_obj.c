@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* OBJ text. */
+/* Write OBJ text. */
 #include "mesh/io/save.h"
 
 supine_status supine_mesh_save_obj(const mesh_writer *writer) {

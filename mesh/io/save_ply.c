@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Binary little-endian PLY. */
+/* Write binary little-endian PLY. */
 #include "mesh/io/save.h"
 
 supine_status supine_mesh_save_ply(const mesh_writer *writer) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Binary STL. */
+/* Write binary STL. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 enum { HEADER = 80, FACET = 50 };
 
-/* Unit normal of the three corners, 0 where they are in line. */
+/* Find the unit normal of three corners, 0 if they are collinear. */
 static void facet_normal(float corners[3][3], float normal[3]) {
   double side[2][3];
   for (int k = 0; k < 2; ++k) {
@@ -31,7 +31,7 @@ static void facet_normal(float corners[3][3], float normal[3]) {
 
 supine_status supine_mesh_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
-  /* The header must not begin with "solid", by which readers know STL text. */
+  /* The header must not begin with "solid", which marks STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
   (void)snprintf(text, sizeof text, "SPACE=%s %s %s", writer->space, writer->unit, writer->comment);
   unsigned char header[HEADER + 4] = {0};

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* VTK XML PolyData: what surrounds the arrays, and one surface as a whole. */
+/* VTK XML PolyData: the XML around the arrays, and a file of one surface. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "mesh/io/vtp.h"
 
-/* An element whose length does not depend on where its array lies. */
+/* Write an element whose length does not depend on its array's offset. */
 static void write_array(const vtp *file, size_t number, FILE *out) {
   const vtp_array *array = &file->arrays[number];
   for (size_t frame = 0; frame < file->frames; ++frame) {
@@ -23,12 +23,12 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
   }
 }
 
-/* 3D Slicer looks for the axes in the array SPACE; a reader of text, in the comment. "--" may not
- * stand in an XML comment. */
+/* Write the axes as the array SPACE for 3D Slicer, and as a comment for readers of text. "--" is
+ * not allowed in an XML comment. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
-    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* may be cut in a letter */
+    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* may end within a character */
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
       (void)fputc(' ', out);
     }
@@ -45,7 +45,7 @@ static void write_text(const char *name, const char *text, FILE *out) {
   (void)fputs("0</Array>\n", out);
 }
 
-/* Of all frames, one tuple each. */
+/* Write one tuple for each frame. */
 static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE *out) {
   (void)fprintf(out,
                 "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"%zu\" "
@@ -64,7 +64,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* "TimeValue" would be taken for that of the one frame there is */
+  if (file->times != NULL) { /* with one frame, "TimeValue" would be read as its time */
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->field_count; ++i) {
@@ -106,7 +106,7 @@ void supine_mesh_vtp_foot(FILE *out) {
   (void)fputs("\n</AppendedData>\n</VTKFile>\n", out);
 }
 
-/* The arrays into memory first, as their places come before them. */
+/* Compress the arrays into memory first: their offsets precede them. */
 supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
   vtp file = {.writer = *writer, .frames = 1};
   char *bytes = NULL;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What all formats share: numbers in the file's axes and units, and their bytes. */
+/* Shared by all formats: numbers in the file's axes and units, and their bytes. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "mesh/io/save.h"
 
-/* Float32 holds it: else a file would be written that cannot be loaded. */
+/* Report whether float32 holds a value, so that the file can be loaded again. */
 static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
@@ -14,9 +14,10 @@ static bool fits(double x) {
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error) {
   if (mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: too large to write: %zu vertices, %zu triangles", path,
-                            mesh->vertex_count, mesh->triangle_count);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%s: too large to write: %zu vertices, %zu triangles: write a coarser mesh", path,
+        mesh->vertex_count, mesh->triangle_count);
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     const double *vertex = mesh->vertices + 3 * i;
@@ -83,13 +84,13 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
   supine_mesh_unit_name(unit, writer->unit);
 }
 
-/* To the writer's grid, where it has one. */
+/* Round to the writer's grid, if it has one. */
 static double rounded(const mesh_writer *writer, double length) {
   return writer->quantum > 0.0 ? rint(length / writer->quantum) * writer->quantum : length;
 }
 
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* a grid for normals, where lengths have one: 0.1 degrees */
+  static const double steps = 256.0; /* a grid for normals of 0.1 degrees, if lengths have one */
   for (size_t axis = 0; axis < 3; ++axis) {
     const double value = (double)writer->normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);
@@ -98,7 +99,7 @@ void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal
 }
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) { /* + 0: no -0 */
+  for (size_t axis = 0; axis < 3; ++axis) { /* + 0 turns -0 into 0 */
     position[axis] =
         (float)(rounded(writer, writer->factor[axis] *
                                     writer->mesh->vertices[3 * i + writer->source[axis]]) +

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A series of surfaces in one VTP file: arrays as they come, then what says where they lie, in the
- * place that was kept for it. */
+/* Write a series of surfaces into one VTP file: the arrays in order, then their offsets into the
+ * space reserved at the head. */
 #include <stdlib.h>
 
 #include "sh/base/output.h"
@@ -31,8 +31,9 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
   }
   status = supine_output_open(path, &made->output, error);
   if (status == SUPINE_OK && fseeko(made->output.file, 0, SEEK_SET) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_WRITE,
-                              "%s: a series cannot be written into a pipe or device", path);
+    status =
+        supine_error_set(error, SUPINE_ERROR_WRITE,
+                         "%s: a series cannot be written into a pipe or device: give a file", path);
   }
   if (status == SUPINE_OK) {
     made->file.frames = frames;
@@ -66,7 +67,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   supine_mesh_vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* fails as writing did */
+  (void)fseeko(series->output.file, 0, SEEK_SET); /* a failure shows in the stream */
   supine_mesh_vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The axes that a comment in a file's head names, as 3D Slicer writes them: SPACE=LPS. */
+/* Find the axes named by a comment in a file's head, as 3D Slicer writes them: SPACE=LPS. */
 #include <ctype.h>
 #include <string.h>
 #include <strings.h>
 
 #include "mesh/io/read.h"
 
-/* The next place, from `at` on, where `word` stands with no letter or digit before it. */
+/* Find the next `word` from `at` on that no letter or digit precedes. */
 static const unsigned char *find_word(const unsigned char *at, const unsigned char *end,
                                       const unsigned char *begin, const char *word) {
   const size_t length = strlen(word);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* STL, binary or text: three corners a facet. */
+/* Read STL, binary or text: three corners for each facet. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 enum { STL_HEADER = 80, STL_FACET = 50, STL_NORMAL = 12 };
 
-/* Some binary files begin with "solid" too: then the length decides, or a byte that no text has. */
+/* Some binary files begin with "solid" too: the length or a byte that text never has decides. */
 static bool is_text(const mesh_file *file) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text word;
@@ -33,7 +33,7 @@ static void take_binary(const mesh_file *file, supine_mesh *mesh, size_t facets)
   mesh->vertex_count = 3 * facets;
 }
 
-/* A line a corner; those with other words say nothing that the corners do not. */
+/* Read one corner per line; lines with other keywords add nothing. */
 static supine_status take_text(const mesh_file *file, supine_mesh *mesh, supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
@@ -47,26 +47,28 @@ static supine_status take_text(const mesh_file *file, supine_mesh *mesh, supine_
     if (supine_mesh_text_is(word, "vertex") &&
         !supine_mesh_text_position(&line, mesh->vertices + 3 * mesh->vertex_count++)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu: a vertex wants three numbers", file->path, number);
+                              "%s: line %zu: a vertex needs three numbers", file->path, number);
     }
   }
   if (open || mesh->vertex_count % 3 != 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the STL text ends before its endsolid: the file is truncated",
-                            file->path);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: the STL text ends before its endsolid: the file is truncated; save it again",
+        file->path);
   }
   return SUPINE_OK;
 }
 
-/* Of neither kind. */
+/* Report why a file is neither kind. */
 static supine_status refuse(const mesh_file *file, size_t facets, size_t promised,
                             supine_error *error) {
   return file->size < STL_HEADER + 4
-             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: %zu bytes are too few for an STL file: it is truncated",
-                                file->path, file->size)
+             ? supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: %zu bytes are too few for an STL file: it is truncated; save it again",
+                   file->path, file->size)
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: the file has %zu bytes where an STL of %zu facets has %zu: it "
+                                "%s: the file has %zu bytes, but an STL of %zu facets has %zu: it "
                                 "is truncated or not an STL file",
                                 file->path, file->size, facets, promised);
 }
@@ -83,7 +85,8 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_er
   }
   const size_t room = binary ? 3 * facets + 1 : file->size / strlen("vertex 0 0 0") + 2;
   if (room > MESH_VERTICES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: more than %d vertices", file->path,
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: more than %d vertices; give a coarser mesh", file->path,
                             MESH_VERTICES_MAX);
   }
   mesh->vertices = malloc(3 * room * sizeof *mesh->vertices);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Lines, words and numbers of a text that may hold anything. */
+/* Split a text of any content into lines, words and numbers. */
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -92,7 +92,7 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
 bool supine_mesh_text_number(mesh_text *text, double *value) {
   mesh_text word;
   const bool good = supine_mesh_text_word(text, &word) && is_number(word);
-  *value = good ? strtod((const char *)word.at, NULL) : 0.0; /* ends with the word at the latest */
+  *value = good ? strtod((const char *)word.at, NULL) : 0.0; /* ends with the word */
   return good;
 }
 

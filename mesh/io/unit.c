@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Which unit a file is in, judged by the size of its box. */
+/* Guess a file's unit from the size of its box. */
 #include <math.h>
 
 #include "mesh/mesh.h"
 
-/* Longest side of a box of one or two lungs, infant to adult; and of an adult lung. mm */
+/* Range of the longest side of a box of lungs, infant to adult, and least of an adult's, mm. */
 static const double side_least = 80.0;
 static const double side_most = 700.0;
 static const double side_typical = 280.0;

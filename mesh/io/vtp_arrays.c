@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The arrays of a VTP file, and their bytes, compressed as VTK has them. */
+/* Compress and write the arrays of a VTP file in VTK's format. */
 #include <stdlib.h>
 
 #include <libdeflate.h>
@@ -8,7 +8,7 @@
 
 #include "mesh/io/vtp.h"
 
-/* Bytes that are compressed together, a multiple of every item's, and libdeflate's level: 2 takes
+/* Bytes compressed together, a multiple of every item's size, and libdeflate's level: 2 takes
  * half as long again for 5 % less. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
 
@@ -128,7 +128,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0: no memory */
+    file->sizes[3 + i] = /* 0: out of memory */
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
@@ -137,8 +137,8 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* The number of blocks, their size, the last one's where it is smaller, each one's size when
- * compressed; then the blocks. */
+/* Write the number of blocks, their size, that of a shorter last one, their compressed sizes;
+ * then the blocks. */
 static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
   const size_t bytes = array->item * array->count;
   const size_t blocks = (bytes + BLOCK - 1) / BLOCK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* VTK XML PolyData, the subset that Supine, VTK and 3D Slicer write: one piece, points and polygons
- * in arrays that are text, base64 or appended, raw or base64, plain or compressed by zlib. */
+/* Read VTK XML PolyData as Supine, VTK and 3D Slicer write it: one piece, points and polygons in
+ * arrays that are text, base64 or appended, raw or base64, plain or compressed by zlib. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,19 +12,18 @@
 
 typedef struct vtp_file {
   const mesh_file *file;
-  const char *bytes, *end; /* `bytes` is ended by a NUL, but may hold others */
-  const char *appended;    /* its first byte, behind the underscore; NULL: none */
+  const char *bytes, *end; /* `bytes` ends with a NUL, but may contain others */
+  const char *appended;    /* first byte after the underscore; NULL: none */
   bool appended_raw, compressed;
   size_t header_size; /* 4 or 8 */
 } vtp_file;
 
 /* An element's attributes, name="value". */
 typedef struct element {
-  const char *at, *end; /* between < and > */
-  const char *body;     /* behind its > */
+  const char *at, *end; /* text between < and > */
+  const char *body;     /* text after its > */
 } element;
 
-/* Bytes of an array, decoded. */
 typedef struct array {
   unsigned char *bytes;
   size_t size;
@@ -34,7 +33,7 @@ static supine_status malformed(const vtp_file *v, const char *what, supine_error
   return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", v->file->path, what);
 }
 
-/* The first element of this name between two places; false where there is none. */
+/* Find the first element of this name between two places; false if there is none. */
 static bool find_element(const char *from, const char *to, const char *name, element *found) {
   const size_t length = strlen(name);
   for (const char *at = from; at < to && (at = memchr(at, '<', (size_t)(to - at))) != NULL; ++at) {
@@ -51,7 +50,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
   return false;
 }
 
-/* The value of an attribute, cut off at `size`; false where there is none. */
+/* Copy the value of an attribute, cut off at `size`; false if there is none. */
 static bool attribute(const element *e, const char *name, char *value, size_t size) {
   const size_t length = strlen(name);
   for (const char *at = e->at; at + length + 2 < e->end; ++at) {
@@ -91,8 +90,8 @@ static int sextet(char c) {
                                 : -1;
 }
 
-/* Decodes base64 up to `bytes` bytes or what ends it, and moves *at behind the group that ends it.
- * How many bytes came. */
+/* Decode base64 up to `bytes` bytes or its end, and move *at after the last group. Return the
+ * number of bytes. */
 static size_t base64(const char **at, const char *end, unsigned char *bytes, size_t most) {
   size_t count = 0;
   while (count < most) {
@@ -124,7 +123,7 @@ static size_t base64(const char **at, const char *end, unsigned char *bytes, siz
   return count;
 }
 
-/* Takes bytes off a stream, raw or base64. */
+/* Read bytes from a stream, raw or base64. */
 static bool take_bytes(const char **at, const char *end, bool raw, unsigned char *bytes,
                        size_t count) {
   if (!raw) {
@@ -138,8 +137,8 @@ static bool take_bytes(const char **at, const char *end, bool raw, unsigned char
   return true;
 }
 
-/* Compressed blocks: their number, size, the last one's, each one's compressed; then the blocks.
- * In base64 the sizes and the blocks are a stream each. */
+/* Read compressed blocks: their number, size, the last one's size, the compressed sizes; then
+ * the blocks. In base64 the sizes and the blocks are separate streams. */
 static bool take_blocks(const vtp_file *v, const char *at, bool raw, size_t wanted, array *out) {
   unsigned char sizes[3 * 8];
   const size_t h = v->header_size;
@@ -209,7 +208,7 @@ static bool take_binary(const vtp_file *v, const element *e, size_t count, size_
   if (v->compressed) {
     return take_blocks(v, at, raw, out->size, out);
   }
-  /* One size before the numbers, in the same stream of base64. */
+  /* One size precedes the numbers in the same base64 stream. */
   unsigned char *whole = malloc(v->header_size + out->size + 1);
   const bool good = whole != NULL &&
                     take_bytes(&at, v->end, raw, whole, v->header_size + out->size) &&
@@ -254,13 +253,13 @@ static size_t size_of_type(const char *type) {
   return 0;
 }
 
-/* `count` numbers of an array as doubles, or NULL after an error. */
+/* Read `count` numbers of an array as doubles; NULL after an error. */
 static double *take_numbers(const vtp_file *v, const element *e, size_t count,
                             supine_error *error) {
   char type[32] = "";
   (void)attribute(e, "type", type, sizeof type);
   const size_t each = size_of_type(type);
-  /* what zlib can make of a byte at most */
+  /* zlib expands a byte to at most 1032 */
   if (each == 0 || count > 1032 * (size_t)(v->end - v->bytes) / 1) {
     (void)malformed(v, "an array of its points or polygons is not read", error);
     return NULL;
@@ -282,7 +281,7 @@ static double *take_numbers(const vtp_file *v, const element *e, size_t count,
     }
   }
   if (values != NULL && raw.bytes != NULL && !good) {
-    (void)malformed(v, "an array is truncated or damaged", error);
+    (void)malformed(v, "an array is truncated or damaged; save it again", error);
   }
   free(raw.bytes);
   if (!good) {
@@ -292,7 +291,7 @@ static double *take_numbers(const vtp_file *v, const element *e, size_t count,
   return values;
 }
 
-/* Bounds an element's body by its end tag, and finds the array of a name in it, or the first. */
+/* Bound an element's body by its end tag, and find an array in it by name, or the first. */
 static bool find_array(const vtp_file *v, const element *piece, const char *within,
                        const char *name, element *found) {
   element e;
@@ -326,7 +325,7 @@ static bool count_of(const element *piece, const char *name, size_t *count) {
   return end != text && *end == '\0' && text[0] != '-' && value <= MESH_VERTICES_MAX;
 }
 
-/* The polygons, or strips of triangles, of a piece. */
+/* Read the polygons, or strips of triangles, of a piece. */
 static supine_status take_polygons(const vtp_file *v, const element *piece, mesh_faces *faces,
                                    size_t count, bool strips, supine_error *error) {
   const char *within = strips ? "Strips" : "Polys";
@@ -347,7 +346,7 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   double *corners = NULL;
   supine_status status = SUPINE_ERROR_FORMAT;
   if (!(total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX)) {
-    (void)malformed(v, "the offsets of its polygons are none", error);
+    (void)malformed(v, "the offsets of its polygons are invalid; save it again", error);
   } else if ((corners = take_numbers(v, &connectivity, (size_t)total, error)) != NULL) {
     status = SUPINE_OK;
   } else {
@@ -356,7 +355,7 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   double from = 0.0;
   for (size_t p = 0; p < count && status == SUPINE_OK; ++p) {
     if (!(ends[p] >= from && ends[p] <= total)) {
-      status = malformed(v, "the offsets of its polygons are none", error);
+      status = malformed(v, "the offsets of its polygons are invalid; save it again", error);
       break;
     }
     const double *of = corners + (size_t)from;
@@ -375,7 +374,7 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   return status;
 }
 
-/* What the head says of the arrays. */
+/* Read the head: the array types and the piece. */
 static supine_status read_head(vtp_file *v, element *piece, supine_error *error) {
   element root;
   element appended;
@@ -403,14 +402,14 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
     return malformed(v, "no Piece", error);
   }
   if (find_element(piece->body, limit, "Piece", &second)) {
-    return malformed(v, "several pieces; save it in one", error);
+    return malformed(v, "it has several pieces; save it as one", error);
   }
   return SUPINE_OK;
 }
 
-/* The axes that 3D Slicer, and Supine, name in a string array SPACE. */
+/* Note the axes that 3D Slicer and Supine name in a string array SPACE. */
 static void note_space(const vtp_file *v, const element *piece, mesh_file *file) {
-  enum { SIZE = 4 }; /* with its NUL */
+  enum { SIZE = 4 }; /* including its NUL */
   const char *at = v->bytes;
   unsigned char letters[SIZE] = {0};
   array raw = {letters, SIZE};
@@ -457,7 +456,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   if (!count_of(&piece, "NumberOfPoints", &count[0]) ||
       !count_of(&piece, "NumberOfPolys", &count[1]) ||
       !count_of(&piece, "NumberOfStrips", &count[2])) {
-    return malformed(&v, "its numbers of points and polygons are none", error);
+    return malformed(&v, "its numbers of points and polygons are invalid; save it again", error);
   }
   if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
     return malformed(&v, "no array of points", error);
@@ -469,7 +468,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     }
     mesh->vertex_count = count[0];
   }
-  for (size_t i = 0; i < 3 * count[0]; ++i) { /* to single precision, as all formats */
+  for (size_t i = 0; i < 3 * count[0]; ++i) { /* to single precision, as in all formats */
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Joining vertices at the same position, in linear time, by a hash of the position's bits. */
+/* Join vertices at the same position, in linear time, by a hash of the position's bits. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@ static uint64_t hash_position(const double position[3]) {
   uint64_t bits[3];
   memcpy(bits, position, sizeof bits);
   uint64_t hash = 0;
-  for (int k = 0; k < 3; ++k) { /* odd multipliers; the high bits go down each time */
+  for (int k = 0; k < 3; ++k) { /* odd multipliers; each step mixes the high bits down */
     hash = (hash ^ bits[k]) * UINT64_C(0x9E3779B97F4A7C15);
     hash ^= hash >> 32;
   }
@@ -22,7 +22,7 @@ static bool same_position(const double a[3], const double b[3]) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Moves the vertices that are first at their position to the front; remap: old to new index. */
+/* Move the first vertex at each position to the front; remap: old to new index. */
 static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t slot_count) {
   const size_t mask = slot_count - 1;
   double *vertices = mesh->vertices;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whose a label is: by the convention of the segmenter, or by where it lies. */
+/* Choose the side of each label, by the segmenter's convention or by its position. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* What segmenters write: lungmask's R231 and LTRCLobes, TotalSegmentator's `total` since 2.0 and
- * before. */
+/* Labels of segmenters: lungmask's R231 and LTRCLobes, TotalSegmentator's `total` from 2.0 and
+ * earlier. */
 static const struct {
   const char *name;
   uint16_t left[4], right[4]; /* ended by 0 */
@@ -20,7 +20,7 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Centre of the labels of a side, mm; false where there is no voxel. */
+/* Find the centre of a side's labels, mm; false if it has no voxel. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
   double count = 0.0;
@@ -40,7 +40,7 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   return count > 0.0;
 }
 
-/* "1, 2 and 17 more" */
+/* Print a list such as "1, 2 and 17 more". */
 static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
                         size_t size) {
   enum { SHOWN = 12 };
@@ -69,7 +69,7 @@ static void take(const uint16_t *labels, uint8_t value, uint8_t *side) {
   }
 }
 
-/* "10+11" up to a comma or the end; NULL where it is anything else. */
+/* Parse "10+11" up to a comma or the end; NULL if it is invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;
@@ -85,7 +85,6 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* "left=10+11,right=12+13+14" */
 static bool read_custom(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
@@ -103,7 +102,7 @@ static bool read_custom(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Are the labels that are there just those of a convention? */
+/* Report whether the labels present are exactly those of a convention. */
 static bool is_convention(const labels_tally *tally, size_t convention) {
   uint8_t *named = calloc(LABELS_MAX, 1);
   bool same = named != NULL;
@@ -118,7 +117,7 @@ static bool is_convention(const labels_tally *tally, size_t convention) {
   return same;
 }
 
-/* Without a word from the user. Two labels are two lungs, whoever numbered them. */
+/* Choose without an option: two labels are two lungs, whatever their numbers. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -157,15 +156,15 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Sets sides as wanted; `name` is the convention's. */
+/* Set sides as requested; `name` is the convention's. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
                             const char *wanted, uint8_t *side, const char **name,
                             supine_error *error) {
   char present[128];
   list_labels(tally, NULL, 0, present, sizeof present);
   if (present[0] == '\0') {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "%s: every voxel is 0: the mask is empty",
-                            path);
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: every voxel is 0: give a mask with labels", path);
   }
   if (wanted == NULL) {
     return choose_by_presence(image, tally, side, name)
@@ -196,7 +195,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Both are there where both are named; `doubted` unless the left one lies left of the other. */
+/* Check that both lungs are present if both are named; `doubted` unless the left one lies left. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};
@@ -214,14 +213,15 @@ static supine_status check(const char *path, const supine_image *image, const la
       continue;
     }
     if (!there[1 - s]) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: its labels are %s: by --labels none of them is a lung", path,
-                              present);
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "%s: its labels are %s, but --labels names none of them: correct --labels", path,
+          present);
     }
     list_labels(tally, side, sides[1 - s], alone, sizeof alone);
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: no voxel of the %s lung. If the %s one is meant to be alone, name "
-                            "its labels (%s) alone, as --labels %s=1+2",
+                            "%s: no voxel of the %s lung. For the %s lung alone, give only its "
+                            "labels (%s), as --labels %s=1+2",
                             path, names[s], names[1 - s], alone, names[1 - s]);
   }
   if (!(there[0] && there[1])) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The labels of an image, and how many voxels have each. */
+/* Count the voxels of each label in an image. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -62,9 +62,9 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          bad < 0.0 ? "%s: a voxel holds %g, which is no label: labels are 0 to "
-                                      "65535. Is this the CT itself? Segment it first"
-                                    : "%s: a voxel holds %g, which is no label: labels are whole, "
-                                      "0 to 65535. Of probabilities, make a mask first",
+                          bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is "
+                                      "the CT itself, segment it first"
+                                    : "%s: a voxel holds %g, but labels are whole numbers, 0 to "
+                                      "65535: threshold probabilities into a mask first",
                           path, bad);
 }

@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* A mask averaged over cubes, in steps along its own axes, and made so that no two cubes of the
- * inside, or of the outside, meet in an edge or a corner alone: then its surface is a manifold
- * [Latecki1995]. */
+/* A mask averaged over cubes, in steps along its own axes, and corrected so that no two inner or
+ * outer cubes meet only in an edge or a corner: its surface is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 
-enum { LAYERS = 2 }; /* of cubes around the mask */
+enum { LAYERS = 2 }; /* of empty cubes around the mask */
 
-/* Share of the mask's voxels that a cube has along one axis, from `in` [outer, n, inner] into `out`
- * [outer, m, inner]. A cube narrower than a voxel is one as wide: between centres that is linear
- * interpolation. */
+/* Average along one axis over cubes, from `in` [outer, n, inner] into `out` [outer, m, inner]. A
+ * cube narrower than a voxel is widened to one, which interpolates linearly between centres. */
 static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
                     float *out) {
   const double width = fmax(1.0, ratio);
@@ -36,7 +34,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Rows of bytes averaged along the first axis, straight from the mask. */
+/* Average rows of bytes along the first axis, straight from the mask. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);
@@ -56,11 +54,11 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
 }
 
 static const float half = 0.5F;
-/* Shares are rounded to so many parts, so that a half is a half on every processor. */
+/* Number of levels that shares are rounded to, so that all processors agree on a half. */
 static const float levels = 65536.0F;
 
-/* Of four cubes around an edge, two that face each other are inside alone: the emptier two's
- * fuller one joins them. */
+/* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other
+ * two. */
 static bool mend_edge(float *share, const size_t at[4]) {
   const bool in[4] = {share[at[0]] >= half, share[at[1]] >= half, share[at[2]] >= half,
                       share[at[3]] >= half};
@@ -73,8 +71,8 @@ static bool mend_edge(float *share, const size_t at[4]) {
   return true;
 }
 
-/* Of eight cubes around a corner, two opposite ones are inside, or outside, alone. Inside: a path
- * of two joins them; outside: one of them is filled. */
+/* If only two opposite cubes of the eight around a corner are inside, join them by a path of
+ * two; if only they are outside, fill one. */
 static bool mend_corner(float *share, const size_t at[8]) {
   unsigned inside = 0;
   for (unsigned c = 0; c < 8; ++c) {
@@ -96,7 +94,7 @@ static bool mend_corner(float *share, const size_t at[8]) {
   return false;
 }
 
-/* Looks at every edge and corner; true where something was mended. */
+/* Correct every edge and corner; true if any changed. */
 static bool mend(const size_t size[3], float *share) {
   const size_t stride[3] = {1, size[0], size[0] * size[1]};
   bool mended = false;
@@ -130,7 +128,7 @@ static bool mend(const size_t size[3], float *share) {
   return mended;
 }
 
-/* The cubes' own islands and cavities, which averaging may leave and mending close. */
+/* Remove islands and cavities of the cubes, left by averaging or correction. */
 static supine_status one_piece(labels_cubes *cubes) {
   labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
   const size_t count = supine_labels_mask_count(&inside);

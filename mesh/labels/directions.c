@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The directions of an image's axes, in words. */
+/* Describe the directions of an image's axes. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Distances from every voxel to a set of voxels, exact: along the first axis by counting, along the
- * others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
+/* Exact distances from every voxel to a set of voxels: along the first axis by counting, along
+ * the others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
  * [Felzenszwalb2012]. */
 #include <math.h>
 #include <stdlib.h>
@@ -8,14 +8,14 @@
 #include "mesh/labels/mask.h"
 #include "sh/base/parallel.h"
 
-static const float far_away = 1e30F; /* mm^2: there is nothing in that row */
+static const float far_away = 1e30F; /* mm^2: no voxel of the set in that row */
 
 typedef struct sweep {
   const labels_mask *mask;
   bool zero;
   float *squares;
   int axis;
-  size_t length; /* longest side */
+  size_t length; /* of the longest side */
   double *space; /* of each thread, 3 x (length + 1) */
 } sweep;
 
@@ -41,8 +41,8 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* One line of n values, `stride` apart; v: where parabolas stand, z: where each begins to be the
- * lowest, f: the values. */
+/* Transform one line of n values, `stride` apart; v: places of the parabolas, z: where each
+ * becomes the lowest, f: the values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;
@@ -118,7 +118,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
     free(squares);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < count; ++i) { /* 2: what is new */
+  for (size_t i = 0; i < count; ++i) { /* 2: filled by closing */
     mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
   }
   const supine_status status = supine_labels_distance(mask, true, squares);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The whole way from a label map to surfaces. */
+/* Make surfaces from a label map. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,22 +7,22 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2; /* mm: a hundredth of it would be a billion vertices */
-static const double most_edge = 20.0; /* of what is larger no lung is left */
+static const double least_edge = 0.2; /* mm: a hundredth of it would give a billion vertices */
+static const double most_edge = 20.0; /* mm: a larger one leaves nothing of a lung */
 static const double most_closing = 20.0;
-static const double least_lung = 1.0;      /* mL: anything less is no lung */
-static const double longest_lung = 1000.0; /* mm: its cubes would fill any memory */
+static const double least_lung = 1.0;      /* mL: the least volume of a lung */
+static const double longest_lung = 1000.0; /* mm: the cubes of a longer one exceed any memory */
 
 typedef struct work {
-  const char *path; /* the first, for messages */
+  const char *path; /* first file, for messages */
   const supine_labels_options *options;
   supine_labels_report *report;
   double edge;
-  supine_image image; /* until the mask is made of it */
+  supine_image image; /* freed when the mask is made */
   labels_mask both;
-  size_t from[3]; /* voxel of the image that the mask's first is */
-  size_t cut[2];  /* voxels of either side at the image's border */
-  bool doubted;   /* the header does not put the left lung left of the right one */
+  size_t from[3]; /* voxel of the image at the mask's origin */
+  size_t cut[2];  /* voxels of each side at the image's border */
+  bool doubted;   /* by the header, the left lung is not left of the right one */
 } work;
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
@@ -33,7 +33,7 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
                                 "interrupted: nothing was written");
 }
 
-/* Do two images have the same voxels, to a hundredth of one over the whole image? */
+/* Report whether two images have the same voxels, to a hundredth of one over the whole image. */
 static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
@@ -57,7 +57,7 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
   return true;
 }
 
-/* In the axes that were asked for. */
+/* Read an image in the axes requested. */
 static supine_status read_image(const work *w, const char *path, supine_image *image,
                                 supine_error *error) {
   const supine_status status = supine_image_read(path, image, error);
@@ -65,7 +65,7 @@ static supine_status read_image(const work *w, const char *path, supine_image *i
   return status;
 }
 
-/* Several masks as one map, whose labels are their numbers from 1; earlier ones go first. */
+/* Join masks into one map, labelled by their order from 1; earlier masks take precedence. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
   const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
@@ -80,7 +80,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
     status = f == 0 ? SUPINE_OK : read_image(w, paths[f], &next, error);
     if (status == SUPINE_OK && !same_frame(&w->image, image)) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: its voxels are not those of %s: masks of one scan are wanted",
+                                "%s: its voxels are not those of %s: give masks of one scan",
                                 paths[f], paths[0]);
     }
     for (size_t i = 0; i < voxels && status == SUPINE_OK; ++i) {
@@ -95,7 +95,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   return status;
 }
 
-/* The voxels of lungs, with a margin, as LABELS_LEFT, _RIGHT or _EITHER. */
+/* Make the mask of the lungs' voxels, with a margin, as LABELS_LEFT, _RIGHT or _EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -113,7 +113,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   return SUPINE_OK;
 }
 
-/* Voxels of each side in the image's first and last layers: there the lung goes on. */
+/* Count voxels of each side in the image's first and last layers, where the lung is cut off. */
 static void count_cut(work *w, const size_t image_size[3]) {
   const labels_mask *both = &w->both;
   for (size_t k = LABELS_MARGIN; k < both->size[2] - LABELS_MARGIN; ++k) {
@@ -183,7 +183,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   return status;
 }
 
-/* Closing takes nothing of the other lung. */
+/* Undo closing where it entered the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
   long offset[3];
   supine_labels_mask_offset(mask, both, offset);
@@ -206,7 +206,7 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* One piece, without cavities. */
+/* Keep one piece, and fill its cavities. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
@@ -247,7 +247,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   status = status == SUPINE_OK ? clean(w, value, &mask, lung) : status;
   if (status == SUPINE_OK && lung->mask < least_lung) {
     status = supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: the largest piece of the %s lung holds %.2g mL: that is no lung",
+                              "%s: the largest piece of the %s lung holds %.2g mL, too little for "
+                              "a lung: check --labels and the voxels' size",
                               w->path, value == LABELS_LEFT ? "left" : "right", lung->mask);
     supine_labels_mask_free(&mask);
     return status;
@@ -286,7 +287,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, value == LABELS_LEFT ? "left" : "right", w->edge);
 }
 
-/* Do the two surfaces' boxes lie beside each other, whichever is left? */
+/* Report whether the two surfaces' boxes lie beside each other, on either side. */
 static bool beside(const supine_mesh *surfaces) {
   double low[2][3];
   double high[2][3];
@@ -299,8 +300,8 @@ static bool beside(const supine_mesh *surfaces) {
   return apart[0] > apart[1] && apart[0] > apart[2];
 }
 
-/* The left lung does not lie left of the other: are the labels named wrongly, or is the header
- * wrong? The shape of the lungs knows. */
+/* If the left lung does not lie left of the other, tell by the lungs' shape whether the labels
+ * or the header are wrong. */
 static supine_status settle_doubt(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);

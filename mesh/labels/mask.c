@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Boxes of voxels. */
+/* Extract boxes of voxels from masks and images. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,7 +27,7 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* The box of a value; false where there is none. */
+/* Find the box of a value; false if it is absent. */
 static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t high[3]) {
   bool any = false;
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
@@ -116,7 +116,8 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
-      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* it went well before */
+      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* all rows were read
+                                                                          * before */
       uint8_t *out = mask->at + LABELS_MARGIN +
                      mask->size[0] * (j - low[1] + LABELS_MARGIN +
                                       mask->size[1] * (k - low[2] + LABELS_MARGIN));

@@ -12,11 +12,11 @@ static const float half = 0.5F;
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3];
-  uint32_t *vertex; /* [cubes] of the cell that begins at each, or LABELS_NONE */
+  uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or LABELS_NONE */
   labels_net *net;
 } build;
 
-/* Mean of where the surface crosses the cell's edges, 0 to 1; false where it does not. */
+/* Find the mean crossing of the surface with the cell's edges, 0 to 1; false if there is none. */
 static bool crossing(const build *b, size_t cell, double mean[3]) {
   const float *share = b->cubes->share;
   double sum[3] = {0.0, 0.0, 0.0};
@@ -26,7 +26,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
     inside += share[cell + (c & 1U) * b->stride[0] + (c >> 1U & 1U) * b->stride[1] +
                     (c >> 2U) * b->stride[2]] >= half;
   }
-  if (inside == 0 || inside == 8) { /* most cells */
+  if (inside == 0 || inside == 8) { /* the usual case */
     return false;
   }
   for (size_t c = 0; c < 8; ++c) {
@@ -53,7 +53,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
   return true;
 }
 
-/* Numbers the cells; with `write`, fills the net's vertices. */
+/* Number the cells; with `write`, fill the net's vertices. */
 static void find_vertices(build *b, bool write) {
   const size_t *size = b->cubes->size;
   labels_net *net = b->net;
@@ -79,14 +79,14 @@ static void find_vertices(build *b, bool write) {
   }
 }
 
-/* A quadrilateral around the edge from a cube along an axis, and neighbours along its sides. */
+/* Add a quadrilateral around the edge from a cube along an axis; link its neighbours. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
   labels_net *net = b->net;
   const size_t u = (a + 1) % 3;
   const size_t v = (a + 2) % 3;
   const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
                            cube - b->stride[u]};
-  /* From one cell to the next: along +u, +v, -u, -v. */
+  /* To the next cell: along +u, +v, -u, -v. */
   const size_t way[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
   if (write) {
     const bool outwards = b->cubes->share[cube] >= half;
@@ -153,7 +153,7 @@ void supine_labels_net_free(labels_net *net) {
   *net = (labels_net){0};
 }
 
-/* A vertex in voxels of the mask. */
+/* Convert a vertex to voxels of the mask. */
 static void in_voxels(const labels_net *net, const labels_cubes *cubes, size_t vertex,
                       double voxel[3]) {
   for (size_t a = 0; a < 3; ++a) {
@@ -162,8 +162,8 @@ static void in_voxels(const labels_net *net, const labels_cubes *cubes, size_t v
   }
 }
 
-/* From a point in voxels to the nearest face between the mask and what is around it, mm: the
- * nearest voxel of the other kind, looked for in boxes that grow. */
+/* Find the distance, mm, from a point in voxels to the mask's nearest face, by the nearest voxel
+ * of the other value in growing boxes. */
 static double distance_to_mask(const labels_mask *mask, const double voxel[3]) {
   long middle[3];
   double nearest = INFINITY;
@@ -178,7 +178,7 @@ static double distance_to_mask(const labels_mask *mask, const double voxel[3]) {
   const bool kind =
       mask->at[(size_t)middle[0] + n0 * ((size_t)middle[1] + n1 * (size_t)middle[2])] != 0;
   for (long reach = 1; ((double)reach - 1.0) * least < nearest; ++reach) {
-    bool inside = false; /* is any of the box? */
+    bool inside = false; /* whether any voxel of the box is */
     for (long k = middle[2] - reach; k <= middle[2] + reach; ++k) {
       for (long j = middle[1] - reach; j <= middle[1] + reach; ++j) {
         const bool shell = labs(k - middle[2]) == reach || labs(j - middle[1]) == reach;

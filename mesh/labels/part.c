@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Two lungs in one mask. Where they touch, the mask is worn down until it falls into two pieces
+/* Split a mask of two lungs. Where they touch, erode the mask until it falls into two pieces
  * beside each other; each voxel then belongs to the nearer piece. */
 #include <math.h>
 #include <stdlib.h>
@@ -7,17 +7,17 @@
 
 #include "mesh/labels/mask.h"
 
-/* Lungs of one chest are of one order of size. */
+/* Least volume of the smaller lung over the larger. */
 static const double least_share = 0.1;
-/* Necks between lungs are no wider; what is left of a lung by then is its core. */
+/* Widest neck between lungs. */
 static const double widest_neck = 40.0; /* mm */
 
 typedef struct pair {
   uint32_t piece[2];
-  double centre[2][3]; /* mm, in the order of size */
+  double centre[2][3]; /* mm, larger piece first */
 } pair;
 
-/* The two largest pieces, if they lie beside each other; the left one first. */
+/* Find the two largest pieces if they lie beside each other; the left one first. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
@@ -49,15 +49,15 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
          fabs(apart) > fabs(found->centre[0][2] - found->centre[1][2]);
 }
 
-/* Only what is deeper than this; mm. */
-static void wear(const labels_mask *both, const float *squares, double depth, uint8_t *worn) {
+/* Keep only the voxels deeper than this, mm. */
+static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *worn) {
   const size_t count = supine_labels_mask_count(both);
   for (size_t i = 0; i < count; ++i) {
     worn[i] = both->at[i] != 0 && (depth == 0.0 || sqrt((double)squares[i]) > depth);
   }
 }
 
-/* The voxels of the pair, 1 and 2; all others 0. */
+/* Mark the voxels of the pair as 1 and 2, all others as 0. */
 static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
                       uint8_t *marks) {
   memset(marks, 0, supine_labels_mask_count(mask));
@@ -72,7 +72,7 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
   }
 }
 
-/* Every voxel goes to the nearer of the marked pieces. `squares` is space for distances. */
+/* Assign every voxel to the nearer marked piece. `squares` is work space. */
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);
   labels_mask one = *both;
@@ -107,15 +107,15 @@ supine_status supine_labels_part(const char *path, labels_mask *both, double *ne
     goto cleanup;
   }
   status = SUPINE_OK;
-  bool all = false; /* in the two pieces */
+  bool all = false; /* volume of both pieces */
   for (double depth = 0.0; status == SUPINE_OK && !parted && 2.0 * depth <= widest_neck;
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* most lungs have fallen apart before */
+    if (depth == step) { /* most lungs separate before this depth */
       status = supine_labels_distance(both, true, squares);
     }
-    wear(both, squares, depth, worn.at);
+    erode(both, squares, depth, worn.at);
     status = status == SUPINE_OK ? supine_labels_pieces_find(&worn, false, &pieces) : status;
     parted = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
     if (parted) {
@@ -134,12 +134,12 @@ cleanup:
   free(squares);
   free(worn.at);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory to part %zu voxels", path, count);
+    return supine_error_set(error, status, "%s: no memory to split %zu voxels", path, count);
   }
   return parted ? SUPINE_OK
                 : supine_error_set(error, SUPINE_ERROR_MESH,
-                                   "%s: one lung, or two that cannot be parted: nothing falls into "
-                                   "two pieces beside each other, however much is worn off. Of one "
-                                   "lung, name the side: --labels left=LABEL or right=LABEL",
+                                   "%s: cannot split the mask into two lungs: erosion leaves no "
+                                   "two pieces beside each other. If it is one lung, name the "
+                                   "side: --labels left=LABEL or right=LABEL",
                                    path);
 }

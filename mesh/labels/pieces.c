@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pieces of voxels that share faces, by runs along the rows: islands and cavities. */
+/* Find pieces of voxels that share faces, by runs along the rows: islands and cavities. */
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
@@ -12,14 +12,13 @@ static uint32_t root(labels_run *run, uint32_t i) {
   return i;
 }
 
-/* The earlier of the two is the piece's. */
+/* Unite two pieces under the earlier run. */
 static void unite(labels_run *run, uint32_t a, uint32_t b) {
   a = root(run, a);
   b = root(run, b);
   run[a > b ? a : b].parent = a > b ? b : a;
 }
 
-/* Unites the runs of two rows that overlap. */
 static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t b_end) {
   while (a < a_end && b < b_end) {
     if (run[a].begin < run[b].end && run[b].begin < run[a].end) {
@@ -33,7 +32,7 @@ static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t
   }
 }
 
-/* Runs of one row into `run`, or their number alone where that is NULL. */
+/* Find the runs of one row; if `run` is NULL, only count them. */
 static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
   size_t count = 0;
   for (size_t i = 0; i < size;) {
@@ -52,7 +51,7 @@ static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run 
   return count;
 }
 
-/* Every run knows its piece, and each piece its size. */
+/* Set the piece of every run and the size of every piece. */
 static void measure(const labels_mask *mask, labels_pieces *pieces) {
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
@@ -114,7 +113,7 @@ void supine_labels_pieces_free(labels_pieces *pieces) {
   *pieces = (labels_pieces){0};
 }
 
-/* Sets the voxels of all pieces but one. */
+/* Set the voxels of all pieces but one. */
 static size_t change_others(labels_mask *mask, const labels_pieces *pieces, uint32_t kept,
                             uint8_t value) {
   size_t changed = 0;
@@ -153,7 +152,7 @@ supine_status supine_labels_fill_cavities(labels_mask *mask, size_t *cavities, s
     return status;
   }
   *cavities = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
-  *filled = change_others(mask, &pieces, 0, 1); /* the first run is of the margin */
+  *filled = change_others(mask, &pieces, 0, 1); /* the first run lies in the margin */
   supine_labels_pieces_free(&pieces);
   return SUPINE_OK;
 }

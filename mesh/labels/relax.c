@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Smooths a surface net by turns of shrinking and swelling, which leave long waves as they are
+/* Smooth a surface net by alternate shrinking and inflation, which keeps long waves
  * [Taubin1995]. */
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 
-/* 1 / 0.5 - 1 / 0.51 = 0.04: waves longer than some 16 cubes pass, terraces of slices do not. */
+/* 1 / 0.5 - 1 / 0.51 = 0.04: keeps waves longer than some 16 cubes, removes terraces of slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 };
 
-/* Every vertex a share of the way to the middle of its neighbours, within its cell. */
+/* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
 static void step(const labels_net *net, double share, double (*next)[3]) {
   for (size_t v = 0; v < net->count; ++v) {
     double sum[3] = {0.0, 0.0, 0.0};
@@ -25,7 +25,7 @@ static void step(const labels_net *net, double share, double (*next)[3]) {
     for (size_t a = 0; a < 3; ++a) {
       const double here = net->at[v][a];
       const double there = here + share * (sum[a] / count - here);
-        next[v][a] = there < 0.0 ? 0.0 : there > 1.0 ? 1.0 : there;
+      next[v][a] = there < 0.0 ? 0.0 : there > 1.0 ? 1.0 : there;
     }
   }
 }

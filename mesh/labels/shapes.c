@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Any label's surface. */
+/* Make the surface of each label. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,12 +7,12 @@
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 
-enum { ALL_MOST = 256 }; /* more are no parts that anyone named */
+enum { ALL_MOST = 256 }; /* more labels suggest that it is no label map */
 
-/* Of the cube root of the volume, between vertices of large parts: some 15,000 of a lobe. */
+/* Distance between vertices over the cube root of a large part's volume: 15,000 in a lobe. */
 static const double edge_share = 0.02;
 
-/* `value` [LABELS_MAX] holds zeros, before and after. */
+/* Make one part. `value` [LABELS_MAX] holds zeros before and after. */
 static supine_status make_part(const supine_image *image, const labels_tally *tally, uint8_t *value,
                                supine_labels_shape *part) {
   const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
@@ -32,24 +32,24 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
   return status;
 }
 
-/* Which labels, with those that are not there refused. */
+/* Choose the labels; refuse those that are absent. */
 static supine_status choose(const char *path, const labels_tally *tally, const unsigned *wanted,
                             size_t wanted_count, supine_labels_shape *parts, size_t *count,
                             supine_error *error) {
   *count = 0;
   for (size_t i = 0; i < wanted_count; ++i) {
     if (wanted[i] == 0 || wanted[i] >= LABELS_MAX || tally[wanted[i]].count == 0) {
-      return supine_error_set(error, SUPINE_ERROR_MESH, "%s: no voxel holds the label %u", path,
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "%s: no voxel holds the label %u: correct the label", path,
                               wanted[i]);
     }
     parts[(*count)++].label = wanted[i];
   }
   for (unsigned label = 1; label < LABELS_MAX && wanted_count == 0; ++label) {
     if (tally[label].count > 0 && *count == ALL_MOST) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: more than %d labels: is it a label map? Name those that are "
-                              "wanted",
-                              path, ALL_MOST);
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "%s: more than %d labels: if it is a label map, name the labels to use", path, ALL_MOST);
     }
     if (tally[label].count > 0) {
       parts[(*count)++].label = label;
@@ -57,7 +57,7 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
   }
   return *count > 0 ? SUPINE_OK
                     : supine_error_set(error, SUPINE_ERROR_MESH,
-                                       "%s: all voxels hold 0: there is no label", path);
+                                       "%s: all voxels are 0: give a label map", path);
 }
 
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,

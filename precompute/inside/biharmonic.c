@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Biharmonic interpolation: well-spread centres, one dense factorisation, sums over the centres. */
+/* Biharmonic interpolation: spread centres, one dense factorisation, sums over the centres. */
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
@@ -13,7 +13,7 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* Columns of the matrix that are eliminated together; points and centres of a tile of sums. */
+/* Columns of the matrix eliminated together; points and centres in a tile of sums. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
 static inline double apart(const double a[3], const double b[3]) {
@@ -23,7 +23,7 @@ static inline double apart(const double a[3], const double b[3]) {
   return sqrt(x * x + y * y + z * z);
 }
 
-/* The box of the points: their middle, and half its diagonal as the unit. */
+/* Set the middle of the points' box, and half its diagonal as the unit. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -39,7 +39,7 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
   fit->unit = square > 0.0 ? sqrt(square) : 1.0;
 }
 
-/* Farthest first: every next centre is the point farthest from all before it. */
+/* Choose each next centre as the point farthest from all earlier ones. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);
@@ -69,7 +69,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
       farthest = distance[i] > distance[farthest] ? i : farthest;
     }
     fit->spacing = distance[farthest];
-    if (fit->spacing == 0.0) { /* no other point is left */
+    if (fit->spacing == 0.0) { /* all other points coincide with centres */
       break;
     }
   }
@@ -77,8 +77,9 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   return SUPINE_OK;
 }
 
-/* The distances of the centres without their affine part. With l(p) the barycentric coordinates in
- * the tetrahedron of the first four centres q, a(p) the distances from them and G those among them,
+/* The centres' distance matrix reduced by its affine part. With l(p) the barycentric coordinates
+ * in the tetrahedron of the first four centres q, a(p) the distances to p and G those among
+ * them,
  *
  *     N_ij = l_i.b_j + b_i.l_j - |p_i - p_j|,    b = a - G l / 2
  *
@@ -91,8 +92,8 @@ typedef struct reduced {
   size_t done;        /* columns eliminated */
 } reduced;
 
-/* Put centres far from a line and from a plane in the third and fourth place; false where all lie
- * in one plane. */
+/* Move centres far from a line and from a plane to the third and fourth place; false if all
+ * points lie in one plane. */
 static bool find_tetrahedron(supine_inside_biharmonic *fit, double slope[3][3]) {
   static const double flat = 1e-9;
   double edge[3][3] = {{0.0}};
@@ -165,8 +166,7 @@ SUPINE_CLONES static void fill(const double *centres, const reduced *r) {
   }
 }
 
-/* Take the last columns eliminated out of those behind, a long block of these and a short one in
- * turn. */
+/* Subtract the last eliminated columns from those behind, alternating long and short blocks. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const reduced *r = context;
@@ -181,7 +181,7 @@ static void update_blocks(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Cholesky's factorisation, the same whatever the number of threads. */
+/* Cholesky factorisation with a result that does not depend on the number of threads. */
 static lapack_int factorise(reduced *r) {
   const size_t n = r->size;
   lapack_int failed = 0;
@@ -200,8 +200,8 @@ static lapack_int factorise(reduced *r) {
   return failed;
 }
 
-/* Weights of one column from N z = l.f(q) - f, which is solved in `z`: those of q make up for the
- * others' affine part, and the affine function meets f(q). */
+/* Find the weights of one column from N z = l.f(q) - f, solved in `z`: the weights of q cancel
+ * the affine part of the others, and the affine function fits f(q). */
 static void finish_column(const supine_inside_biharmonic *fit, const reduced *r, const double *z,
                           const double f[AFFINE], double *weights) {
   const double *c = fit->centres;
@@ -231,7 +231,7 @@ static void finish_column(const supine_inside_biharmonic *fit, const reduced *r,
   }
 }
 
-/* [ |p_i - p_j|  1 p ; (1 p)^T  0 ] [w; a B] = [values; 0], by N. */
+/* Solve [ |p_i - p_j|  1 p ; (1 p)^T  0 ] [w; a B] = [values; 0] by N. */
 static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
   reduced r = {0};
   if (!find_tetrahedron(fit, r.slope)) {
@@ -295,11 +295,12 @@ supine_status supine_inside_biharmonic_fit(size_t count, const double *points, s
   }
   if (status != SUPINE_OK) {
     supine_inside_biharmonic_free(&made);
-    return supine_error_set(error, status,
-                            status == SUPINE_ERROR_MEMORY
-                                ? "no memory to interpolate from %zu points"
-                                : "cannot interpolate from %zu points: they lie in one plane",
-                            most);
+    return supine_error_set(
+        error, status,
+        status == SUPINE_ERROR_MEMORY
+            ? "no memory to interpolate from %zu points"
+            : "cannot interpolate from %zu points in one plane: give closed lungs",
+        most);
   }
   *fit = made;
   return SUPINE_OK;
@@ -312,7 +313,6 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit) {
   *fit = (supine_inside_biharmonic){0};
 }
 
-/* Points and their values. */
 typedef struct evaluation {
   const supine_inside_biharmonic *fit;
   const double *points;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Reading what is to be carried along. */
+/* Read the content that a basis moves. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@ static supine_status no_memory(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
 }
 
-/* Space for more points, at least doubled so that points can come one by one. */
+/* Make room for more points, at least doubling it so that appending is cheap. */
 static bool reserve(supine_inside_content *content, size_t *capacity, size_t more) {
   if (content->count + more <= *capacity) {
     return true;
@@ -28,7 +28,6 @@ static bool reserve(supine_inside_content *content, size_t *capacity, size_t mor
   return true;
 }
 
-/* Adds the name of the next part. */
 static bool add_name(supine_inside_content *content, const char *name, size_t length, size_t *used,
                      size_t *capacity) {
   if (*used + length + 2 > *capacity) {
@@ -77,7 +76,7 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* "airways" of "/scans/airways.ply". */
+/* Find "airways" in "/scans/airways.ply". */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;
@@ -148,8 +147,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
     }
     if (!found) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--rigid: no part is named '%.*s': a mesh's name is its file's, a "
-                              "label's as --labels has it",
+                              "--rigid: no part is named '%.*s': give the name of a mesh's file, "
+                              "or a label as in --labels",
                               (int)length, at);
     }
     at += length;

@@ -1,45 +1,44 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * What is to be carried along: named points, meshes, or the nodes of a grid. */
+/** @file Content that a basis moves: named points, meshes, or the nodes of a grid. */
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
 #include "mesh/image/image.h"
 
-/** Points, of which some may be corners of triangles. Zero-initialise; supine_inside_content_free
- * releases what the functions below put there. */
+/** Points, some of which may be corners of triangles. Zero-initialise;
+ * supine_inside_content_free releases it. */
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] which of the parts a point is of; of a grid: its node,
-                       i + size[0] (j + size[1] k) */
+  uint32_t *part; /**< [count] index of the point's part; for a grid, its node i + size[0] (j +
+                   * size[1] k) */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] */
-  size_t part_count;   /**< names of parts; 0: a grid */
-  char *names;         /**< in order of part, each but the last followed by a newline */
-  bool *rigid;         /**< [part_count] parts that keep their size; NULL: none */
+  size_t part_count;   /**< number of names; 0: a grid */
+  char *names;         /**< in order of part, separated by newlines */
+  bool *rigid;         /**< [part_count] parts that keep their shape; NULL: none */
   supine_image grid;   /**< size, origin and step of its nodes */
 } supine_inside_content;
 
-/** Appends the points of a file, each a part of its own; options and statuses as
+/** Append the points of a file, each as one part; options and statuses as
  * supine_mesh_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);
 
-/** Appends a mesh, one part, named as its file is.
- * @retval those of supine_mesh_load */
+/** Append a mesh as one part, named after its file.
+ * @retval as supine_mesh_load */
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error);
 
-/** Appends a surface, one part of that name.
+/** Append a surface as one part of the given name.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
 
-/** Makes parts rigid.
- * @param names  separated by commas, or "all"
- * @retval SUPINE_ERROR_ARGUMENT  no part is named so
+/** Make parts rigid.
+ * @param names  part names separated by commas, or "all"
+ * @retval SUPINE_ERROR_ARGUMENT  no part has that name
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);

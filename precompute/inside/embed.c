@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Content in, a basis of kind vector that moves it out. */
+/* Embed content in the lungs, and write the vector basis that moves it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,7 +14,7 @@
 
 enum { BLOCK = 1024 };
 
-/* The content in the lungs' order, and where each point stands. */
+/* The content in the order of the lungs. */
 typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
@@ -22,14 +22,14 @@ typedef struct embedding {
   size_t columns; /* 3 K */
   supine_inside_place *place;
   unsigned char *lung;
-  size_t *order;       /* [N] content's points, lung by lung */
-  float *vertices;     /* [N, 3] in that order, likewise: */
+  size_t *order;       /* [N] indices of the content's points, lung by lung */
+  float *vertices;     /* [N, 3] in that order, as all below: */
   float *coefficients; /* [N, 3, K] */
   float *depth;
   uint32_t *part;
   unsigned char *group;
   uint32_t *triangles; /* [M, 3] */
-  uint32_t *rigid;     /* [rigid_count, 2] first vertex of a rigid part, and that behind its last */
+  uint32_t *rigid;     /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
   size_t rigid_count;
 } embedding;
 
@@ -45,7 +45,7 @@ static void find_places(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Put the points of each rigid part into the lung of most of them. */
+/* Assign the points of each rigid part to the lung that holds most of them. */
 static void gather_parts(embedding *e) {
   const supine_inside_content *content = e->content;
   for (size_t begin = 0, end = 0; content->rigid != NULL && begin < content->count; begin = end) {
@@ -63,7 +63,7 @@ static void gather_parts(embedding *e) {
   }
 }
 
-/* Points lung by lung, in their own order within each; triangles follow. */
+/* Sort the points by lung, in their own order within each; renumber the triangles. */
 static supine_status sort_points(embedding *e, supine_inside_report *report) {
   const size_t n = e->content->count;
   uint32_t *position = malloc(n * sizeof *position);
@@ -99,7 +99,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
     while (end < n && e->part[end] == e->part[begin]) {
       ++end;
     }
-    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a point is rigid as it is */
+    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a point needs no rotation */
       e->rigid[2 * e->rigid_count] = (uint32_t)begin;
       e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
     }
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Motion of the surface at a place, linear in its triangle. */
+/* Find the motion of the surface at a place, linear in its triangle. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -122,7 +122,7 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* From where the scan had the points [begin, end) to where full inflation has them. */
+/* Move the points [begin, end) from the scan to full inflation. */
 static void take_back(embedding *e, size_t lung, size_t begin, size_t end, const double *values) {
   const size_t modes = e->columns / 3;
   for (size_t i = begin; i < end; ++i) {
@@ -137,9 +137,9 @@ static void take_back(embedding *e, size_t lung, size_t begin, size_t end, const
   }
 }
 
-/* Points [begin, end) of the order, all of one lung, at most BLOCK. In `space`: positions [2
- * BLOCK, 3], values [2 BLOCK, R]; the second half are the surface's points nearest to those whose
- * distance is less than `reach`. Eight parameters: a block is no more than its range. */
+/* Find the motion of points [begin, end) of the order, all of one lung, at most BLOCK. In
+ * `space`: positions [2 BLOCK, 3], values [2 BLOCK, R]; the second half holds the nearest
+ * surface points of those nearer than `reach`. Eight parameters: one block and its work space. */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -180,9 +180,8 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
   take_back(e, (size_t)(shell - e->shells->shell), begin, end, values);
 }
 
-/* Adds to sums of squares what the interpolation leaves at the surface's vertices, and their
- * motion.
- */
+/* Add the squared residual of the interpolation at the surface's vertices, and their squared
+ * motion, to sums. */
 static void residual(const embedding *e, const supine_inside_shell *shell,
                      const double *displacement, const supine_inside_biharmonic *fit, double *space,
                      double sums[2]) {
@@ -200,7 +199,7 @@ static void residual(const embedding *e, const supine_inside_shell *shell,
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end, double sums[2],
                                 supine_inside_report *report, supine_error *error) {
-  static const double reach_spacings = 2.0; /* what a wave of the centres' spacing fades out in */
+  static const double reach_spacings = 2.0; /* over the centres' spacing: errors fade out in it */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -233,9 +232,9 @@ cleanup:
   return status;
 }
 
-/* The part as it was given, turned and shifted so that the field at the scan's weights, from there,
- * takes it back to where it was: the turn is found by repetition, as the field is that of where
- * full inflation has the vertices. */
+/* Find the part at full inflation: its given shape, rotated and shifted so that the field at the
+ * scan's weights returns it to the scan. The rotation is iterated, as the field acts on the
+ * vertices at full inflation. */
 static void take_back_rigid(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -268,7 +267,7 @@ static void take_back_rigid(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Metadata of the surface that do not hold for what is inside. */
+/* Report whether a surface's metadata does not apply to content. */
 static bool dropped(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
@@ -280,7 +279,7 @@ static bool dropped(const char *key) {
   return false;
 }
 
-/* The surface's metadata, then those of the content. */
+/* Write the surface's metadata, then the content's. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
   enum { OWN = 5 };
@@ -314,7 +313,7 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
 }
 
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
-  /* What the surface and what is inside share. */
+  /* Tensors that the surface and its content share. */
   static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
                                        "resting_volume"};
   const supine_inside_content *content = e->content;
@@ -383,7 +382,8 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   supine_status status = SUPINE_OK;
   *report = (supine_inside_report){0};
   if (content->count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: no point");
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "nothing to embed: the content has no points");
   }
   if (!allocate(&e)) {
     status =

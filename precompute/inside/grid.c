@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choosing the nodes of a grid that lie inside, row by row. */
+/* Choose the nodes of a grid that lie inside the lungs, row by row. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -10,7 +10,7 @@
 
 static const double nodes_max = 2147483648.0;
 
-/* The box of the lungs and the margin in steps of `grid`. */
+/* Find the box of the lungs with the margin, in steps of `grid`. */
 static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
@@ -34,7 +34,7 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
-/* The grid that covers the lungs: a box of its own, or every n-th node of another's. */
+/* Make the grid that covers the lungs, along the axes or from every n-th node of another grid. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
@@ -55,9 +55,9 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
     first[k] = every * floor(low[k] / every);
     const double count = ceil((high[k] - first[k]) / every) + 1.0;
     if (like != NULL && !(high[k] >= low[k])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the image does not show the lungs: are its axes, and those of the "
-                              "lungs' meshes, what they say?");
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "the image does not show the lungs: check its axes and those of the lungs' meshes");
     }
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
@@ -77,11 +77,11 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   return SUPINE_OK;
 }
 
-/* Which lung each node is of, and whether it is to be kept. */
+/* The lung of each node, and whether the node is kept. */
 typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
-  double limit; /* mm outside that are kept */
+  double limit; /* largest distance outside of nodes that are kept, mm */
   unsigned char *keep;
 } search;
 
@@ -144,7 +144,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
     return status;
   }
   double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) { /* the longest diagonal is no longer than this, however oblique */
+  for (int k = 0; k < 3; ++k) { /* bounds the longest diagonal of an oblique cell */
     diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];

@@ -1,20 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * A grid of nodes over the lungs, as content. */
+/** @file A grid of nodes over the lungs, as content. */
 #ifndef SUPINE_INSIDE_GRID_H
 #define SUPINE_INSIDE_GRID_H
 
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
-/** Nodes inside the lungs, and those outside whose distance is less than the diagonal of a cell, so
- * that every point inside lies between nodes that are there.
+/** Make a grid of the nodes inside the lungs and those outside within a cell's diagonal, so that
+ * every point inside lies between nodes.
  *
- * @param like     axes to take: nodes are every n-th node of its, the box within its box. NULL:
+ * @param like     gives the axes: nodes are every n-th node of it, within its box. NULL:
  *                 along x, y, z
  * @param spacing  mm between nodes; with `like`, at least about this far
- * @param margin   mm that the grid's box reaches beyond the lungs'; there are no nodes, but the
- *                 field that is written fades out in it
+ * @param margin   mm of the grid's box beyond the lungs', without nodes; the field fades out in
+ *   it
  * @param content  zero-initialised
  * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
  * @retval SUPINE_ERROR_MESH      no node is inside a lung

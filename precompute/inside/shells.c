@@ -19,7 +19,7 @@ static double mean_edge(const supine_inside_shell *shell) {
   return sum / (double)(3 * shell->triangle_count);
 }
 
-/* @param scanned  [N, 3] the basis's vertices where the scan had them */
+/* @param scanned  [N, 3] the basis's vertices in the scan */
 static supine_status create_shell(const supine_basis_info *info, const float *scanned, size_t lung,
                                   supine_inside_shell *shell, supine_error *error) {
   const size_t begin = info->lung_begin[lung];
@@ -46,7 +46,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   }
   if (shell->triangle_count == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "lung %s has no triangles: nothing can be inside it",
+                            "lung %s has no triangles: give a basis of a surface",
                             info->lung_names[lung]);
   }
   shell->edge = mean_edge(shell);
@@ -54,7 +54,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
                                       &shell->surface, error);
 }
 
-/* Do all corners of every triangle lie in one lung? */
+/* Report whether every triangle has its corners in one lung. */
 static bool separate(const supine_basis_info *info) {
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const size_t begin = info->lung_begin[lung];
@@ -78,14 +78,15 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   const supine_basis_info *info = supine_basis_get_info(basis);
   *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
   if (supine_basis_metadata(basis, "content") != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis holds %s inside lungs already: give that of the lungs' "
-                            "surface",
-                            supine_basis_metadata(basis, "content"));
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the basis already holds %s inside lungs: give the basis of the lungs' surface",
+        supine_basis_metadata(basis, "content"));
   }
   if (!separate(info)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "a triangle of the basis joins two lungs: make the basis anew");
+    return supine_error_set(
+        error, SUPINE_ERROR_MESH,
+        "a triangle of the basis joins two lungs: make a new basis from separate lungs");
   }
   float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
   const supine_state scan = supine_basis_scan(basis);
@@ -99,7 +100,8 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
     if (!isfinite(scanned[i])) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the scan's volume is out of reach of the basis");
+                                "the basis cannot reach the scan's volume: make a new basis, with "
+                                "--scanned for that scan");
     }
   }
   for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
@@ -140,7 +142,7 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Brings the walk's place in one lung up to the point. */
+/* Update the walk's place in one lung for a point. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];
@@ -158,7 +160,7 @@ static void step_to(const supine_inside_shells *shells, const double point[3], s
 
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk) {
-  step_to(shells, point, walk->lung, far, walk); /* most likely still there */
+  step_to(shells, point, walk->lung, far, walk); /* try the lung of the last point first */
   size_t best = walk->lung;
   for (size_t lung = 0; lung < shells->count && walk->place[best].depth <= 0.0; ++lung) {
     if (lung != walk->lung) {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * The surfaces of an open basis, lung by lung, to tell what is inside which. */
+/** @file The surfaces of an open basis, lung by lung, to find the lung that a point is in. */
 #ifndef SUPINE_INSIDE_SHELLS_H
 #define SUPINE_INSIDE_SHELLS_H
 
@@ -12,9 +11,9 @@
 
 /** One lung's surface. */
 typedef struct supine_inside_shell {
-  size_t begin; /**< the basis's first vertex of it */
+  size_t begin; /**< index of its first vertex in the basis */
   size_t vertex_count;
-  double *vertices; /**< [vertex_count, 3] mm, where the scan had them */
+  double *vertices; /**< [vertex_count, 3] mm, in the scan */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3], vertices counted from `begin` */
   double edge;         /**< mean length of an edge, mm */
@@ -22,39 +21,38 @@ typedef struct supine_inside_shell {
 } supine_inside_shell;
 
 typedef struct supine_inside_shells {
-  const supine_basis *basis; /**< kept by the caller */
+  const supine_basis *basis; /**< owned by the caller; must outlive the shells */
   size_t count;              /**< lungs, G */
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
-  supine_pose scan; /**< the scan's own state, in which content is given */
+  supine_pose scan; /**< the scan's state, in which content is given */
 } supine_inside_shells;
 
-/** Take the lungs' surfaces to where they were scanned.
+/** Move the lungs' surfaces to their state in the scan.
  * @param shells  written; supine_inside_shells_free releases it
  * @retval SUPINE_ERROR_MESH    a lung without a triangle
  * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
- * @retval SUPINE_ERROR_NUMERICAL  its volumes do not reach the scan's
+ * @retval SUPINE_ERROR_NUMERICAL  it cannot reach the scan's volume
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
-/** Displacements of a lung's vertices at weight and scale 1 of each mode.
+/** Find the displacements of a lung's vertices at weight and scale 1 of each mode.
  * @param displacement  [vertex_count, 3, K] mm, written */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 
-/** Places of one point after another, each near the one before: what was found lately, by lung. */
+/** Successive nearby points: the last place found, by lung. */
 typedef struct supine_inside_walk {
   bool known[SUPINE_LUNGS_MAX];
-  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< of some earlier point */
+  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< of an earlier point */
   size_t lung;                                 /**< the last answer */
 } supine_inside_walk;
 
-/** The lung that a point is in, or where it is in none, the nearest; walk->place[lung] is its
- * place.
+/** Find the lung that a point is in, or the nearest lung; walk->place[lung] is its place there.
  * @param walk  zeroed for the first point
- * @param far   mm: where the surface is known to be farther than this the place is left as it was,
- *              of an earlier point on the same side; INFINITY: never */
+ * @param far   mm: if the surface is farther, the place may be an earlier point's on the same
+ *   side; INFINITY: never */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

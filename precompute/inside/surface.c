@@ -13,20 +13,20 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* Boxes seen from farther than this many of their radii are dipoles: errs by less than 1 % of the
- * winding number, where 50 % decide. */
+/* Distance in radii from which a box is a dipole: errs by less than 1 % of the winding number,
+ * whose threshold is 50 %. */
 static const double dipole_distance = 2.0;
-/* A point this near, mm, is on the surface, whose positions are float32: not outside. */
+/* Distance, mm, at which a point counts as on the surface, whose positions are float32. */
 static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
-  double area, centre[3]; /* of it */
+  double area, centre[3]; /* centre of area, mm */
   double dipole[3];       /* sum of the triangles' normals times area */
-  double radius;          /* about the centre */
+  double radius;          /* of the box, about the centre */
   uint32_t begin, end;
-  uint32_t right; /* the other child; the first follows the node; 0: a leaf */
-  uint32_t leaf;  /* its boxes */
+  uint32_t right; /* second child; the first is the next node; 0: a leaf */
+  uint32_t leaf;  /* index of a leaf's boxes */
 } node;
 
 /* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
@@ -41,7 +41,7 @@ struct supine_inside_surface {
   uint32_t *order; /* triangles, leaf by leaf */
   node *nodes;
   uint32_t node_count;
-  boxes *leaves; /* of the triangles of each leaf */
+  boxes *leaves; /* boxes of the triangles of each leaf */
   uint32_t leaf_count;
 };
 
@@ -62,8 +62,7 @@ typedef struct keyed {
   uint32_t triangle;
 } keyed;
 
-/* Sort by key; what is equal stays in order, as with the C library's merge sort, which calls a
- * function for each comparison.
+/* Stable merge sort by key, without a function call for each comparison.
  * @param space  [count / 2] */
 static void sort(keyed *item, size_t count, keyed *space) {
   const size_t half = count / 2;
@@ -92,7 +91,6 @@ static double greatest(double a, double b) {
   return a > b ? a : b;
 }
 
-/* The box of a triangle. */
 static void triangle_box(const supine_inside_surface *s, size_t triangle, double low[3],
                          double high[3]) {
   const double *p[3];
@@ -103,7 +101,7 @@ static void triangle_box(const supine_inside_surface *s, size_t triangle, double
   }
 }
 
-/* Find the box of a node's triangles, and of a leaf each triangle's. */
+/* Find the box of a node's triangles and, in a leaf, of each triangle. */
 static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   for (int k = 0; k < 3; ++k) {
     n->low[k] = INFINITY;
@@ -124,7 +122,7 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part, of which `centre` is the centre of area, to a node's dipole and centre times area. */
+/* Add a part with centre of area `centre` to a node's dipole, area and first moment. */
 static void add_part(node *n, double area, const double centre[3], const double dipole[3]) {
   n->area += area;
   for (int k = 0; k < 3; ++k) {
@@ -133,7 +131,7 @@ static void add_part(node *n, double area, const double centre[3], const double 
   }
 }
 
-/* Find a node's dipole: a leaf's from its triangles, another's from its children's. */
+/* Find a node's dipole: a leaf's from its triangles, otherwise from its children. */
 static void find_dipole(const supine_inside_surface *s, node *n) {
   n->area = 0.0;
   memset(n->centre, 0, sizeof n->centre);
@@ -169,7 +167,7 @@ static void find_dipole(const supine_inside_surface *s, node *n) {
   n->radius = sqrt(square);
 }
 
-/* Builds the node of triangles order[begin..end) and those below it. */
+/* Build the node of triangles order[begin..end) and its descendants. */
 static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32_t end) {
   node *n = &s->nodes[s->node_count++];
   n->begin = begin;
@@ -213,7 +211,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
     s->triangles = triangles;
     s->triangle_count = count;
     s->order = malloc(count * sizeof *s->order);
-    s->nodes = malloc(2 * count * sizeof *s->nodes); /* a binary tree of at most `count` leaves */
+    s->nodes = malloc(2 * count * sizeof *s->nodes); /* a binary tree of `count` leaves at most */
     s->leaves = malloc((2 * count / LEAF + 1) * sizeof *s->leaves); /* each at least half full */
   }
   if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL || s->leaves == NULL) {
@@ -240,19 +238,19 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Weight of the second of two points, nearest to the first one's origin: -w.e / e.e in 0 to 1. */
+/* Find the weight of the second point in the point nearest to the first's origin on their
+ * segment: -w.e / e.e, clamped to 0 to 1. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
   return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Barycentric coordinates of the triangle's point nearest to x: inside it, or on an edge; false
- * where it is farther than the square `best`, as the distances from its plane and from the lines of
- * its edges in the plane may tell. */
+/* Find the barycentric coordinates of the triangle's point nearest to x; false if a bound of its
+ * squared distance, by the plane or an edge's line, exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* of a triangle whose coordinates are not exact enough */
+  static const double slender = 1e-4; /* triangles with inexact coordinates */
   double u[3];
   double v[3];
   double w[3];
@@ -273,7 +271,8 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   }
   const double ww = supine_dot(w, w);
   const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu};             /* squared edges */
-  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw); /* of it in the plane */
+  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw); /* of the distance, in the
+                                                                        * plane */
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
     farther |= b[k] < 0.0 && b[k] * b[k] * determinant > rest * opposite[k];
@@ -305,7 +304,7 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   return true;
 }
 
-/* Square of the distance of two intervals, the point x and [low, high]. */
+/* Find the squared distance of the point x from the interval [low, high]. */
 static inline double gap_square(double low, double high, double x) {
   const double out = low - x > x - high ? low - x : x - high;
   const double apart = out > 0.0 ? out : 0.0;
@@ -320,7 +319,7 @@ static double box_square(const node *n, const double x[3]) {
   return square;
 }
 
-/* Those of a leaf's triangles. */
+/* Find the squared distances of the boxes of a leaf's triangles. */
 SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], double *square) {
   for (size_t i = 0; i < LEAF; ++i) {
     square[i] = gap_square((double)leaf->low[0][i], (double)leaf->high[0][i], x[0]) +
@@ -329,7 +328,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* The nearest triangle below node `at`, where it is nearer than the square *best. */
+/* Search below node `at` for a triangle nearer than the square *best. */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
@@ -382,7 +381,7 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
   }
 }
 
-/* Solid angle of a triangle, 4 pi all round. */
+/* Find the solid angle of a triangle, 4 pi for a whole sphere. */
 static double solid_angle(const double *const p[3], const double x[3]) {
   double a[3];
   double b[3];
@@ -399,7 +398,6 @@ static double solid_angle(const double *const p[3], const double x[3]) {
                                             supine_dot(b, c) * la + supine_dot(c, a) * lb);
 }
 
-/* Sum of solid angles below node `at`. */
 static double angle(const supine_inside_surface *s, size_t at, const double x[3]) {
   const node *n = &s->nodes[at];
   double apart[3];
@@ -425,7 +423,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* the surface is no farther than from there, and the way */
+  if (near != NULL) { /* bound: the distance from `near` plus the way to it */
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
@@ -468,7 +466,7 @@ supine_inside_place supine_inside_surface_find(const supine_inside_surface *surf
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
-                           ? near->depth > 0.0 /* no surface lies between */
+                           ? near->depth > 0.0 /* no surface lies between: the same side */
                            : angle(surface, 0, point) > half);
   place.depth = inside ? place.depth : -place.depth;
   return place;

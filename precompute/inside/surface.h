@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * Where a point stands to a surface: how deep inside, and nearest to which triangle. */
+/** @file Find how deep a point is inside a surface, and the nearest triangle. */
 #ifndef SUPINE_INSIDE_SURFACE_H
 #define SUPINE_INSIDE_SURFACE_H
 
@@ -13,16 +12,16 @@ typedef struct supine_inside_surface supine_inside_surface;
 
 /** The place of a point. */
 typedef struct supine_inside_place {
-  double point[3];       /**< mm */
+  double point[3];       /**< the point, mm */
   double depth;          /**< mm to the surface; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
-  size_t triangle;       /**< that it lies on */
-  double barycentric[3]; /**< in it */
+  size_t triangle;       /**< its triangle */
+  double barycentric[3]; /**< its coordinates in the triangle */
 } supine_inside_place;
 
-/** A tree of boxes over the triangles.
- * @param vertices   [., 3] mm, kept by the caller
- * @param triangles  [count, 3], 0 < count < 2^31, outwards; kept by the caller
+/** Build a tree of boxes over the triangles.
+ * @param vertices   [., 3] mm, must outlive the tree
+ * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles,
@@ -30,24 +29,23 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Finds the nearest point; depth is positive on both sides. Thread-safe.
- * @param near  the place of a point near by, which saves most of the work; NULL where none is known
- */
+/** Find the nearest point; depth is positive on both sides. Thread-safe.
+ * @param near  the place of a nearby point, to save work; NULL: none */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],
                                                   const supine_inside_place *near);
 
 /** Find the distance of each point [count, 3] to the surface, mm, into distance [count], and the
- * surface's nearest point into nearest [count, 3] where it is not NULL. Uses all cores. */
+ * surface's nearest point into nearest [count, 3] unless it is NULL. Uses all cores. */
 void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
                                      const double *points, double *distance, double *nearest);
 
-/** Finds the nearest point, and which side by the generalised winding number, 1 inside and 0
- * outside, so that small holes do no harm: inside where
+/** Find the nearest point, and the side by the generalised winding number, which tolerates small
+ * holes: inside if
  *
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
- * Boxes farther than twice their radius count as one dipole. Thread-safe.
+ * Boxes farther than twice their radius are approximated by a dipole. Thread-safe.
  * @param near  as above, from this function
  * Source: [Jacobson2013]; dipoles [Barill2018]. */
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,

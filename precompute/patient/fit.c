@@ -53,8 +53,6 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double w
   return law;
 }
 
-/* --- fits ------------------------------------------------------------------------------------ */
-
 /* Fit the law alone, the baseline of the correction, and the corrected law. */
 static supine_status fit_rows(const study *s, const supine_patient_row *rows, size_t count,
                               supine_patient_power *law, supine_patient_krige **krige,
@@ -161,8 +159,6 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
 static double root_mean(const study *s, double sum, double weight) {
   return weight > 0.0 ? sqrt(sum * (double)s->components / weight) : 0.0;
 }
-
-/* --- the whole fit --------------------------------------------------------------------------- */
 
 /* Score the maps without a law, fitted and held out. */
 static void score_maps(const study *s, squares *fitted, squares *held) {

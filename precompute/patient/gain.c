@@ -136,8 +136,6 @@ static double search(const problem *p) {
   return 0.5 * (low + high);
 }
 
-/* --- points ---------------------------------------------------------------------------------- */
-
 /* Find the range of heights along gravity over the corners of the frame. */
 static double frame_height(const supine_patient_frame *frame, const double gravity[3],
                            const supine_patient_place *place) {
@@ -316,8 +314,6 @@ void supine_patient_refer(const supine_patient *patient, size_t count, double *p
     memcpy(points + 3 * i, at, sizeof at);
   }
 }
-
-/* --- the whole fit --------------------------------------------------------------------------- */
 
 /* Alternate between fitting gain and scales, and finding the nearest points. */
 static supine_status settle(problem *p, supine_patient_gain *found, supine_error *error) {

@@ -89,7 +89,6 @@ static double spread_of(const supine_patient_krige_options *options, size_t term
                                                : 0.0;
 }
 
-/* Find a term's distance from its prior mean. */
 static double offset_of(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->options.mean;

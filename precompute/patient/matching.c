@@ -16,8 +16,7 @@
 enum { GRAIN = 64 };
 
 static const double compatible = 0.5;    /* cosine between normals: 60 degrees */
-static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficient for normal
-                                          * errors */
+static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficiency */
 static const double surface_noise = 0.5; /* mm along the normal */
 static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
 

@@ -14,9 +14,8 @@ enum { GRAIN = 64, SETTLE_STEPS = 60 };
 
 static const double settled = 1e-4; /* change in a step that ends the iteration, mm */
 
-/* Largest distance of the surface's box from the nearest state's over its width, and largest
- * relative difference of their sizes, of surfaces. Boxes of landmarks are estimates and may
- * differ more. */
+/* Largest distance of the surface's box from the nearest state's, over its width, and difference
+ * of their sizes. Boxes of landmarks are estimates and may differ more. */
 static const double apart_most[2] = {0.3, 0.15};
 static const double size_most[2] = {1.6, 1.25};
 
@@ -34,8 +33,8 @@ supine_force_law supine_patient_force(const supine_patient *patient, double gain
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = patient->powers + 3;
   /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
-   * lying on the side they run along x, in opposite directions of X in the two lungs, so no term
-   * of X represents them. */
+   * on the side they run along x, opposite in X in the two lungs, so no term of X represents
+   * them. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

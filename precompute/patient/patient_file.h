@@ -34,8 +34,7 @@ typedef struct supine_patient_record {
   size_t points;
   double held_out, held_out_baseline, fitted, explained; /**< mm RMS; explained: share */
   double expected_constant;            /**< mm: expected square error per mm of displacement */
-  double expected, band;               /**< held out: expected error, mm RMS; share within the 95
-                                        * % band */
+  double expected, band;               /**< held out: expected mm RMS; share in the 95 % band */
   supine_patient_stiffness stiffness;  /**< counts are 0: even tissue */
   supine_patient_expand_report expand; /**< written if it was tried; not read */
   supine_patient_applied applied;      /**< written if there are blocks; not read */
@@ -74,8 +73,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
 typedef struct supine_patient_field {
   const supine_patient_record *record; /**< owned by the caller; must outlive the field */
   double way[3];                       /**< share of full inflation to rest, by axis */
-  double *moved;                       /**< [N, 3] displacement to rest, mm, for a spread force
-                                        * of 1 */
+  double *moved;                       /**< [N, 3] mm to rest, for a spread force of 1 */
 } supine_patient_field;
 
 /** Find the displacement of every vertex between the two fitted states; free it afterwards.

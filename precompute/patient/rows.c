@@ -139,8 +139,7 @@ bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, con
   }
   const lapack_int size = translation ? 3 : N;
   for (size_t a = 0; a < N; ++a) {
-    matrix[a * N + a] += 1e-9 * trace; /* keeps the matrix regular where rows leave a term
-                                        * undetermined */
+    matrix[a * N + a] += 1e-9 * trace; /* regular where rows leave a term undetermined */
     map[a] = a < (size_t)size ? map[a] : 0.0;
   }
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, N, map, N) == 0;

@@ -7,8 +7,7 @@
 
 #include "sh/base/vec3.h"
 
-static const double apart = 35.0;      /* largest distance of a vertex from its nearest centre,
-                                        * mm */
+static const double apart = 35.0;      /* largest distance of a vertex from a centre, mm */
 static const double overlapping = 1.5; /* radius over that distance */
 
 enum { LOOKED_AT = 8192 }; /* most vertices considered as centres */

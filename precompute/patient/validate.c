@@ -37,9 +37,8 @@ static const double still = 0.05;
 /* A similarity with scale 1, not among the maps that are reported. */
 static const supine_patient_map rigid = SUPINE_PATIENT_MAP_COUNT;
 
-/* Rotation and scale from the cross moments: with K = U S V^T, R = U V^T, with the sign of the
- * last column of U changed if R would mirror; the scale is tr(S) over the spread, or 1 if that
- * is 0. */
+/* Rotation and scale from the cross moments K = U S V^T: R = U V^T, with the last column of U
+ * negated if R would mirror; the scale is tr(S) over the spread, or 1 if that is 0. */
 static bool similarity(double cross[9], double spread, double m[9]) {
   double s[3];
   double u[9];

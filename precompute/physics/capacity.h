@@ -26,7 +26,7 @@ typedef struct supine_person {
  * usual adults if the person is unknown, else twice the same value. */
 void supine_reference_capacity(const supine_person *person, double range[2]);
 
-/** Append the expected full volume in words: "expected 6500", "an adult's lungs hold 4573 to
+/** Append the expected full volume in words: "expected 6500", "an adult's 4573 to
  * 8525". */
 void supine_reference_compare(const supine_reference *reference, const supine_person *person,
                               char *text, size_t size);

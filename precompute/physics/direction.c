@@ -68,7 +68,7 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   case SUPINE_DIRECTION_VECTORS:
     if (law->vectors == NULL) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the model has no direction vectors: give --directions-file");
+                              "the model has no direction vectors: give --direction FILE");
     }
     for (size_t i = 0; i < 3 * n; ++i) {
       directions[i] = law->vectors[i];

@@ -137,7 +137,6 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
   return status;
 }
 
-/* Arguments of one solve. */
 typedef struct solve_pass {
   supine_equilibrium *eq;
   const double *force;           /* [N, lanes] */

@@ -160,7 +160,6 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Store the differences to the previous step. */
 static void remember(ascent *a) {
   double *images = a->images + a->begun % DEPTH * a->size;
   double *residuals = a->residuals + a->begun % DEPTH * a->size;
@@ -178,7 +177,6 @@ static void remember(ascent *a) {
   }
 }
 
-/* Move the lungs to the start of the next step. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
