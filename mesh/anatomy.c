@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Which of the 48 possible axes fit the shape of lungs best.
+/* Find which of the 48 possible axes fits the shape of lungs best.
  *
  * With the third moments of volume, m_abc = integral of a b c dV / (V sd_a sd_b sd_c) about the
- * centre, and x outwards from the midline, these sums were positive for all of nine lungs of five
- * people and two synthetic ones:
+ * centre, and x outwards from the midline, these sums were positive for all of nine lungs of
+ * five people and two synthetic ones:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
@@ -18,17 +18,17 @@
 
 #include "mesh/anatomy.h"
 
-/* Other axes must fit better by this much; the true ones led by 0.35 to 0.7. */
+/* Least margin by which other axes must fit better; the true ones led by 0.35 to 0.7. */
 static const double clearly = 0.2;
-/* Most that the ratio of volumes counts for, as a logarithm: a collapsed lung mirrors nothing. */
+/* Bound of the logarithm of the volumes' ratio, so that a collapsed lung does not decide. */
 static const double most_ratio = 0.25;
-/* A lung is the thinnest from side to side: 0.6 to 0.7 of its depth (standard deviations). */
+/* Largest ratio of a lung's standard deviations, side to side over depth: lungs have 0.6 to 0.7. */
 static const double thin = 0.85;
-/* Both lungs in one surface are the widest from side to side, and there flatter than a uniform
- * distribution (kurtosis 1.8). */
+/* Least ratio of width to depth of two lungs in one surface, whose distribution is flatter than
+ * uniform (kurtosis 1.8). */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* A single lung is called left or right where its concavity towards the heart is at least this. */
+/* Least concavity towards the heart that tells a single lung's side. */
 static const double least_side = 0.12;
 
 typedef struct shape {
@@ -36,7 +36,7 @@ typedef struct shape {
   double third[3][3][3];
 } shape;
 
-/* Adds w times the powers of point p, about an origin. */
+/* Add w times the monomials of point p about an origin. */
 static void add_point(const double p[3], double w, double sum[3], double square[3],
                       double third[3][3][3]) {
   for (int a = 0; a < 3; ++a) {
@@ -50,10 +50,10 @@ static void add_point(const double p[3], double w, double sum[3], double square[
   }
 }
 
-/* Mean of x^4 over a tetrahedron with one corner at x = 0: the sum of all products of four of the
- * other three corners' x, over 35. */
+/* Find the mean of x^4 over a tetrahedron with one corner at x = 0: the sum of all products of
+ * four of the other corners' x, over 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0; /* sums of products of n of a and b, and of a, b and c */
+  double ab = 1.0; /* complete sums of products of degree n of a and b, and of a, b and c */
   double abc = 1.0;
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
@@ -64,8 +64,8 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrates over the tetrahedra between `origin` and the triangles, exactly for cubics (Keast's
- * five points). Returns the signed volume. */
+/* Integrate over the tetrahedra between `origin` and the triangles, exactly for cubics (Keast's
+ * five points). Return the signed volume. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -102,7 +102,7 @@ static double integrate(const supine_mesh *mesh, const double origin[3], double 
   return volume;
 }
 
-/* Box of the corners of the triangles, which may be some of the vertices. */
+/* Find the box of the triangles' corners; other vertices are ignored. */
 static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
     low[k] = INFINITY;
@@ -117,7 +117,7 @@ static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   }
 }
 
-/* False where the surface encloses next to nothing. */
+/* Find the moments; false if the surface encloses almost nothing. */
 static bool measure(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
@@ -128,7 +128,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* the second about the centre of volume */
+  for (int pass = 0; pass < 2; ++pass) { /* the second pass is about the centre of volume */
     s->volume = integrate(mesh, s->centre, sum, square, s->third, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
@@ -150,7 +150,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   return isfinite(s->deviation[0]) && isfinite(s->deviation[1]) && isfinite(s->deviation[2]);
 }
 
-/* The moment m_abc in other axes: `from` and `sign` say which old coordinate each new one is. */
+/* Axes to test: the moment m_abc in them takes old coordinate `from`, times `sign`. */
 typedef struct view {
   int from[3];
   double sign[3];
@@ -182,7 +182,7 @@ static double upright(const shape *s, const view *v) {
          moment(s, v, 1, 1, 2);
 }
 
-/* How well axes fit; -INFINITY where they cannot be. */
+/* Score the fit of axes; -INFINITY if they are impossible. */
 static double fit_pair(const shape s[2], const view *v) {
   double apart[3];
   for (int k = 0; k < 3; ++k) {
@@ -202,7 +202,7 @@ static double fit_pair(const shape s[2], const view *v) {
 static double fit_single(const shape *s, const view *v, bool mirrored) {
   const double x = s->deviation[v->from[0]];
   const bool can = x <= thin * s->deviation[v->from[1]] && x <= thin * s->deviation[v->from[2]];
-  /* which of two mirror images a single lung is cannot be told: the coordinates are believed */
+  /* a single lung and its mirror image are indistinguishable: trust the coordinates */
   return can && !mirrored ? fabs(hollow(s, v)) + upright(s, v) : -INFINITY;
 }
 

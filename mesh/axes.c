@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The 48 ways in which a file's coordinates can lie along the patient's axes. */
+/* The 48 ways to assign a file's coordinates to the patient's axes. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 enum { CODES = 48, SIGNS = 8 };
 
-/* The patient axis (0 left-right, 1 front-back, 2 feet-head) of each coordinate. */
+/* Patient axis (0 left-right, 1 front-back, 2 feet-head) of each coordinate. */
 static const unsigned char orders[CODES / SIGNS][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
                                                        {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
 
@@ -23,7 +23,7 @@ void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]) {
   double matrix[3][3];
   const double from[3] = {point[0], point[1], point[2]};
   supine_mesh_axes_matrix(axes, matrix);
-  for (int k = 0; k < 3; ++k) { /* the products with 0 are exact; + 0: no -0 */
+  for (int k = 0; k < 3; ++k) { /* products with 0 are exact; + 0 turns -0 into 0 */
     point[k] =
         scale * (matrix[k][0] * from[0] + matrix[k][1] * from[1] + matrix[k][2] * from[2]) + 0.0;
   }

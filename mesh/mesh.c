@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A surface in memory. */
+/* Create, copy and free a surface. */
 #include <stdlib.h>
 
 #include "mesh/mesh.h"

@@ -13,29 +13,29 @@
 
 #include <supine/status.h>
 
-/** The axes that a file's coordinates are in: any of the 48 ways to name them by three letters,
- * each saying which way a coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior),
- * as Slicer and nibabel do. Those without a name here come from supine_mesh_axes_parse. */
+/** Axes of a file's coordinates: any of the 48 choices of three letters, each the direction in
+ * which a coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer
+ * and nibabel. supine_mesh_axes_parse gives those without a name here. */
 typedef enum supine_axes {
-  SUPINE_AXES_AUTO = 0, /**< the file's SPACE tag, LPS where it has none */
+  SUPINE_AXES_AUTO = 0, /**< by the file's SPACE tag; LPS without one */
   SUPINE_AXES_LPS = 1,
   SUPINE_AXES_RAS = 4,
   SUPINE_AXES_COUNT = 49
 } supine_axes;
 
-/** Reads three letters, as "RAI"; false for anything else. */
+/** Parse three letters, such as "RAI"; false for anything else. */
 bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
 void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
-/** The signed permutation that takes coordinates in these axes to LPS; AUTO is LPS. */
+/** Find the signed permutation from these axes to LPS; AUTO is LPS. */
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
-/** Takes a point or vector to LPS, times `scale`. */
+/** Convert a point or vector to LPS, times `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
-/** The axes whose matrix is that of `then` times that of `first`. */
+/** Find the axes whose matrix is that of `then` times that of `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** True where the axes are left-handed: triangles read in them are inside out. */
+/** Report whether the axes are left-handed, so that triangles read in them face inwards. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
-/** A triangle surface. Zero-initialise; supine_mesh_free releases what load or make put there. */
+/** A triangle surface. Zero-initialise; release with supine_mesh_free. */
 typedef struct supine_mesh {
   size_t vertex_count;
   double *vertices; /**< [vertex_count, 3] mm, LPS */
@@ -43,55 +43,55 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. Zero-initialised means: axes and millimetres as the file says. */
+/** How to read a file. Zero-initialised: axes as the file says, 1 mm a unit. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< scale to mm; 0: 1 */
 } supine_mesh_load_options;
 
-/** What loading found and did. */
+/** Result of loading. */
 typedef struct supine_mesh_report {
-  size_t file_vertices;         /**< vertices as the importer gave them */
-  size_t file_faces;            /**< faces as the importer gave them, polygons cut to triangles */
-  size_t welded_vertices;       /**< vertices that joined an earlier one at the same position */
-  size_t degenerate_faces;      /**< faces dropped: two corners at one vertex, or not a triangle */
-  size_t unreferenced_vertices; /**< vertices dropped: no triangle names them */
-  supine_axes axes;             /**< axes that were assumed for the file */
-  bool axes_from_tag;           /**< the file said so itself, with a SPACE tag */
+  size_t file_vertices;         /**< vertices in the file */
+  size_t file_faces;            /**< faces in the file, polygons as triangles */
+  size_t welded_vertices;       /**< vertices merged with an earlier one at the same position */
+  size_t degenerate_faces;      /**< faces dropped: repeated corners, or not a polygon */
+  size_t unreferenced_vertices; /**< vertices dropped: in no triangle */
+  supine_axes axes;             /**< axes assumed for the file */
+  bool axes_from_tag;           /**< the axes come from a SPACE tag */
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
-  double odd_side;              /**< longest side, mm, where no lungs are of that size; else 0 */
-  const char *likely_unit; /**< then "mm", "cm", "m", "um" or "in", a literal, if that unit in place
-                                of the one assumed would make it lungs; else NULL */
+  double odd_side;              /**< longest side, mm, if no lungs have that size; else 0 */
+  const char *likely_unit;      /**< "mm", "cm", "m", "um" or "in", a literal: the unit in which an
+                                 * odd file would hold lungs; else NULL */
 } supine_mesh_report;
 
-/** Reads one surface: PLY and STL directly, all else that assimp reads through it. Polygons
- * are cut into triangles, all nodes of a scene are joined, vertices at the same position are welded
- * in order of first appearance.
+/** Read one surface: PLY, STL and VTP directly, other formats through assimp. Polygons are cut
+ * into triangles, all nodes of a scene are joined, vertices at the same position are welded in
+ * order of first appearance.
  *
- * Files are held to their own counts, so that a truncated or hostile one is refused. assimp runs in
- * a process of its own, so that a file on which an importer crashes or runs wild is refused too.
- * Positions are rounded to float32. A name without a known ending is read as PLY or STL where
- * it begins with that word.
+ * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp
+ * runs in its own process, so files on which an importer crashes or exceeds its limits are
+ * refused too. Positions are rounded to float32. A name without a known ending is read as PLY or
+ * STL if it begins with that word.
  *
  * @param path     file
  * @param options  NULL: defaults
- * @param mesh     zero-initialised; written on success alone
+ * @param mesh     zero-initialised; written only on success
  * @param report   optional
  * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
  * @retval SUPINE_ERROR_FORMAT  empty, truncated or malformed, or no importer for it
  * @retval SUPINE_ERROR_MESH    no triangles, a coordinate that is not finite (vertex named)
  * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit negative or not finite
  * @retval SUPINE_ERROR_MEMORY
- * Thread-safe: several files can be under way at once. */
+ * Thread-safe. */
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** `side` where no lungs have a box with that longest side, mm, else 0. `likely`: the unit, among
- * those that loading is told by name, in which the file would hold lungs, or NULL.
- * @param millimetres  per unit, that `side` was scaled by */
+/** Return `side` if no lungs have a box with that longest side, mm, else 0. `likely`: the named
+ * unit in which the file would hold lungs, or NULL.
+ * @param millimetres  per unit, used to scale `side` */
 double supine_mesh_unit_check(double side, double millimetres, const char **likely);
 
-/** Frees the arrays and zeroes the struct; a zeroed struct is legal. */
+/** Free the arrays and zero the struct; a zeroed struct is legal. */
 void supine_mesh_free(supine_mesh *mesh);
 
 /** The edges and vertex adjacency of a mesh. */
@@ -102,50 +102,51 @@ typedef struct supine_topology {
   size_t non_manifold_edges; /**< edges of three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< connected components, over shared vertices */
-  uint32_t *component;       /**< [vertex_count] component of each vertex, 0 the first to appear */
+  uint32_t *component;       /**< [vertex_count] component of each vertex, numbered by first
+                              * appearance */
   long euler_characteristic; /**< V - E + F */
-  long genus;  /**< (2 * components - euler_characteristic) / 2 where closed, else -1; -1 also where
-                    parts touch in single vertices so that this is no whole number >= 0 */
+  long genus;  /**< (2 * components - euler_characteristic) / 2 of a closed surface, else -1;
+                * also -1 if touching parts give no whole number >= 0 */
   bool closed; /**< every edge joins exactly two triangles, consistently */
 } supine_topology;
 
-/** Finds edges and components. Linear in time and memory but for the sort of a vertex's edges.
- * @param topology  zero-initialised; written on success alone
- * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or one that is not there (load
- *                                gives no such mesh), or more than 2^31 - 1 vertices
+/** Find edges and components, in linear time and memory except for sorting each vertex's edges.
+ * @param topology  zero-initialised; written only on success
+ * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or one out of range, or more
+ *   than 2^31 - 1 vertices
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
-/** Enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed, positive where
- * the triangles face outwards; meaningful on closed surfaces alone; 0 where there is nothing. */
+/** Compute the enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed,
+ * positive if the triangles face outwards; meaningful only for closed surfaces; 0 if empty. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Axis-aligned box, mm; zeros where there is no vertex. */
+/** Find the axis-aligned box, mm; zeros without vertices. */
 void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
-/** One third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
+/** Find one third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
-/** Outward unit normals [vertex_count, 3]: the triangles' at each vertex, weighted by their areas;
- * 0 where they have none. */
+/** Find outward unit normals [vertex_count, 3], the area-weighted mean of the triangles' at each
+ * vertex; 0 if undefined. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
-/** Share, 0 to 1, of the triangles whose normal turns by more than a right angle where the vertices
- * move to `vertices` [vertex_count, 3]: more than a few in a thousand, and the surface looks torn.
- */
+/** Find the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
+ * vertices move to `vertices` [vertex_count, 3]: above a few in a thousand the surface looks
+ * torn. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
 /** Numbers of a whole surface, for VTP's field data. */
 typedef struct supine_mesh_field {
-  const char *name; /**< with its unit: "volume_mL" */
+  const char *name; /**< including its unit: "volume_mL" */
   size_t count;
-  const double *values; /**< [frames, count]; frames: 1 but in a series */
+  const double *values; /**< [frames, count]; frames: 1 except in a series */
 } supine_mesh_field;
 
-/** What goes into a file beside the surface itself. */
+/** Optional content of a file. */
 typedef struct supine_mesh_save_options {
-  supine_axes axes;    /**< of the file; AUTO: LPS. Written as its SPACE tag */
+  supine_axes axes;    /**< of the file, written as its SPACE tag; AUTO: LPS */
   const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
                             vector and its magnitude as point data */
   const char *comment; /**< optional, one line */
@@ -162,52 +163,52 @@ typedef struct supine_mesh_save_options {
   /** @} */
 } supine_mesh_save_options;
 
-/** Writes the surface as the name's ending says: .ply (binary), .obj, .stl (binary), .vtp.
- * The file appears whole or not at all: written to a temporary name beside it, then renamed.
+/** Write the surface in the format of the name's ending: .ply (binary), .obj, .stl (binary),
+ * .vtp. The file appears whole or not at all: written to a temporary name beside it, then
+ * renamed.
  * @param options  NULL: LPS, no displacement, no comment
- * @retval SUPINE_ERROR_ARGUMENT  an ending that is none of these, or too large for the formats
+ * @retval SUPINE_ERROR_ARGUMENT  another ending, or too large for the formats
  * @retval SUPINE_ERROR_MESH      a coordinate that is not finite (vertex named)
  * @retval SUPINE_ERROR_WRITE     no such folder, no permission, full disk */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
-/** Surfaces of one topology over time in one VTP file, as VTK's and ParaView's readers of it know
- * time: triangles once, every array compressed, displacements without their magnitude. Their time
- * is the frame's number; seconds and the fields are tables of all frames, "time_s" and as named.
- * The file appears whole or not at all. */
+/** Surfaces of one topology over time in one VTP file, in the form of time that VTK and ParaView
+ * read: triangles once, every array compressed, displacements without their magnitude. Their
+ * time is the frame's number; seconds and the fields are tables of all frames, "time_s" and as
+ * named. The file appears whole or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 
-/** Begins one. Everything given must stay until commit; before each frame the caller changes what
- * `mesh->vertices` and `options->normals` point to.
- * @param times  [frames] s
- * Statuses as supine_mesh_save, and
- * @retval SUPINE_ERROR_WRITE  the path is a pipe or device: where arrays lie is written last
+/** Begin a series. All arguments must outlive it; before each frame the caller updates the
+ * arrays of `mesh->vertices` and `options->normals`.
+ * @param times  [frames] s Statuses as supine_mesh_save, and
+ * @retval SUPINE_ERROR_WRITE  the path is a pipe or device: offsets are written last
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error);
-/** Adds the next frame. Statuses as supine_mesh_save. */
+/** Add the next frame. Statuses as supine_mesh_save. */
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Gives the file its name, after all frames. Statuses as supine_mesh_save. */
+/** Give the file its name, after all frames. Statuses as supine_mesh_save. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
-/** Releases; what was not committed is gone. NULL is legal. */
+/** Free a series, and drop it if it was not committed. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
 
-/** Name a unit of length: "mm", "cm", "m", "um", "in" or, of any other, "2.5 mm".
+/** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
  * @param text  [24], written */
 void supine_mesh_unit_name(double millimetres, char *text);
 
-/** The formats that supine_mesh_save writes, by their endings; each is supine_mesh_save_NAME in
+/** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in
  * mesh/io. This is the only list of them. */
 #define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)
 
-/** Their endings in words. */
+/** List the endings in words. */
 #define SUPINE_MESH_ENDINGS SUPINE_MESH_FORMATS(SUPINE_MESH_ENDING, SUPINE_MESH_NEXT_ENDING)
 #define SUPINE_MESH_ENDING(name) "." #name
 #define SUPINE_MESH_NEXT_ENDING(name) ", ." #name
 
-/** True where `path` has one of those endings. */
+/** Report whether `path` has one of those endings. */
 bool supine_mesh_save_supports(const char *path);
 
 #endif

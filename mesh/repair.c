@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Small defects of surfaces: triangles given twice, faces too many, reversed triangles, surfaces
- * that touch. */
+/* Repair small defects of surfaces: duplicate, loose and reversed triangles, touching surfaces. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +7,7 @@
 
 #include "mesh/repair.h"
 
-/* Loose triangles are dropped where they are at most this share. */
+/* Largest share of loose triangles that is dropped. */
 static const double few = 0.01;
 
 /* One side of a triangle. */
@@ -18,8 +17,8 @@ typedef struct side {
 } side;
 
 typedef struct links {
-  uint32_t *parent; /* of each triangle */
-  uint8_t *turned;  /* against its parent */
+  uint32_t *parent; /* [triangles] */
+  uint8_t *turned;  /* faces against its parent */
 } links;
 
 static int compare_sides(const void *left, const void *right) {
@@ -29,7 +28,7 @@ static int compare_sides(const void *left, const void *right) {
                           : (a->high > b->high) - (a->high < b->high);
 }
 
-/* Sides by edge; NULL without memory. */
+/* Sort the sides by edge; NULL if out of memory. */
 static side *sort_sides(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
   uint32_t *first = calloc(mesh->vertex_count + 2, sizeof *first);
@@ -39,7 +38,7 @@ static side *sort_sides(const supine_mesh *mesh) {
     free(sides);
     return NULL;
   }
-  for (int pass = 0; pass < 2; ++pass) { /* counts, then places */
+  for (int pass = 0; pass < 2; ++pass) { /* count, then place */
     for (size_t i = 0; i < count; ++i) {
       const uint32_t a = mesh->triangles[i];
       const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
@@ -54,7 +53,7 @@ static side *sort_sides(const supine_mesh *mesh) {
       first[v + 1] += first[v];
     }
   }
-  for (size_t i = 0; i < count;) { /* each vertex's few by the other end */
+  for (size_t i = 0; i < count;) { /* sort each vertex's sides by the other end */
     size_t end = i + 1;
     while (end < count && sides[end].low == sides[i].low) {
       ++end;
@@ -66,7 +65,7 @@ static side *sort_sides(const supine_mesh *mesh) {
   return sides;
 }
 
-/* Sides of the edge that begins at i. */
+/* Count the sides of the edge that begins at i. */
 static size_t edge_size(const side *sides, size_t i, size_t count) {
   size_t size = 1;
   while (i + size < count && compare_sides(&sides[i], &sides[i + size]) == 0) {
@@ -79,7 +78,7 @@ static uint32_t opposite(const supine_mesh *mesh, const side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
 
-/* Marks triangles whose three corners an earlier one has. */
+/* Mark triangles with the same three corners as an earlier one. */
 static void mark_duplicates(const supine_mesh *mesh, const side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   for (size_t i = 0; i < count; i += edge_size(sides, i, count)) {
@@ -95,7 +94,7 @@ static void mark_duplicates(const supine_mesh *mesh, const side *sides, uint8_t 
   }
 }
 
-/* Marks faces that hang on by nothing that they share with one other: no edge of two triangles. */
+/* Mark faces that share no edge with exactly one other face. */
 static void mark_loose(const supine_mesh *mesh, const side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -108,12 +107,12 @@ static void mark_loose(const supine_mesh *mesh, const side *sides, uint8_t *drop
     }
   }
   if ((double)loose >
-      few * (double)mesh->triangle_count) { /* triangles that nothing joins, not faces too many */
+      few * (double)mesh->triangle_count) { /* unconnected triangles are no defect of a surface */
     memset(drop, 0, mesh->triangle_count);
   }
 }
 
-/* Drops marked triangles; how many. */
+/* Drop marked triangles; return how many. */
 static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   size_t kept = 0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
@@ -126,7 +125,7 @@ static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   return dropped;
 }
 
-/* The first triangle of t's surface; `turned` says whether t faces the other way. */
+/* Find the first triangle of t's surface; `turned` says whether t faces against it. */
 static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   uint8_t sum = 0;
   uint32_t root = t;
@@ -135,7 +134,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* shortens the way for the next time */
+  while (l->parent[t] != root && t != root) { /* path compression */
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;
@@ -146,7 +145,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   return root;
 }
 
-/* Links the triangles over edges of two; false where they form a one-sided surface. */
+/* Link triangles over edges of two; false if they form a one-sided surface. */
 static bool link_triangles(const supine_mesh *mesh, const side *sides, const links *l,
                            bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
@@ -179,7 +178,8 @@ static bool link_triangles(const supine_mesh *mesh, const side *sides, const lin
   return sound;
 }
 
-/* Turns the fewer of each surface's triangles. @param count  [triangles, 2] space of zeros */
+/* Reverse the minority of each surface's triangles.
+ * @param count  [triangles, 2] zeros, used as work space */
 static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)[2]) {
   size_t reversed = 0;
   uint8_t turned;
@@ -200,7 +200,7 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
   return reversed;
 }
 
-/* Gives each surface vertices of its own where several meet in one. */
+/* Give each surface its own vertices where several meet in one. */
 static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *parted) {
   const size_t corners = 3 * mesh->triangle_count;
   uint32_t *owner = malloc((mesh->vertex_count + 1) * sizeof *owner);
@@ -256,7 +256,7 @@ static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *pa
   return status;
 }
 
-/* Turns and parts what is linked. */
+/* Reverse and separate linked triangles. */
 static supine_status mend_links(supine_mesh *mesh, const side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;
@@ -304,7 +304,7 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
   return status;
 }
 
-/* The volume of each piece, mm^3, about its own first vertex; without a sign. */
+/* Find the absolute volume of each piece, mm^3, about its own first vertex. */
 static double *piece_volumes(const supine_mesh *mesh, const supine_topology *topology) {
   const size_t pieces = topology->component_count;
   double *volume = calloc(pieces + 1, sizeof *volume);
@@ -333,7 +333,7 @@ static double *piece_volumes(const supine_mesh *mesh, const supine_topology *top
   return volume;
 }
 
-/* Keeps the vertices and triangles of the pieces that are `kept`, in their order. */
+/* Keep the vertices and triangles of the pieces in `kept`, in order. */
 static supine_status keep_pieces(supine_mesh *mesh, const supine_topology *topology,
                                  const bool *kept) {
   uint32_t *place = malloc((mesh->vertex_count + 1) * sizeof *place);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Edges, found by sorting the triangles' sides; components, by joining the ends of the edges. */
+/* Find edges by sorting the triangles' sides, and components by joining their ends. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "mesh/mesh.h"
 
-enum { FEW = 24 }; /* sides that insertion sorts faster than qsort */
+enum { FEW = 24 }; /* most sides that insertion sort sorts faster than qsort */
 
-/* The triangles' sides, sorted: those whose lower end is a stand at first[a] <= s < first[a + 1],
- * each as 2 * (higher end) + (1 where the triangle runs from the higher end to the lower). */
+/* The triangles' sides, sorted: those with lower end a are at first[a] <= s < first[a + 1], each
+ * as 2 * (higher end) + (1 if the triangle runs from the higher end to the lower). */
 typedef struct side_table {
   uint32_t *first; /* [vertex_count + 2] */
   uint32_t *sides; /* [3 * triangle_count] */
@@ -35,10 +35,11 @@ static void sort_sides(uint32_t *sides, size_t count) {
   }
 }
 
-/* Counting sort by the lower end, then each vertex's few sides by the higher. */
+/* Sort by the lower end with a counting sort, then each vertex's sides by the higher. */
 static void sides_fill(const supine_mesh *mesh, const side_table *table) {
   const size_t triangles = mesh->triangle_count;
-  uint32_t *next = table->first + 1; /* next[a] grows from where a's sides begin to their end */
+  uint32_t *next = table->first + 1; /* next[a] moves from the beginning of a's sides to their
+                                      * end */
   for (size_t t = 0; t < triangles; ++t) {
     const uint32_t *v = mesh->triangles + 3 * t;
     for (int k = 0; k < 3; ++k) {
@@ -67,7 +68,7 @@ static void sides_fill(const supine_mesh *mesh, const side_table *table) {
   }
 }
 
-/* Sides from s on that belong to one edge. */
+/* Count the sides from s on that belong to one edge. */
 static size_t edge_sides(const side_table *table, size_t s, size_t stop) {
   size_t count = 1;
   while (s + count < stop && table->sides[s + count] / 2 == table->sides[s] / 2) {
@@ -101,7 +102,7 @@ static void edges_fill(const supine_mesh *mesh, const side_table *table, uint32_
   }
 }
 
-/* The first vertex of i's tree; shortens the way there. */
+/* Find the first vertex of i's tree, with path compression. */
 static uint32_t tree_root(uint32_t *parent, uint32_t i) {
   while (parent[i] != i) {
     parent[i] = parent[parent[i]];
@@ -120,8 +121,8 @@ static void components_find(size_t vertex_count, supine_topology *topology) {
     const uint32_t b = tree_root(parent, topology->edges[2 * e + 1]);
     parent[a > b ? a : b] = a < b ? a : b;
   }
-  /* A root comes before all of its tree, and a parent before its children: one pass numbers all,
-   * a vertex taking the number that its parent has by then. */
+  /* Roots and parents precede their vertices, so one pass numbers all: a vertex takes its
+   * parent's number. */
   for (size_t i = 0; i < vertex_count; ++i) {
     parent[i] = parent[i] == i ? (uint32_t)topology->component_count++ : parent[parent[i]];
   }

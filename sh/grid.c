@@ -8,8 +8,8 @@
 
 #include "sh/grid.h"
 
-/* GSL tabulates some sizes and computes the others to about 1e-11. One Newton step on P_n takes
- * those to rounding: quadratic convergence leaves 1e-22. work: [2 (n + 1)]
+/* GSL tabulates some sizes and computes the others to about 1e-11. One Newton step on P_n makes
+ * those exact to rounding: its error is 1e-22. work: [2 (n + 1)]
  *
  *     w = 2 / ((1 - z^2) P_n'(z)^2) */
 static void refine(supine_sh_grid *grid, double *work) {
@@ -59,7 +59,7 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   status = SUPINE_OK;
 
 cleanup:
-  if (table != NULL) { /* GSL 2.7 does not take NULL here */
+  if (table != NULL) { /* GSL 2.7 does not accept NULL */
     gsl_integration_glfixed_table_free(table);
   }
   free(work);

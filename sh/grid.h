@@ -8,7 +8,7 @@
 
 #include <supine/status.h>
 
-/** The most latitudes or longitudes of a rule. */
+/** Most latitudes or longitudes of a rule. */
 #define SUPINE_SH_GRID_MAX 16384
 
 /** A rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) = z[j] and
@@ -20,18 +20,17 @@ typedef struct supine_sh_grid {
   double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
 } supine_sh_grid;
 
-/** Makes the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
- * each). It integrates products of two functions of band L exactly where latitudes > L and
+/** Create the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
+ * each). It integrates products of two functions of band L exactly if latitudes > L and
  * longitudes > 2 L.
  * @retval SUPINE_ERROR_ARGUMENT  a number out of range
- * @retval SUPINE_ERROR_MEMORY    (GSL's error handler is called first if it is GSL that lacks it)
- */
+ * @retval SUPINE_ERROR_MEMORY    (if GSL runs out, after its error handler) */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
-/** Frees a rule; NULL is legal. */
+/** Free a rule; NULL is legal. */
 void supine_sh_grid_destroy(supine_sh_grid *grid);
 
-/** Unit direction (j, k). */
+/** Compute unit direction (j, k). */
 void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]);
 
 #endif

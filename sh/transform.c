@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fields on a grid of directions to coefficients: FFTW along longitude, Legendre functions along
- * latitude. */
+/* Transform fields on a grid of directions to coefficients: FFTW along longitude, Legendre
+ * functions along latitude. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -15,12 +15,12 @@
 struct supine_sh_transform {
   size_t band, fields;
   const supine_sh_grid *grid;
-  double *legendre;       /* one latitude's, in GSL's order */
+  double *legendre;       /* of one latitude, in GSL's order */
   fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] */
   fftw_plan fft;
 };
 
-/* FFTW_ESTIMATE plans in microseconds, and the same every time. */
+/* FFTW_ESTIMATE makes the same plan every time, in microseconds. */
 static fftw_plan plan_fft(supine_sh_transform *plan) {
   const int longitudes = (int)plan->grid->longitudes;
   const int fields = (int)plan->fields;
@@ -39,11 +39,11 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
                                          supine_sh_transform **plan, supine_error *error) {
   *plan = NULL;
   if (band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || grid->longitudes <= 2 * band) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid of %zu x %zu directions cannot carry band %zu: more than %zu "
-                            "latitudes and %zu longitudes are needed, and bands end at %d",
-                            grid->latitudes, grid->longitudes, band, band, 2 * band,
-                            SUPINE_SH_BAND_MAX);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "a grid of %zu x %zu directions cannot represent band %zu: more than %zu latitudes and %zu "
+        "longitudes are needed, and the highest band is %d",
+        grid->latitudes, grid->longitudes, band, band, 2 * band, SUPINE_SH_BAND_MAX);
   }
   supine_sh_transform *made = calloc(1, sizeof *made);
   if (made != NULL) {

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * The spherical-harmonic transform of some real fields at once, in double precision.
+/** @file The spherical-harmonic transform of several real fields at once, in double precision.
  *
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)
  *
- * by the grid's quadrature: exact to rounding for fields of the plan's band; of others, what lies
- * beyond the band folds back. A field never mixes with its neighbours. */
+ * by the grid's quadrature: exact to rounding for fields of the plan's band; in others, higher
+ * bands alias into it. Fields do not mix. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -14,14 +13,14 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** A plan for one band, one grid and a number of fields; for one thread at a time. Plans are made
- * and destroyed by one thread at a time (FFTW's planner). */
+/** A plan for one band, one grid and a number of fields, for one thread at a time. Only one
+ * thread at a time may create or destroy plans (FFTW's planner). */
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Make a plan.
  * @param band  0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
- * @param grid  kept by the plan: it must outlive it
- * @param fields  above 0
+ * @param grid  must outlive the plan
+ * @param fields  at least 1
  * @retval SUPINE_ERROR_ARGUMENT  band too high, or a grid too small for it
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
@@ -30,10 +29,9 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
 /** Free a plan; NULL is legal. */
 void supine_sh_transform_destroy(supine_sh_transform *plan);
 
-/** Add latitude j's part of the transform to the coefficients, so that a caller who makes one ring
- * of the grid at a time never holds the whole. Zero the coefficients first; the rings may come in
- * any order, each once.
- * @param ring          values at latitude j alone, [longitudes, fields]
+/** Add latitude j's part of the transform to the coefficients, so that a caller can make one
+ * ring of the grid at a time. Zero the coefficients first; add each ring once, in any order.
+ * @param ring          values at latitude j, [longitudes, fields]
  * @param coefficients  [fields, (band + 1)^2] */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether a compressed stream is whole: readers of voxels stop where they have enough. */
+/* Check that a compressed stream is complete: readers of voxels stop when they have enough. */
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -26,11 +26,11 @@ supine_status supine_image_check_gzip(const char *path, long offset, supine_erro
   do {
     count = gzread(file, piece, PIECE);
   } while (count > 0);
-  const int closed = gzclose(file); /* Z_BUF_ERROR where the stream ends early */
+  const int closed = gzclose(file); /* Z_BUF_ERROR if the stream ends early */
   return count == 0 && closed == Z_OK
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: damaged: its compressed data or their checksum are wrong; "
-                                "fetch or write the file anew",
+                                "fetch or write the file again",
                                 path);
 }

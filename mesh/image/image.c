@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* An image in memory: voxels as numbers, places as voxels. */
+/* An image in memory: voxels as numbers, positions in voxels and mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -63,7 +63,7 @@ SUPINE_CLONES void supine_image_gather(const supine_image *image, size_t from, c
 
 static double clip(double value, double low, double high) {
   const double whole = rint(value);
-  return whole > low ? (whole < high ? whole : high) : low; /* low where it is not a number */
+  return whole > low ? (whole < high ? whole : high) : low; /* low if it is not a number */
 }
 
 #define PUT(type, number)                                                                          \

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Images in files: which format a name asks for, and what is checked of all. */
+/* Choose an image's format by its name, and check what all formats share. */
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 
 #include "mesh/image/formats.h"
 
-/* Endings, and who reads and writes them. */
+/* Endings, with their readers and writers. */
 static const struct {
   const char *ending;
   supine_status (*read)(const char *path, size_t file_size, supine_image *image,
@@ -24,7 +24,7 @@ static const struct {
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-/* FORMATS where it is none. */
+/* Find the format; FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
   while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
@@ -46,8 +46,8 @@ bool supine_image_is_named(const char *path) {
   return is;
 }
 
-/* Finite, and three directions? A voxel's edges are no closer than a thousandth of a right angle.
- */
+/* Report whether the frame is finite and its three directions are independent: edges at least a
+ * thousandth of a right angle apart. */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
   for (int a = 0; a < 3; ++a) {
@@ -65,11 +65,10 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   struct stat file = {0};
   supine_image read = {.channels = 1};
   if (!supine_image_supports(path)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; others are "
-        "to be converted, as by 3D Slicer or 'plastimatch convert'",
-        path);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
+                            "others, as by 3D Slicer or 'plastimatch convert'",
+                            path);
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
@@ -78,7 +77,7 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   supine_status status = formats[format_of(path)].read(path, (size_t)file.st_size, &read, error);
   if (status == SUPINE_OK && !is_frame(&read)) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: the header's directions are no three axes", path);
+                              "%s: the header's directions are not three independent axes", path);
   }
   if (status != SUPINE_OK) {
     supine_image_free(&read);

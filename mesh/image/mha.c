@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* MetaImage with its voxels in the same file (.mha), as ITK, elastix and plastimatch have it: lines
- * "Key = value", the last of which is ElementDataFile, then the voxels. Its axes are LPS. */
+/* MetaImage with its voxels in the same file (.mha), as ITK, elastix and plastimatch write it:
+ * lines "Key = value", the last of which is ElementDataFile, then the voxels. Its axes are LPS. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@
 
 enum { HEADER_MAX = 1 << 16 };
 
-/* MET_LONG is of 4 bytes in MetaIO, whatever the machine. */
+/* MetaIO's MET_LONG has 4 bytes on every machine. */
 static const struct {
   const char *name;
   supine_image_voxel voxel;
@@ -41,7 +41,7 @@ static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Reads up to `most` numbers; how many. */
+/* Parse up to `most` numbers; return how many. */
 static size_t numbers(const char *text, double *values, size_t most) {
   size_t count = 0;
   for (char *end; count < most; text = end) {
@@ -54,7 +54,7 @@ static size_t numbers(const char *text, double *values, size_t most) {
   return count;
 }
 
-/* One line, ended by NUL; false where a list is too short. */
+/* Parse one line, ended by NUL; false if a list is too short. */
 static bool take_line(char *key, char *value, header *h) {
   const struct {
     const char *key;
@@ -94,7 +94,7 @@ static bool take_line(char *key, char *value, header *h) {
   return true;
 }
 
-/* Reads the lines of `text`, which is cut up; NULL, or what is wrong. */
+/* Parse the lines of `text`, which is modified; return NULL or the error. */
 static const char *read_header(char *text, header *h) {
   *h = (header){.spacing = {1.0, 1.0, 1.0, 1.0}, .channels = 1.0, .binary = true, .is_image = true};
   for (char *line = text; !h->ended;) {
@@ -120,16 +120,16 @@ static const char *read_header(char *text, header *h) {
     line = end + 1;
     h->length = (size_t)(line - text);
   }
-  return !h->is_image          ? "it is no image"
+  return !h->is_image          ? "it is not an image"
          : !h->is_local        ? "the voxels are in another file; save them in one (.mha)"
          : !h->binary          ? "voxels as text are not read"
          : h->dimensions < 3.0 ? "its header does not say NDims = 3"
-         : h->dimensions == 4.0 && h->size[3] != 1.0 ? "several volumes; one is wanted"
-         : h->channels != 1.0                        ? "several numbers a voxel; one is wanted"
+         : h->dimensions == 4.0 && h->size[3] != 1.0 ? "several volumes; give one"
+         : h->channels != 1.0                        ? "several numbers per voxel; give one"
                                                      : NULL;
 }
 
-/* Size, frame and type; NULL, or what is wrong. */
+/* Find size, frame and type; return NULL or the error. */
 static const char *describe(const header *h, size_t file_size, supine_image *image, bool *wide) {
   size_t type = 0;
   while (type < TYPES && (h->type == NULL || strcmp(h->type, types[type].name) != 0)) {
@@ -146,7 +146,7 @@ static const char *describe(const header *h, size_t file_size, supine_image *ima
   image->frame_source = "TransformMatrix";
   for (size_t a = 0; a < 3; ++a) {
     if (!(h->size[a] >= 1.0 && h->size[a] <= 1e6) || h->size[a] != (double)(size_t)h->size[a]) {
-      return "its DimSize is no size";
+      return "its DimSize is invalid";
     }
     image->size[a] = (size_t)h->size[a];
     image->origin[a] = h->offset[a];
@@ -155,7 +155,7 @@ static const char *describe(const header *h, size_t file_size, supine_image *ima
       framed = framed || h->matrix[a * n + k] != 0.0;
     }
   }
-  for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix: along the axes */
+  for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix the axes are those of LPS */
     image->step[a][a] = h->spacing[a];
   }
   return supine_image_bytes(image, file_size) == 0 ? "its voxels are more than the file can hold"
@@ -172,7 +172,7 @@ static void swap_bytes(unsigned char *bytes, size_t count, size_t size) {
   }
 }
 
-/* The voxels out of the rest of the file; false where they are not all there. */
+/* Unpack the voxels from the rest of the file; false if they are incomplete. */
 static bool unpack(const header *h, const unsigned char *packed, size_t packed_size,
                    unsigned char *values, size_t bytes) {
   if (!h->compressed) {

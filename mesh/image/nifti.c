@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* NIfTI, read through libnifti2, written as NIfTI-1. */
+/* Read NIfTI through libnifti2, and write NIfTI-1. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define ZLIB_CONST /* it does not write where it reads */
+#define ZLIB_CONST /* next_in is const */
 #include <nifti2_io.h>
 #include <zlib.h>
 
@@ -19,7 +19,7 @@
 static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
                                               DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};
 
-/* Does the qform put a corner of the image half a voxel or more from where the sform does? */
+/* Report whether qform and sform place a corner of the image half a voxel or more apart. */
 static bool forms_differ(const nifti_image *nifti) {
   const double size[3] = {(double)nifti->nx, (double)nifti->ny, (double)nifti->nz};
   const double voxel = fmin(fabs(nifti->dx), fmin(fabs(nifti->dy), fabs(nifti->dz)));
@@ -39,7 +39,7 @@ static bool forms_differ(const nifti_image *nifti) {
   return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
 }
 
-/* Size, type and frame; NIfTI is RAS. */
+/* Check size, type and frame; NIfTI is RAS. */
 static supine_status check(const char *path, const nifti_image *nifti, size_t file_size,
                            supine_image *image, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
@@ -49,9 +49,10 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
   const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
   size_t type = 0;
   if (nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %d axes; one number a voxel, three axes and one volume are wanted",
-                            path, (int)nifti->ndim);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: %d axes; give an image with one number per voxel, three axes and one volume", path,
+        (int)nifti->ndim);
   }
   if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -85,7 +86,7 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
   return SUPINE_OK;
 }
 
-/* Stored numbers times slope, plus intercept, as F32. */
+/* Convert stored numbers to F32, times slope plus intercept. */
 static supine_status rescale(const char *path, const nifti_image *nifti, supine_image *image,
                              supine_error *error) {
   const double slope = nifti->scl_slope;
@@ -113,7 +114,8 @@ supine_status supine_image_read_nifti(const char *path, size_t file_size, supine
   nifti_set_debug_level(0);
   nifti_image *nifti = nifti_image_read(path, 0);
   if (nifti == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no NIfTI header", path);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
+                            path);
   }
   supine_status status = check(path, nifti, file_size, image, error);
   if (status == SUPINE_OK && nifti_is_gzfile(path)) {
@@ -135,7 +137,7 @@ supine_status supine_image_read_nifti(const char *path, size_t file_size, supine
   return status;
 }
 
-/* The header, 348 bytes and 4 that say that nothing comes before the voxels. */
+/* Make the header, 348 bytes and 4 that say that no extension follows. */
 static void make_header(const supine_image *image, const char *note, unsigned char header[352]) {
   nifti_1_header h = {0};
   static const short bits[SUPINE_VOXEL_COUNT] = {8, 8, 16, 16, 32, 32, 32, 64};
@@ -161,7 +163,7 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
     }
     rows[a][3] = (float)(a < 2 ? -image->origin[a] : image->origin[a]);
   }
-  if (image->channels == 3) { /* the fifth axis is the vector's, as the format has it */
+  if (image->channels == 3) { /* the fifth axis is the vector's in this format */
     h.dim[0] = 5;
     h.dim[5] = 3;
     h.pixdim[4] = h.pixdim[5] = 1.0F;
@@ -173,9 +175,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   memcpy(header, &h, sizeof h);
 }
 
-/* Each component of the vectors by itself, in LPS: ITK and ANTs, which made such files common, do
- * not turn vectors of this intent (of DISPVECT before ITK 5.3 they read the first component alone).
- * NULL without memory. */
+/* Separate the components of the vectors, in LPS: ITK and ANTs, which established such files, do
+ * not convert vectors of this intent (of DISPVECT before ITK 5.3 they read only the first
+ * component). NULL if out of memory. */
 static float *planes(const supine_image *image) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = malloc(3 * count * sizeof *made);
@@ -185,7 +187,7 @@ static float *planes(const supine_image *image) {
   return made;
 }
 
-/* Deflates `bytes` more bytes into the file; `flush` is Z_FINISH for the last. */
+/* Compress `bytes` more bytes into the file; `flush` is Z_FINISH for the last. */
 static bool deflate_bytes(z_stream *z, const unsigned char *values, size_t bytes, int flush,
                           FILE *file) {
   enum { PIECE = 1 << 28, SPACE = 1 << 16 };
@@ -199,7 +201,7 @@ static bool deflate_bytes(z_stream *z, const unsigned char *values, size_t bytes
     do {
       z->next_out = space;
       z->avail_out = SPACE;
-      (void)deflate(z, bytes == 0 ? flush : Z_NO_FLUSH); /* fails on misuse alone */
+      (void)deflate(z, bytes == 0 ? flush : Z_NO_FLUSH); /* fails only on misuse */
       const size_t made = SPACE - z->avail_out;
       if (fwrite(space, 1, made, file) != made) {
         return false;
@@ -230,7 +232,7 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
   if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
       image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: NIfTI-1 has one number or a vector of three a voxel and at most "
+                            "%s: NIfTI-1 has one number or a vector of three per voxel and at most "
                             "%d voxels a side: write .nrrd",
                             path, INT16_MAX);
   }

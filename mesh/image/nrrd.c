@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* NRRD, through teem. */
+/* Read and write NRRD through teem. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +13,7 @@ static const int types[SUPINE_VOXEL_COUNT] = {nrrdTypeChar,   nrrdTypeUChar, nrr
                                               nrrdTypeUShort, nrrdTypeInt,   nrrdTypeUInt,
                                               nrrdTypeFloat,  nrrdTypeDouble};
 
-/* Fails with the last line of teem's own account. */
+/* Fail with the last line of teem's message. */
 static supine_status teem_fails(const char *path, supine_status status, supine_error *error) {
   char *text = biffGetDone(NRRD);
   char *last = text;
@@ -39,11 +39,11 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             "%s: the voxels are in another file; save them in one", path);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            nrrd->dim != 3
-                                ? "%s: %u axes; one number a voxel and three axes are wanted"
-                                : "%s: the header has no space directions of its %u axes",
-                            path, nrrd->dim);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        nrrd->dim != 3 ? "%s: %u axes; give an image with one number per voxel and three axes"
+                       : "%s: the header has no space directions of its %u axes",
+        path, nrrd->dim);
   }
   double turn = 0.0;
   switch (nrrd->space) {
@@ -86,7 +86,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   return SUPINE_OK;
 }
 
-/* Bytes before the voxels: the header ends in an empty line. */
+/* Find the bytes before the voxels: the header ends in an empty line. */
 static long header_length(const char *path) {
   FILE *file = fopen(path, "rb");
   int before = 0;
@@ -113,7 +113,7 @@ supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
     goto cleanup;
   }
-  io->skipData = AIR_TRUE; /* the header alone, before any memory is taken for what it says */
+  io->skipData = AIR_TRUE; /* only the header, before allocating what it asks for */
   if (nrrdLoad(nrrd, path, io) != 0) {
     status = teem_fails(path, SUPINE_ERROR_FORMAT, error);
     goto cleanup;
@@ -133,7 +133,7 @@ supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_
     status = teem_fails(path, SUPINE_ERROR_FORMAT, error);
     goto cleanup;
   }
-  image->values = nrrd->data; /* malloc's: teem allocates with calloc */
+  image->values = nrrd->data; /* from malloc: teem allocates with calloc */
   nrrd->data = NULL;
   if (is_wide(nrrd)) {
     supine_image_widen(image->values, image->size[0] * image->size[1] * image->size[2],
@@ -147,7 +147,7 @@ cleanup:
   return status;
 }
 
-/* The header: axes, space, kinds. */
+/* Describe the image in the header: axes, space, kinds. */
 static bool describe(Nrrd *nrrd, const supine_image *image, const char *note) {
   const unsigned vector = image->channels > 1;
   size_t sizes[4] = {image->channels, image->size[0], image->size[1], image->size[2]};

@@ -116,8 +116,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
-      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* all rows were read
-                                                                          * before */
+      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* read before */
       uint8_t *out = mask->at + LABELS_MARGIN +
                      mask->size[0] * (j - low[1] + LABELS_MARGIN +
                                       mask->size[1] * (k - low[2] + LABELS_MARGIN));

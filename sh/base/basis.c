@@ -2,7 +2,7 @@
 /* Real spherical harmonics of a direction.
  *
  * Y(l, +-m) = q(l, m)(z) * { Re, Im } (x + i y)^m, where q is the normalised Legendre function
- * without its factor sin^m: a polynomial in z, so that a pole is no special case. In l it obeys
+ * without its factor sin^m: a polynomial in z, regular at the poles. Its recurrence in l is
  *
  *     q(l, m) = a(l, m) (z q(l - 1, m) - q(l - 2, m) / a(l - 1, m))
  *     a(l, m)^2 = (4 l^2 - 1) / (l^2 - m^2) */
@@ -18,7 +18,7 @@ size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
 }
 
-/* Divides by the largest component first: no length over- or underflows. */
+/* Normalise, dividing by the largest component first against overflow and underflow. */
 static supine_status normalise(const double v[3], double unit[3]) {
   const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
   if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]) || largest == 0) {
@@ -32,8 +32,8 @@ static supine_status normalise(const double v[3], double unit[3]) {
   return SUPINE_OK;
 }
 
-/* The column of Y(l, m) and Y(l, -m), l = m to band: `top` is q(m, m), `re` and `im` are
- * (x + i y)^m. */
+/* Evaluate Y(l, m) and Y(l, -m) for l = m to band: `top` is q(m, m), `re` and `im` are (x + i
+ * y)^m. */
 static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
                            double *y) {
   double before = 0; /* q(l - 2, m) / a(l - 1, m) */
@@ -41,7 +41,7 @@ static void evaluate_order(size_t band, size_t m, double z, double top, double r
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
-    centre[m] = q * re; /* last: for m = 0 it is the one that counts */
+    centre[m] = q * re; /* written last, so that m = 0 keeps it */
     if (l == band) {
       return;
     }
@@ -63,7 +63,7 @@ supine_status supine_sh_evaluate(size_t band, const double direction[3], double 
   double re = 1;
   double im = 0;
   evaluate_order(band, 0, unit[2], top, re, im, y);
-  top *= 1.41421356237309504880; /* sqrt(2): cos and sin share what exp(+-i m phi) had */
+  top *= 1.41421356237309504880; /* sqrt(2): normalises cos and sin instead of exp(+-i m phi) */
   for (size_t m = 1; m <= band; ++m) {
     const double turned = re * unit[0] - im * unit[1];
     im = re * unit[1] + im * unit[0];

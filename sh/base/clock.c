@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A clock for measuring how long things take. */
+/* A clock for measuring durations. */
 #include <time.h>
 
 #include "sh/base/clock.h"

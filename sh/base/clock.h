@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/** @file
- * A clock for measuring how long things take. */
+/** @file A clock for measuring durations. */
 #ifndef SUPINE_CLOCK_H
 #define SUPINE_CLOCK_H
 
-/** Seconds since some moment in the past; never runs backwards. */
+/** Seconds since some moment in the past; monotonic. */
 double supine_clock_seconds(void);
 
 #endif

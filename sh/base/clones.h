@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file
- * Versions of a function for wider vector units, chosen when the program is loaded. */
+/** @file Compile versions of a function for wider vector units; the loader chooses one. */
 #ifndef SUPINE_CLONES_H
 #define SUPINE_CLONES_H
 
@@ -8,8 +7,8 @@
 #include <features.h> /* __GLIBC__ */
 #endif
 
-/** Marks a hot function. The names are levels of the architecture, not of a maker's processors:
- * those are matched by model and pass every other maker's by. */
+/** Mark a hot function. The targets are architecture levels, as processor names would match one
+ * maker's models only. */
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
     !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))

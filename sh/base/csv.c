@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A strict reader of small CSV files whose errors name the line. */
+/* Read small CSV files strictly; errors name the line. */
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -21,7 +21,7 @@ static char *trim(char *text) {
   return text;
 }
 
-/* The next line that holds something, trimmed; NULL at the end or on failure. */
+/* Read the next line that is not blank, trimmed; NULL at the end or on failure. */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -39,7 +39,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
     ++csv->line;
     if (strlen(csv->text) != (size_t)length) {
       *status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                 "%s:%zu: a NUL byte: this is no CSV text", csv->path, csv->line);
+                                 "%s:%zu: a NUL byte: save it as CSV text", csv->path, csv->line);
       return NULL;
     }
     static const char mark[] =
@@ -52,8 +52,8 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Takes the field at *rest, which then follows it, or is NULL after the last. A field in quotes may
- * hold the separator, and "" for a quote. NULL where a quote does not end. */
+/* Split off the field at *rest; *rest then points behind it, or is NULL after the last. A quoted
+ * field may contain the separator, and "" for a quote. NULL if a quote does not end. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;
@@ -88,12 +88,13 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   csv->field_count = 0;
   for (char *rest = text; rest != NULL;) {
     if (csv->field_count == SUPINE_CSV_FIELDS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: more than %d fields", csv->path,
-                              csv->line, (int)SUPINE_CSV_FIELDS_MAX);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s:%zu: more than %d fields: delete columns", csv->path, csv->line,
+                              (int)SUPINE_CSV_FIELDS_MAX);
     }
     char *field = csv_field(&rest, csv->separator);
     if (field == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a quote is not closed",
+      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a quote is not closed: add \"",
                               csv->path, csv->line);
     }
     csv->field[csv->field_count++] = field;
@@ -101,7 +102,7 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   return SUPINE_OK;
 }
 
-/* Which field holds which expected column. */
+/* Find the field of each expected column. */
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
@@ -117,7 +118,7 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
                               "%s:%zu: repeated column \"%s\" in the header", csv->path, csv->line,
                               csv->field[f]);
     }
-    if (c < count) { /* others are no concern of ours */
+    if (c < count) { /* ignore unexpected columns */
       csv->column[c] = f;
     }
   }
@@ -172,7 +173,7 @@ supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) 
   status = csv_split(csv, text, error);
   if (status == SUPINE_OK && csv->field_count != csv->column_count) {
     status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %zu fields where the header has %zu",
+        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %zu fields, but the header has %zu",
                          csv->path, csv->line, csv->field_count, csv->column_count);
   }
   return status;
@@ -187,7 +188,7 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   char *text = csv->field[csv->column[column]];
   char *end = NULL;
   char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
-  if (comma != NULL) { /* as spreadsheets have it where ';' separates */
+  if (comma != NULL) { /* decimal comma, as in spreadsheets with ';' */
     *comma = '.';
   }
   *number = strtod(text, &end);

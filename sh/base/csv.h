@@ -11,9 +11,9 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A reader of small CSV files: comments, blank lines, one header, fields in quotes. Fields are
- * separated by what the header has: ',', ';' (numbers may then have a decimal comma) or tabs.
- * Zeroed at first. */
+/* A reader of small CSV files: comments, blank lines, one header, quoted fields. The header
+ * determines the separator: ',', ';' (then numbers may have a decimal comma) or tab.
+ * Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
@@ -22,25 +22,24 @@ typedef struct supine_csv {
   size_t line;
   char separator;
   size_t field_count;
-  char *field[SUPINE_CSV_FIELDS_MAX]; /* of the row read last */
+  char *field[SUPINE_CSV_FIELDS_MAX]; /* of the last row read */
   size_t column_count;
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
 } supine_csv;
 
-/* Opens and reads the header; each of the first `required` of `names` must be there, in any case;
- * others may be there too, and are passed over. Without names
- * (NULL) any header will do; it stays in `field` until the first row, and columns are in its order.
- */
+/* Open the file and read the header, which must have the first `required` of `names`, in any
+ * case; other columns are ignored. Without names (NULL) any header is valid; it stays in `field`
+ * until the first row, and columns are in its order. */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
 
-/* Reads a row; *more is false at the end. */
+/* Read a row; *more is false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
 
-/* Text of a column of the row, or NULL where the file has no such column. */
+/* Find the text of a column of the row; NULL if the file lacks the column. */
 const char *supine_csv_text(const supine_csv *csv, size_t column);
 
-/* A finite number. */
+/* Parse a column as a finite number. */
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
                                 double *number, supine_error *error);
 

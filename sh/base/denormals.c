@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Denormal numbers: the tail of a unit force's response fades into them, and they are slow. */
+/* Treat denormal numbers as zero: the response to a unit force decays into them, and they are
+ * slow. */
 #include "sh/base/denormals.h"
 
 #if defined(__SSE2__)

@@ -4,7 +4,7 @@
 #ifndef SUPINE_DENORMALS_H
 #define SUPINE_DENORMALS_H
 
-/** Sets the processor to treat denormal numbers as zero; returns what to restore. */
+/** Make the processor treat denormal numbers as zero; return the setting to restore. */
 unsigned supine_denormals_flush(void);
 void supine_denormals_restore(unsigned saved);
 

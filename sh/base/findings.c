@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Lines that an input gave cause for. */
+/* Collect warnings and notes about an input. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +18,7 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
     findings->text[used] = '\0';
     return;
   }
-  for (char *c = findings->text + used; *c != '\0'; ++c) { /* a file's name may hold anything */
+  for (char *c = findings->text + used; *c != '\0'; ++c) { /* a file's name may contain any byte */
     *c = *c == '\n' ? ' ' : *c;
   }
   (void)supine_text_make_utf8(findings->text + used);

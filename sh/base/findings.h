@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file
- * What was found of an input that a user should know, kept so that it can be said again later. */
+/** @file Warnings and notes about an input, kept to be shown again later. */
 #ifndef SUPINE_FINDINGS_H
 #define SUPINE_FINDINGS_H
 
@@ -8,16 +7,17 @@
 
 #include <supine/status.h>
 
-/** Lines, each beginning with "warning: " or "note: " or a file's name and either. Zeroed at first.
- */
+/** Lines, each beginning with "warning: " or "note: ", or a file's name and either.
+ * Zero-initialise. */
 typedef struct supine_findings {
-  char text[4096]; /**< each line ended by a line feed */
+  char text[4096]; /**< each line ends with a line feed */
 } supine_findings;
 
-/** Adds a line by a printf format; one that does not fit is left out. */
+/** Add a line by a printf format; a line that does not fit is dropped. */
 SUPINE_PRINTF(2, 3) void supine_findings_add(supine_findings *findings, const char *format, ...);
 
-/** The line at *at without its end, `length` long, and moves *at behind it; NULL after the last. */
+/** Find the line at *at, `length` bytes without its end, and move *at behind it; NULL after the
+ * last. */
 const char *supine_findings_next(const char **at, size_t *length);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Output folders that appear whole or not at all. */
+/* Write output folders whole or not at all. */
 #include <dirent.h>
 #include <errno.h>
 #include <signal.h>
@@ -20,13 +20,14 @@ static supine_status fail(const char *path, const char *what, supine_error *erro
   return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", path, what, strerror(code));
 }
 
-/* Removes a folder of files, as far as it can. */
+/* Remove a folder of files as far as possible. */
 static void remove_folder(const char *path) {
   DIR *entries = opendir(path);
   if (entries != NULL) {
     const struct dirent *entry;
     while ((entry = readdir(entries)) != NULL) {
-      (void)unlinkat(dirfd(entries), entry->d_name, 0); /* not "." and "..", which are folders */
+      (void)unlinkat(dirfd(entries), entry->d_name, 0); /* fails for "." and "..", which are
+                                                         * folders */
     }
     (void)closedir(entries);
   }
@@ -43,19 +44,18 @@ static supine_status is_free(const char *path, supine_error *error) {
     ++count;
   }
   (void)closedir(entries);
-  return count <= 2 ? SUPINE_OK
-                    : supine_error_set(error, SUPINE_ERROR_WRITE,
-                                       "%s: there is something in this folder already: remove it, "
-                                       "or choose another name",
-                                       path);
+  return count <= 2
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_WRITE,
+                                "%s: this folder is not empty: remove it, or choose another name",
+                                path);
 }
 
-/* What the keeper is told, each by one byte: the folder takes its name now; it is to stay. Then, or
- * before, the line ends, because this process did. */
+/* Messages to the keeper, one byte each: the folder is being renamed; it is to be kept. The
+ * pipe's end means that this process ended. */
 enum { GROWING, NAMED, KEPT };
 
-/* The keeper's life. Out of this process's group, so that what is sent to all of it does not end
- * the keeper as well. */
+/* Run the keeper, outside this process's group so that signals to the group do not end it. */
 static _Noreturn void keep_watch(const supine_folder *folder, int line) {
   static const int numbers[] = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
@@ -70,7 +70,7 @@ static _Noreturn void keep_watch(const supine_folder *folder, int line) {
       told += got == 1;
     }
   }
-  if (access(folder->temporary, F_OK) == 0) { /* it never took its name */
+  if (access(folder->temporary, F_OK) == 0) { /* it was never renamed */
     remove_folder(folder->temporary);
   } else if (told == NAMED) {
     remove_folder(folder->path);
@@ -81,7 +81,7 @@ static _Noreturn void keep_watch(const supine_folder *folder, int line) {
   _exit(0);
 }
 
-/* Starts the keeper and waits until it is ready; false and errno. */
+/* Start the keeper and wait until it is ready; false sets errno. */
 static bool begin_keeper(supine_folder *folder) {
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -110,7 +110,7 @@ static void tell_keeper(const supine_folder *folder) {
 supine_status supine_folder_open(const char *path, const char *index, supine_folder *folder,
                                  supine_error *error) {
   static const char ending[] = ".part-0123456789abcdef";
-  unsigned long long number = 0; /* a name that nobody else has */
+  unsigned long long number = 0; /* for a unique name */
   (void)!getrandom(&number, sizeof number, 0);
   *folder = (supine_folder){0};
   folder->path = strdup(path);
@@ -149,7 +149,7 @@ void supine_folder_keep(supine_folder *folder) {
 }
 
 void supine_folder_close(supine_folder *folder) {
-  if (folder->named) { /* the index was not written: an old one of its name is not to go */
+  if (folder->named) { /* the index was not written: keep an older one of that name */
     (void)rename(folder->path, folder->temporary);
   }
   if (folder->keeper != 0) {

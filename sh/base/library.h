@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file
- * Shared libraries that few commands need, loaded at their first use: as dependencies they would
- * delay every command. Name the functions once,
+/** @file Load shared libraries that few commands need at their first use: linked, they would
+ * delay every command. List the functions once,
  *
  *     #define FUNCTIONS(EACH) EACH(cairo_, arc) EACH(cairo_, fill)
  *     static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Output files that appear whole or not at all. */
+/* Write output files whole or not at all. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -14,15 +14,15 @@
 
 #include "sh/base/output.h"
 
-/* What stdio writes through: it remembers why a write failed, which FILE does not. */
+/* Stream behind FILE that remembers why a write failed. */
 struct supine_output_stream {
   int descriptor;
   int code; /* errno of the first failure, or 0 */
 };
 
-enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* more than outputs are open at once; bytes */
+enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* Most outputs open at once; buffer in bytes. */
 
-/* Standard output as it was before supine_output_take_standard; -1: where it is. */
+/* Original standard output after supine_output_take_standard; -1: not taken. */
 static atomic_int standard_output = -1;
 
 bool supine_output_is_standard(const char *path) {
@@ -37,7 +37,7 @@ bool supine_output_take_standard(void) {
   return atomic_load(&standard_output) >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0;
 }
 
-/* Temporary names that exist, for supine_output_abandon_all. */
+/* Existing temporary names, for supine_output_abandon_all. */
 static char *_Atomic live[LIVE_MAX];
 
 static void set_live(char *from, char *to) {
@@ -98,9 +98,9 @@ char *supine_path_beside(const char *path, const char *name) {
   return made;
 }
 
-/* What a path leads to, symbolic links of its last part followed, there or not. */
+/* Resolve symbolic links in the last part of a path, which need not exist. */
 static char *follow_links(const char *path) {
-  enum { LINKS_MAX = 40 }; /* as the kernel's */
+  enum { LINKS_MAX = 40 }; /* the kernel's limit */
   char *at = strdup(path);
   for (int i = 0; at != NULL && i < LINKS_MAX; ++i) {
     char link[PATH_MAX];
@@ -120,8 +120,8 @@ static void descriptor_path(int descriptor, char path[32]) {
   (void)snprintf(path, 32, "/proc/self/fd/%d", descriptor);
 }
 
-/* Gives the output a temporary name beside its target that nobody else has: a new file's, whose
- * descriptor it returns, or one for the file that `link` leads to. -1 and errno. */
+/* Give the output a unique temporary name beside its target: of a new file, whose descriptor is
+ * returned, or of the file that `link` refers to. -1 sets errno. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
@@ -146,15 +146,16 @@ static int take_temporary(supine_output *output, const char *link) {
   return -1;
 }
 
-/* A file without a name in the target's folder, where it can be given one later; else one with a
- * temporary name. -1 and errno. */
+/* Open a file without a name in the target's folder if it can be named later, else with a
+ * temporary name. -1 sets errno. */
 static int open_regular(supine_output *output) {
   char *folder = supine_path_beside(output->target, ".");
   if (folder == NULL) {
     errno = ENOMEM;
     return -1;
   }
-  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* less the mask */
+  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* reduced by the
+                                                                                * umask */
   free(folder);
   if (descriptor >= 0) {
     char link[32];
@@ -162,7 +163,7 @@ static int open_regular(supine_output *output) {
     if (access(link, F_OK) == 0) {
       return descriptor;
     }
-    (void)close(descriptor); /* no /proc: it could not be given a name */
+    (void)close(descriptor); /* without /proc it could not be named */
   }
   return take_temporary(output, NULL);
 }
@@ -220,7 +221,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   return SUPINE_OK;
 }
 
-/* Gives the finished file its name; false and errno. */
+/* Give the finished file its name; false sets errno. */
 static bool give_name(supine_output *output) {
   if (output->temporary == NULL) {
     char link[32];
@@ -228,7 +229,8 @@ static bool give_name(supine_output *output) {
     if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
       return true;
     }
-    /* A link replaces nothing: where there is an old file the new one goes beside it first. */
+    /* link() replaces nothing: over an existing file, link to a temporary name first, then
+     * rename. */
     if (errno != EEXIST || take_temporary(output, link) < 0) {
       return false;
     }
@@ -236,7 +238,7 @@ static bool give_name(supine_output *output) {
   return rename(output->temporary, output->target) == 0;
 }
 
-/* Waits until the folder's entry is on the disk, where that can be waited for. */
+/* Wait until the folder's entry is on the disk, if supported. */
 static void sync_folder(const char *target) {
   char *folder = supine_path_beside(target, ".");
   const int descriptor = folder != NULL ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
@@ -264,7 +266,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
     }
     if (output->temporary != NULL) {
       set_live(output->temporary, NULL);
-      output->temporary[0] = '\0'; /* no longer its name */
+      output->temporary[0] = '\0'; /* it has been renamed */
     }
     sync_folder(output->target);
   }
@@ -284,7 +286,7 @@ void supine_output_abandon(supine_output *output) {
     }
   }
   if (output->file != NULL) {
-    (void)fclose(output->file); /* writes nothing more: the stream has failed */
+    (void)fclose(output->file); /* the stream has failed: nothing more is written */
   }
   free(output->stream);
   free(output->temporary);
@@ -297,7 +299,7 @@ supine_status supine_output_try(const char *path, supine_error *error) {
   supine_output output;
   struct stat old;
   if (supine_output_is_standard(path) || (stat(path, &old) == 0 && S_ISFIFO(old.st_mode))) {
-    return SUPINE_OK; /* whoever reads from it would take a closed pipe for the end */
+    return SUPINE_OK; /* keep it open: a reader would take closing for success */
   }
   const supine_status status = supine_output_open(path, &output, error);
   supine_output_abandon(&output);

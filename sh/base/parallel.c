@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Splitting a range of independent work over POSIX threads. */
+/* Split independent work over POSIX threads. */
 #include <pthread.h>
 #include <sched.h>
 #include <stdbool.h>
@@ -21,7 +21,7 @@ static void *piece_run(void *argument) {
   return NULL;
 }
 
-/* 0 where SUPINE_THREADS is not set, -1 where it is no count. */
+/* Read SUPINE_THREADS: 0 if it is not set, -1 if it is not a count. */
 static long asked_threads(void) {
   const char *text = getenv("SUPINE_THREADS"); /* NOLINT(concurrency-mt-unsafe) */
   if (text == NULL) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Sentences put together from parts, and how names end. */
+/* Build sentences from parts, and compare endings of names. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -29,7 +29,7 @@ bool supine_text_ends_in_any_case(const char *name, const char *ending) {
   return strcasecmp(tail_of(name, ending), ending) == 0;
 }
 
-/* Bytes of the UTF-8 character that begins here; 0: it is none. */
+/* Find the bytes of the UTF-8 character that begins here; 0 if invalid. */
 static size_t character(const unsigned char *at) {
   const size_t size = at[0] < 0x80                     ? 1
                       : at[0] >= 0xC2 && at[0] <= 0xDF ? 2
@@ -43,7 +43,7 @@ static size_t character(const unsigned char *at) {
   }
   const bool odd = (at[0] == 0xE0 && at[1] < 0xA0) || (at[0] == 0xED && at[1] > 0x9F) ||
                    (at[0] == 0xF0 && at[1] < 0x90) || (at[0] == 0xF4 && at[1] > 0x8F);
-  return odd ? 0 : size; /* too long, a surrogate, beyond the last character */
+  return odd ? 0 : size; /* overlong, a surrogate, or out of range */
 }
 
 char *supine_text_make_utf8(char *text) {

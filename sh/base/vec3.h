@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file
- * Vectors of three, and directions spread over the sphere. */
+/** @file Vectors of three components, and directions spread over the sphere. */
 #ifndef SUPINE_VEC3_H
 #define SUPINE_VEC3_H
 
@@ -10,14 +9,14 @@ static inline double supine_dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/** a x b; `product` is neither of them. */
+/** Compute a x b; `product` must not alias them. */
 static inline void supine_cross(const double a[3], const double b[3], double product[3]) {
   product[0] = a[1] * b[2] - a[2] * b[1];
   product[1] = a[2] * b[0] - a[0] * b[2];
   product[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/** a . (b x c), the determinant of the three. */
+/** Compute a . (b x c), the determinant of the three. */
 static inline double supine_triple(const double a[3], const double b[3], const double c[3]) {
   double product[3];
   supine_cross(b, c, product);
@@ -33,8 +32,8 @@ static inline double supine_distance(const double a[3], const double b[3]) {
   return supine_length(d);
 }
 
-/** Point `at`, 0 to `count` - 1 or between, of a spiral of golden angles that spreads `count`
- * directions evenly over the sphere, from +z to -z; `from` is its first longitude, rad. */
+/** Find point `at`, 0 to `count` - 1 or between, of a golden-angle spiral of `count` directions
+ * that covers the sphere evenly from +z to -z; `from` is its first longitude, rad. */
 static inline void supine_spiral(double at, double count, double from, double direction[3]) {
   static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
   const double z = 1.0 - (2.0 * at + 1.0) / count;
