@@ -327,7 +327,7 @@ static void test_folder_appears_whole_or_not_at_all(void **state) {
   supine_folder_close(&folder);
   supine_error error;
   assert_int_equal(supine_folder_open(path, NULL, &folder, &error), SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, "there is something in this folder already"));
+  assert_non_null(strstr(error.message, "this folder is not empty"));
   char inside[80];
   (void)snprintf(inside, sizeof inside, "%s/a", path);
   assert_int_equal(unlink(inside), 0);

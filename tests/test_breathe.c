@@ -326,7 +326,7 @@ static void test_breathe_folder_in_use_is_left_alone(void **state) {
   assert_non_null(file);
   (void)fclose(file);
   assert_int_equal(RUN(basis, "--posture", "supine", "-o", series_folder), SUPINE_EXIT_OUTPUT);
-  assert_non_null(strstr(text, "something in this folder already"));
+  assert_non_null(strstr(text, "this folder is not empty"));
   assert_int_equal(stat(inside, &found), 0);
   assert_int_equal(empty(series_folder), 1);
   /* An empty one is fine. */

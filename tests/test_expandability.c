@@ -107,7 +107,7 @@ static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
       {"vertex,a\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 is there already"},
       {"vertex,a\n0,1\n7,1\n", ":3:", "vertex 7 is none"},
       {"vertex,a\n0,1\n-1,1\n", ":3:", "'-1'"},
-      {"vertex,a\n0,1\n1;1\n", ":3:", "1 fields where the header has 2"},
+      {"vertex,a\n0,1\n1;1\n", ":3:", "1 fields, but the header has 2"},
       {"vertex,a\n0,1\n99999999999999999999,1\n", ":3:", "not a number"},
       {"vertex,a\n0,1\n1,-4\n", ":3:", "-4 of vertex 1 must"},
   };

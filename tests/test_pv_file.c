@@ -83,7 +83,7 @@ static void test_samples_load_malformed_names_the_line(void **state) {
       {"pressure_cmH2O,\"volume_mL\n", ":1: a quote is not closed"},
       {"pressure_cmH2O,pressure_cmH2O\n", ":1: repeated column"},
       {"#\npressure_cmH2O,limb\n", ":2: the header has no column \"volume_mL\""},
-      {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 fields where the header has 2"},
+      {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 fields, but the header has 2"},
       {"pressure_cmH2O,volume_mL\n1,2,3\n", ":2: 3 fields"},
       {"pressure_cmH2O,volume_mL\n1,2\n\n3,nan\n", ":4: volume_mL \"nan\""},
       {"pressure_cmH2O,volume_mL\ninf,2\n", ":2: pressure_cmH2O \"inf\""},
@@ -164,7 +164,7 @@ static void test_load_malformed_parameters_name_the_line(void **state) {
   } bad[] = {
       {HEADER, "no row of parameters"},
       {"limb,c1\n", ":1: the header has no column \"pressure_low_cmH2O\""},
-      {HEADER "inhale,0,30,0,6000,1,2,3,4\n", ":2: 9 fields where the header has 10"},
+      {HEADER "inhale,0,30,0,6000,1,2,3,4\n", ":2: 9 fields, but the header has 10"},
       {HEADER "inhale,0,30,0,6000,1,2,3,4,x\n", ":2: c5 \"x\""},
       {HEADER "inhale,30,0,0,6000,1,2,3,4,5\n", ":2: the limb's pressures must rise"},
       {HEADER "inhale,0,30,7,7,1,2,3,4,5\n", ":2: the limb's volumes must rise"},

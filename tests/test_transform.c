@@ -249,7 +249,7 @@ static void test_create_small_grid_or_high_band_refused(void **state) {
                      SUPINE_ERROR_ARGUMENT);
     assert_null(plan);
     assert_int_equal(error.status, SUPINE_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "directions cannot carry band"));
+    assert_non_null(strstr(error.message, "directions cannot represent band"));
     supine_sh_grid_destroy(grid);
   }
   supine_sh_transform_destroy(NULL);
