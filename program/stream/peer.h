@@ -13,7 +13,7 @@
 typedef struct supine_stream_peer {
   int socket;        /**< socket; -1: no peer */
   bool connecting;   /**< not yet there */
-  double took, said; /**< time of the last receipt and send, s */
+  double took, said; /**< when the peer last took data, and last sent some, s */
   /* received data */
   unsigned char raw[SUPINE_STREAM_HEADER];
   size_t got; /**< of the header, then of the body */

@@ -51,7 +51,7 @@ typedef struct supine_stream_options {
   double patience; /**< s that a peer may leave a message or frame unfinished; 0: 20 */
   const supine_stream_poses
       *replay;            /**< poses from a file, from when the first peer is there; NULL */
-  FILE *record;           /**< called with each pose; NULL: not */
+  FILE *record;           /**< each pose is written to it; NULL: none */
   supine_stream_web *web; /**< NULL: none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called at least every 100 ms; true ends the run */
