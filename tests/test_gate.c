@@ -181,14 +181,21 @@ static void test_gate_single_lung_side_by_shape(void **state) {
 
 static void test_gate_specks_dropped_and_told(void **state) {
   (void)state;
+  enum { SPECKS = 10 };
   static const double at[4][3] = {
       {300, -300, 300}, {301, -300, 300}, {300, -299, 300}, {300, -300, 301}};
   supine_mesh mesh = phantom();
   const size_t vertices = mesh.vertex_count;
-  append(&mesh, 4, at[0], 4, tetrahedron[0], true);
+  for (size_t speck = 0; speck < SPECKS; ++speck) {
+    double corners[4][3];
+    for (size_t i = 0; i < 12; ++i) {
+      corners[i / 3][i % 3] = at[i / 3][i % 3] + 10.0 * (double)speck;
+    }
+    append(&mesh, 4, corners[0], 4, tetrahedron[0], true);
+  }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  expect_said(&out, "dropped 1 speck, each below 1 % of the volume; 2 pieces are left");
+  expect_said(&out, "dropped 10 specks, each below 1 % of the volume; 2 pieces are left");
   assert_int_equal(out.lungs.mesh.vertex_count, vertices);
   assert_true(out.lungs.topology.closed);
   supine_lungs_free(&out.lungs);
