@@ -19,7 +19,6 @@ typedef struct supine_basis_content {
   const supine_accuracy *accuracy;
   const supine_reference *reference; /* full inflation; NULL: the scan is the reference */
   const double *resting;             /* [G, 9] with it: volumes at rest, harmonics, mL */
-  const double *resting_total;       /* [9] their sum */
   const double *turned_over;         /* optional, see supine_accuracy_turned_over */
   const supine_error_table *table;   /* optional */
   bool harmonics;                    /* the modes are the harmonics themselves */

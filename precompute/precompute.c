@@ -282,7 +282,6 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->reference.known ? p->resting[0] : NULL,
-                                        .resting_total = p->state.resting,
                                         .harmonics = p->options->modes == 0,
                                         .patient = p->options->patient,
                                         .patient_summary = p->options->patient_summary,

@@ -2,6 +2,7 @@
 /* Postures along a golden spiral, volumes along multiples of another irrational: even in both. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
@@ -58,30 +59,28 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* The form of each lung's volume. */
-static void find_forms(const supine_normals_surface *s, const double *w, supine_volume_form *form) {
+/* Add a lung's volume at weights w to a form. */
+static void add_form(const supine_normals_surface *s, size_t lung, const double *w,
+                     supine_volume_form *form) {
   const size_t k = s->mode_count;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    form[lung] = (supine_volume_form){{0}};
-    supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
-                           s->cubic + lung * k * k * k, w, &form[lung]);
-  }
+  supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
+                         s->cubic + lung * k * k * k, w, form);
 }
 
 /* Gains of each lung at a share, 0 to 1, of its way from rest to the file's surface. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
-  supine_volume_form form[SUPINE_LUNGS_MAX];
-  find_forms(s, w, form);
   *amount = 0.0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    supine_volume_form form = {{0.0}};
     double rest = 0.0;
+    add_form(s, lung, w, &form);
     for (size_t i = 0; i < 9; ++i) {
       rest += s->resting[9 * lung + i] * y[i];
     }
     *amount += (1.0 - share) * rest;
-    if (supine_volume_form_gains(&form[lung], s->bend, rest, (1.0 - share) * rest, gains[lung],
-                                 NULL) != SUPINE_OK) {
+    if (supine_volume_form_gains(&form, s->bend, rest, (1.0 - share) * rest, gains[lung], NULL) !=
+        SUPINE_OK) {
       return false;
     }
   }
@@ -91,29 +90,23 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
 /* The one gain of all lungs at a share, 0 to 1, of the range of a posture. */
 static bool common_gain(const supine_normals_surface *s, const double *w, double whole,
                         double share, double (*gains)[3], double *amount) {
-  static const double even[3] = {1.0, 1.0, 1.0};
-  double scale = 0.0;
   bool reached = true;
   if (s->linear == NULL) {
     const double size = largest(s, w);
     *amount = lowest_mm + share * (highest_mm - lowest_mm);
-    scale = size > 0.0 ? *amount / size : 0.0;
+    gains[0][0] = gains[0][1] = gains[0][2] = size > 0.0 ? *amount / size : 0.0;
     reached = size > 0.0;
   } else {
-    supine_volume_form form[SUPINE_LUNGS_MAX];
-    double cubic[3];
-    find_forms(s, w, form);
-    for (size_t lung = 1; lung < s->lung_count; ++lung) {
-      for (size_t i = 0; i < 7; ++i) {
-        form[0].of[i] += form[lung].of[i];
-      }
+    static const double straight[3] = {0.0, 0.0, 0.0};
+    supine_volume_form form = {{0.0}};
+    for (size_t lung = 0; lung < s->lung_count; ++lung) {
+      add_form(s, lung, w, &form);
     }
-    supine_volume_form_along(&form[0], even, cubic);
     *amount = (lowest_share + share * (highest_share - lowest_share)) * whole;
-    reached = supine_volume_scale(cubic, *amount, &scale, NULL) == SUPINE_OK;
+    reached = supine_volume_form_gains(&form, straight, 0.0, *amount, gains[0], NULL) == SUPINE_OK;
   }
-  for (size_t i = 0; i < 3 * s->lung_count; ++i) {
-    gains[i / 3][i % 3] = scale;
+  for (size_t lung = 1; lung < s->lung_count; ++lung) {
+    memcpy(gains[lung], gains[0], sizeof gains[0]);
   }
   return reached;
 }
