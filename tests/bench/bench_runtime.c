@@ -37,9 +37,9 @@ typedef struct bench {
   float weights[SUPINE_MODES_MAX]; /* times the gain */
   float *xyz, *normals;            /* [N, 3] */
   float *amount;                   /* [N] */
-  float *columns;                  /* [K, N] coefficients, a mode after the other */
-  int16_t *counts;                 /* the same as 16-bit counts */
-  float units[SUPINE_MODES_MAX];   /* of a count, times the weight */
+  float *columns;                  /* [K, N] coefficients, mode by mode */
+  int16_t *counts;                 /* [K, N] the same as 16-bit counts */
+  float units[SUPINE_MODES_MAX];   /* mm of one count, times the weight of its mode */
 } bench;
 
 typedef struct entry {
@@ -124,7 +124,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* The same product with a mode after the other, as a library for columns wants it. */
+/* The same product with the modes as columns of a column-major matrix. */
 static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   const bench *work = e->work;
@@ -135,48 +135,52 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   displace(work, begin, end);
 }
 
-enum { BLOCK = 16384 }; /* vertices whose amounts stay in the first-level cache */
+enum { BLOCK = 16384 }; /* vertices whose amounts stay in the second-level cache */
 
-/* The best simple loops: a mode after the other, over blocks of vertices. */
-static void run_planar(void *context, size_t begin, size_t end, size_t thread) {
-  const bench *work = ((const entry *)context)->work;
-  const size_t n = work->info->vertex_count;
-  (void)thread;
+/* Add mode k to the amounts of vertices begin <= i < end. */
+typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
+
+static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
+  const float *restrict c = work->columns + k * work->info->vertex_count;
+  float *restrict amount = work->amount;
+  const float w = work->weights[k];
+  for (size_t i = begin; i < end; ++i) {
+    amount[i] += w * c[i];
+  }
+}
+
+static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
+  const int16_t *restrict c = work->counts + k * work->info->vertex_count;
+  float *restrict amount = work->amount;
+  const float w = work->units[k];
+  for (size_t i = begin; i < end; ++i) {
+    amount[i] += w * (float)c[i];
+  }
+}
+
+/* Evaluate a mode after the other over blocks of vertices: the best simple loop. */
+static void run_blocks(const bench *work, add_mode *add, size_t begin, size_t end) {
   for (size_t at = begin; at < end; at += BLOCK) {
     const size_t last = end - at < BLOCK ? end : at + BLOCK;
-    float *restrict amount = work->amount;
-    memset(amount + at, 0, (last - at) * sizeof *amount);
+    memset(work->amount + at, 0, (last - at) * sizeof *work->amount);
     for (size_t k = 0; k < work->info->mode_count; ++k) {
-      const float *restrict c = work->columns + k * n;
-      const float w = work->weights[k];
-      for (size_t i = at; i < last; ++i) {
-        amount[i] += w * c[i];
-      }
+      add(work, k, at, last);
     }
     displace(work, at, last);
   }
+}
+
+static void run_planar(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  run_blocks(((const entry *)context)->work, add_column, begin, end);
 }
 
 static void run_planar_int16(void *context, size_t begin, size_t end, size_t thread) {
-  const bench *work = ((const entry *)context)->work;
-  const size_t n = work->info->vertex_count;
   (void)thread;
-  for (size_t at = begin; at < end; at += BLOCK) {
-    const size_t last = end - at < BLOCK ? end : at + BLOCK;
-    float *restrict amount = work->amount;
-    memset(amount + at, 0, (last - at) * sizeof *amount);
-    for (size_t k = 0; k < work->info->mode_count; ++k) {
-      const int16_t *restrict c = work->counts + k * n;
-      const float w = work->units[k];
-      for (size_t i = at; i < last; ++i) {
-        amount[i] += w * (float)c[i];
-      }
-    }
-    displace(work, at, last);
-  }
+  run_blocks(((const entry *)context)->work, add_counts, begin, end);
 }
 
-/* The coefficients a mode after the other, and as counts. */
+/* Store the coefficients mode by mode, as float32 and as 16-bit counts. */
 static void make_columns(bench *work) {
   const size_t n = work->info->vertex_count;
   const size_t modes = work->info->mode_count;
