@@ -186,6 +186,7 @@ static void test_gate_specks_dropped_and_told(void **state) {
       {300, -300, 300}, {301, -300, 300}, {300, -299, 300}, {300, -300, 301}};
   supine_mesh mesh = phantom();
   const size_t vertices = mesh.vertex_count;
+  outcome clean = pass(&mesh, NULL);
   for (size_t speck = 0; speck < SPECKS; ++speck) {
     double corners[4][3];
     for (size_t i = 0; i < 12; ++i) {
@@ -197,7 +198,10 @@ static void test_gate_specks_dropped_and_told(void **state) {
   assert_int_equal(out.status, SUPINE_OK);
   expect_said(&out, "dropped 10 specks, each below 1 % of the volume; 2 pieces are left");
   assert_int_equal(out.lungs.mesh.vertex_count, vertices);
+  assert_memory_equal(out.lungs.mesh.vertices, clean.lungs.mesh.vertices,
+                      3 * vertices * sizeof(double));
   assert_true(out.lungs.topology.closed);
+  supine_lungs_free(&clean.lungs);
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a label map's lungs are, by nibabel, by VTK and by supine: all 8 flips of the axes, axes in
-another order, and oblique ones, by sform and by qform.
+another order, and oblique ones, by sform and by qform; and what is said of 21 wrong headers.
 
     test_labels_orientation.py SUPINE
 """
@@ -36,6 +36,62 @@ def made_map():
     half = numpy.where(x > 0, 58, 53)  # RAS: + is the right
     inside = ((abs(x) - 66) / (half * narrow)) ** 2 + ((y - 0.25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
     return numpy.where(inside, numpy.where(x > 0, 1, 2), 0).astype(numpy.uint8), affine
+
+
+def phantom_map(folder):
+    """lungmask's labels of synthetic lungs, whose shape tells their axes, in a frame along RAS."""
+    path = os.path.join(folder, "phantom.ply")
+    subprocess.run([supine, "phantom", "--vertices", "8000", "-o", path], check=True, stdout=subprocess.DEVNULL)
+    reader = vtk.vtkPLYReader()
+    reader.SetFileName(path)
+    reader.Update()
+    bounds = numpy.array(reader.GetOutput().GetBounds()).reshape(3, 2)
+    origin, step = bounds[:, 0] - 10, 5.0
+    size = [int(n) for n in numpy.ceil((bounds[:, 1] - bounds[:, 0] + 20) / step)]
+    parts = vtk.vtkPolyDataConnectivityFilter()
+    parts.SetInputConnection(reader.GetOutputPort())
+    parts.SetExtractionModeToSpecifiedRegions()
+    labels = numpy.zeros(size, numpy.uint8)
+    for part in range(2):
+        parts.InitializeSpecifiedRegionList()
+        parts.AddSpecifiedRegion(part)
+        clean = vtk.vtkCleanPolyData()
+        clean.SetInputConnection(parts.GetOutputPort())
+        clean.Update()
+        stencil = vtk.vtkPolyDataToImageStencil()
+        stencil.SetInputConnection(clean.GetOutputPort())
+        stencil.SetOutputOrigin(*origin)
+        stencil.SetOutputSpacing(step, step, step)
+        stencil.SetOutputWholeExtent(0, size[0] - 1, 0, size[1] - 1, 0, size[2] - 1)
+        image = vtk.vtkImageStencilToImage()
+        image.SetInputConnection(stencil.GetOutputPort())
+        image.SetOutputScalarTypeToUnsignedChar()
+        image.Update()
+        inside = vtk_to_numpy(image.GetOutput().GetPointData().GetScalars()).reshape(size[::-1]).transpose(2, 1, 0) > 0
+        labels[inside] = 2 if clean.GetOutput().GetCenter()[0] > bounds[0].mean() else 1
+    affine = numpy.diag([step, step, step, 1.0])
+    affine[:3, 3] = origin
+    return labels, RAS_TO_LPS @ affine
+
+
+def check_header(labels, affine, flips, folder):
+    """A header with axes of the patient reversed, 180 degrees about one or mirrored: the option that mends
+    it is named, and the axes are not said to hold. A right header: no axes are proposed."""
+    global faults
+    path = os.path.join(folder, "header.nii.gz")
+    nibabel.save(nibabel.Nifti1Image(labels, numpy.diag([*(-1.0 if f else 1.0 for f in flips), 1.0]) @ affine), path)
+    result = subprocess.run([supine, "precompute", path, "--labels", "lungmask", "--edge", "8", "--held-out", "9",
+                             "-o", os.path.join(folder, "header.safetensors")],
+                            capture_output=True, text=True, check=False)
+    said = result.stdout + result.stderr
+    wanted = "add --axes " + "".join(pair[flip] for pair, flip in zip(("RL", "AP", "SI"), flips))
+    if any(flips):
+        bad = wanted not in said or "axes hold" in said
+    else:
+        bad = "add --axes" in said or result.returncode != 0
+    if bad:
+        faults += 1
+        print(f"{flips}, exit code {result.returncode}, wanted '{wanted}':\n{said}")
 
 
 def turned(labels, affine, order, flips):
@@ -159,5 +215,10 @@ with tempfile.TemporaryDirectory() as folder:
         check("oblique_" + form, *turned(labels, oblique @ affine, (0, 1, 2), (1, 0, 1)), folder,
               form)
         checked += 1
+    labels, affine = phantom_map(folder)
+    for order in ((0, 1, 2), (2, 0, 1), (1, 2, 0)):
+        for flips in numpy.ndindex(2, 2, 2):
+            check_header(*turned(labels, affine, order, (0, 1, 0)), flips, folder)
+            checked += 1
 print(f"{checked} maps, {faults} faults")
 sys.exit(1 if faults else 0)
