@@ -64,8 +64,8 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate over the tetrahedra between `origin` and the triangles, exactly for cubics (Keast's
- * five points). Return the signed volume. */
+/* Integrate moments over the tetrahedra between `origin` and the triangles, by Keast's rule of five
+ * points, which is exact for cubic polynomials. Return the signed volume. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},

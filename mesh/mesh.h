@@ -59,7 +59,7 @@ typedef struct supine_mesh_report {
   supine_axes axes;             /**< axes assumed for the file */
   bool axes_from_tag;           /**< the axes come from a SPACE tag */
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
-  double odd_side;              /**< longest side, mm, if no lungs have that size; else 0 */
+  double odd_side;              /**< longest side of the box, mm, if impossible for lungs; else 0 */
   const char *likely_unit;      /**< "mm", "cm", "m", "um" or "in", a literal: the unit in which an
                                  * odd file would hold lungs; else NULL */
 } supine_mesh_report;

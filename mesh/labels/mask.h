@@ -115,7 +115,7 @@ typedef struct labels_cubes {
   size_t size[3];
   double origin[3]; /**< centre of cube 0, in voxels of the mask */
   double ratio[3];  /**< size of a cube in voxels */
-  float *share;     /**< [size], 0 to 1, with a layer of 0 around */
+  float *share;     /**< [size] 0 to 1; 0 in the outermost layers */
 } labels_cubes;
 
 /** @param one  keep the largest piece, without cavities */

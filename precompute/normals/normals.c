@@ -24,9 +24,9 @@ static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232;
 
-/* One lung's modes before they are rounded. */
+/* One lung's modes before they are rounded; A, n and V as in normals.h. */
 typedef struct fit {
-  double *mix;     /* [MOST, 3, terms] T: n_jc = T_jc . A_c */
+  double *mix;     /* [MOST, 3, terms] T, by which n_jc = T_jc . A_c */
   double *weights; /* [MOST, 3, terms] V */
 } fit;
 

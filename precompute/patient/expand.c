@@ -450,7 +450,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   memcpy(law.powers, patient->powers, sizeof law.powers);
   memcpy(law.linear, patient->lengths, sizeof patient->lengths);
   memcpy(law.linear + 3, patient->motion, sizeof patient->motion);
-  estimate found[2] = {{.power = law}, {.power = law}}; /* without and with expandability */
+  estimate found[2] = {{.power = law}, {.power = law}}; /* even tissue; fitted tissue */
   study *s = calloc(1, sizeof *s);
   *report = (supine_patient_expand_report){.tried = true, .softest = 1.0, .stiffest = 1.0};
   *stiffness = (supine_patient_stiffness){0};

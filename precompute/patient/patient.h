@@ -100,7 +100,7 @@ void supine_patient_law_displacement(const supine_patient *patient,
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
                             const double u[3], double r[3]);
 
-/** Compute u of a point, mm, without the motion between the scans.
+/** Compute the displacement u of a point, mm, less the motion between the scans.
  * @param side  as supine_patient_find */
 void supine_patient_displacement(const supine_patient *patient, const double point[3], double side,
                                  double u[3]);

@@ -84,7 +84,7 @@ static void accept_peers(supine_stream_server *s) {
     const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
-        s->accept_at = s->woke + again_time; /* out of descriptors, for example */
+        s->accept_at = s->woke + again_time; /* no descriptor is free, for example: wait */
       }
       return;
     }
