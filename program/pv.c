@@ -85,12 +85,7 @@ static int run_fit(const char *path, const request *chosen) {
   supine_error error = {0};
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  supine_pv_samples samples = {0};
-  supine_status status = supine_breath_samples_load(path, &samples, &error);
-  if (status == SUPINE_OK) {
-    status = supine_breath_fit_samples(&samples, chosen->confidence, &pv, reports, &error);
-  }
-  supine_breath_samples_clear(&samples);
+  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, &error);
   if (status == SUPINE_OK && chosen->output != NULL) {
     status = supine_breath_save(chosen->output, &pv, &error);
   }

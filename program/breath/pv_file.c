@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files: samples in, parameters out and in. */
+/* Files of samples and of parameters. */
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/csv.h"
 #include "sh/base/output.h"
 
-#include "program/breath/pv_internal.h"
+#include "program/breath/pv.h"
 
-/* Which limb the column names; inhale where the file has no such column. */
+/* Read the limb that a column names; inhale where the file has no such column. */
 static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_limb *limb,
                                supine_error *error) {
   const char *text = supine_csv_text(csv, column);
@@ -24,124 +25,69 @@ static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_l
                           csv->line, text);
 }
 
-static supine_status grow(void **array, size_t count, size_t size) {
-  void *larger = reallocarray(*array, count, size);
-  if (larger == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  *array = larger;
-  return SUPINE_OK;
-}
+/* The samples of a limb, in the file's order. */
+typedef struct samples {
+  size_t count;
+  supine_pv_sample *sample;
+} samples;
 
-/* Room for one more: arrays double when their count reaches a power of two. */
-static supine_status samples_reserve(supine_pv_samples *samples, supine_pv_limb limb,
-                                     supine_error *error) {
-  const size_t count = samples->count[limb];
-  if ((count & (count - 1)) != 0) {
-    return SUPINE_OK;
-  }
-  const size_t room = count == 0 ? 1 : 2 * count;
-  if (grow((void **)&samples->pressure[limb], room, sizeof(double)) != SUPINE_OK ||
-      grow((void **)&samples->volume[limb], room, sizeof(double)) != SUPINE_OK ||
-      grow((void **)&samples->line[limb], room, sizeof(size_t)) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
-  return SUPINE_OK;
-}
-
-static supine_status samples_add(const supine_csv *csv, const char *const *names,
-                                 supine_pv_samples *samples, supine_error *error) {
+static supine_status add_sample(const supine_csv *csv, const char *const *names, samples *limbs,
+                                supine_error *error) {
   supine_pv_limb limb = SUPINE_PV_INHALE;
-  double pressure = 0.0;
-  double volume = 0.0;
+  supine_pv_sample sample = {.line = csv->line};
   supine_status status = read_limb(csv, 2, &limb, error);
   if (status == SUPINE_OK) {
-    status = supine_csv_number(csv, 0, names[0], &pressure, error);
+    status = supine_csv_number(csv, 0, names[0], &sample.pressure, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_csv_number(csv, 1, names[1], &volume, error);
+    status = supine_csv_number(csv, 1, names[1], &sample.volume, error);
   }
-  if (status == SUPINE_OK) {
-    status = samples_reserve(samples, limb, error);
-  }
-  if (status == SUPINE_OK) {
-    const size_t j = samples->count[limb]++;
-    samples->pressure[limb][j] = pressure;
-    samples->volume[limb][j] = volume;
-    samples->line[limb][j] = csv->line;
-  }
-  return status;
-}
-
-supine_status supine_breath_samples_load(const char *path, supine_pv_samples *samples,
-                                         supine_error *error) {
-  static const char *const names[] = {"pressure_cmH2O", "volume_mL", "limb"};
-  *samples = (supine_pv_samples){0};
-  supine_csv csv = {0};
-  supine_status status = supine_csv_open(path, names, 3, 2, &csv, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  samples->name = strdup(path);
-  if (samples->name == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
+  samples *into = &limbs[limb];
+  supine_pv_sample *grown = reallocarray(into->sample, into->count + 1, sizeof *grown);
+  if (grown == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  for (bool more = true; more;) {
+  into->sample = grown;
+  into->sample[into->count++] = sample;
+  return SUPINE_OK;
+}
+
+static supine_status load_samples(const char *path, samples *limbs, supine_error *error) {
+  static const char *const names[] = {"pressure_cmH2O", "volume_mL", "limb"};
+  supine_csv csv = {0};
+  supine_status status = supine_csv_open(path, names, 3, 2, &csv, error);
+  for (bool more = true; status == SUPINE_OK && more;) {
     status = supine_csv_next(&csv, &more, error);
     if (status == SUPINE_OK && more) {
-      status = samples_add(&csv, names, samples, error);
-    }
-    if (status != SUPINE_OK) {
-      goto cleanup;
+      status = add_sample(&csv, names, limbs, error);
     }
   }
-cleanup:
   supine_csv_close(&csv);
-  if (status != SUPINE_OK) {
-    supine_breath_samples_clear(samples);
-  }
   return status;
 }
 
-void supine_breath_samples_clear(supine_pv_samples *samples) {
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    free(samples->line[limb]);
-    free(samples->volume[limb]);
-    free(samples->pressure[limb]);
-  }
-  free(samples->name);
-  *samples = (supine_pv_samples){0};
-}
-
-supine_status supine_breath_fit_samples(const supine_pv_samples *samples, double confidence,
-                                        supine_pv *pv, supine_pv_report *reports,
-                                        supine_error *error) {
-  supine_pv found = {0};
-  supine_pv_report told[SUPINE_PV_LIMB_COUNT] = {{0}};
-  int fitted = 0;
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (samples->count[limb] == 0 && (fitted > 0 || limb + 1 < SUPINE_PV_LIMB_COUNT)) {
-      continue;
-    }
-    const supine_status status = supine_breath_fit(
-        samples->count[limb], samples->pressure[limb], samples->volume[limb], samples->line[limb],
-        samples->name, confidence, &found.limb[limb], &told[limb], error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
-    ++fitted;
-  }
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (samples->count[limb] == 0) {
-      found.limb[limb] = found.limb[SUPINE_PV_LIMB_COUNT - 1 - limb];
+supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
+                                     supine_pv_report *reports, supine_error *error) {
+  samples limbs[SUPINE_PV_LIMB_COUNT] = {{0}};
+  supine_status status = load_samples(path, limbs, error);
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+    const samples *of = &limbs[limb];
+    reports[limb] = (supine_pv_report){0};
+    if (of->count > 0 || limbs[1 - limb].count == 0) {
+      status = supine_breath_fit(path, of->count, of->sample, confidence, &pv->limb[limb],
+                                 &reports[limb], error);
     }
   }
-  *pv = found;
-  if (reports != NULL) {
-    memcpy(reports, told, sizeof told);
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    if (limbs[limb].count == 0) {
+      pv->limb[limb] = pv->limb[1 - limb];
+    }
+    free(limbs[limb].sample);
   }
-  return SUPINE_OK;
+  return status;
 }
 
 static const char *const parameter_names[] = {"limb",
@@ -188,7 +134,7 @@ supine_status supine_breath_save(const char *path, const supine_pv *pv, supine_e
   return supine_output_commit(&output, error);
 }
 
-/* One row; `seen` remembers which limbs were read. */
+/* Read a row of parameters; `seen` marks the limbs that the file has. */
 static supine_status parameters_add(const supine_csv *csv, supine_pv *pv, bool *seen,
                                     supine_error *error) {
   supine_pv_limb limb = SUPINE_PV_INHALE;
@@ -237,11 +183,11 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: no row of parameters: make the file with 'supine pv fit'", path);
   }
-  if (!seen[SUPINE_PV_INHALE]) {
-    found.limb[SUPINE_PV_INHALE] = found.limb[SUPINE_PV_EXHALE];
-  } else if (!seen[SUPINE_PV_EXHALE]) {
-    found.limb[SUPINE_PV_EXHALE] = found.limb[SUPINE_PV_INHALE];
-  }
   *pv = found;
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    if (!seen[limb]) {
+      pv->limb[limb] = found.limb[1 - limb];
+    }
+  }
   return SUPINE_OK;
 }

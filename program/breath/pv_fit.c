@@ -1,198 +1,292 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The inverse problem: the limb that fits samples best. */
+/* The limb that fits samples best, and how well the samples determine it. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include <gsl/gsl_cdf.h>
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multifit_nlinear.h>
+#include <gsl/gsl_statistics.h>
+#include <lapacke.h>
 
-#include "program/breath/pv_internal.h"
+#include "program/breath/pv.h"
 
-enum { LOW = SUPINE_PV_CONTROLS, HIGH }; /* V_low and V_high among the unknowns */
+enum {
+  LOW = SUPINE_PV_CONTROLS, /* V_low and V_high among the unknowns */
+  HIGH,
+  NOISE_KNOWN = 15 /* number of samples from which noise is estimated beside the unknowns */
+};
 
-/* Samples sorted by pressure, x in [-1, 1] and V in shares of the volume range. */
+/* Sorted samples, and the workspace of their fit. */
 typedef struct problem {
+  const char *name;
   size_t count;
-  double *x;      /* [count] */
-  double *v;      /* [count] */
-  double *states; /* [count, PV_STATE_WITH_RESPONSES] */
-  supine_status status;
+  supine_pv_sample *sample; /* [count] by rising pressure */
+  gsl_multifit_nlinear_workspace *work;
+  gsl_matrix *covariance;
+  double *x;       /* [count] pressures mapped to -1 to 1 */
+  double *v;       /* [count] volumes above the first, in shares of their range */
+  double *q;       /* [count] the curve with volumes 0 to 1 */
+  double *scratch; /* [count, SUPINE_PV_UNKNOWNS] */
 } problem;
 
-/* Residuals, and the Jacobian where it is asked for. With q = y / y(1):
- *   V = (1 - q) V_low + q V_high      dq/dc_i = (dy/dc_i - q dy(1)/dc_i) / y(1) */
-static int problem_evaluate(const gsl_vector *unknowns, problem *limb, gsl_vector *residual,
-                            gsl_matrix *jacobian) {
-  static const double wall = 1e6; /* residual that makes the search step back */
-  const size_t size = jacobian != NULL ? PV_STATE_WITH_RESPONSES : PV_STATE;
-  const double *control = unknowns->data;
-  for (size_t i = 0; i < SUPINE_PV_CONTROLS; ++i) {
-    if (!(fabs(control[i]) <= SUPINE_PV_CONTROL_MAX) && residual != NULL) {
-      gsl_vector_set_all(residual, wall);
-      return GSL_SUCCESS;
+static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
+                            supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%.200s:%zu: %s", limb->name, sample->line,
+                          why);
+}
+
+static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sample, double larger,
+                                 supine_error *error) {
+  char why[160];
+  (void)snprintf(why, sizeof why,
+                 "volume %g mL where a lower pressure already has %g mL: volume must rise with "
+                 "pressure, but for noise",
+                 sample->volume, larger);
+  return refuse(limb, sample, why, error);
+}
+
+/* Check that pressures keep rising or keep falling, and copy the samples by rising pressure. */
+static supine_status sort(problem *limb, const supine_pv_sample *samples, supine_error *error) {
+  const size_t count = limb->count;
+  supine_pv_sample *sorted = limb->sample;
+  const bool falling = samples[count - 1].pressure < samples[0].pressure;
+  for (size_t j = 0; j < count; ++j) {
+    const double step = j == 0 ? 0.0 : samples[j].pressure - samples[j - 1].pressure;
+    if (j > 0 && step == 0.0) {
+      return refuse(limb, &samples[j],
+                    "the pressure repeats the one before: keep one of the samples, or their mean",
+                    error);
     }
+    if (j > 0 && (step > 0.0) != (samples[1].pressure > samples[0].pressure)) {
+      return refuse(limb, &samples[j],
+                    "pressure turns back: within a limb it must keep rising or keep falling; sort "
+                    "the samples, or name the limbs in a column \"limb\"",
+                    error);
+    }
+    sorted[falling ? count - 1 - j : j] = samples[j];
   }
-  limb->status = supine_breath_integrate(control, limb->count, limb->x, size, limb->states);
-  if (limb->status != SUPINE_OK) {
-    return GSL_EFAILED;
+  return sorted[count - 1].volume > sorted[0].volume
+             ? SUPINE_OK
+             : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
+}
+
+/* Refuse volumes that fall by more than `allowed` mL below the local trend, or below the largest
+ * volume before them. */
+static supine_status check_falls(const problem *limb, double allowed, supine_error *error) {
+  const supine_pv_sample *s = limb->sample;
+  const size_t last = limb->count - 1;
+  double peak = s[0].volume;
+  for (size_t j = 1; j <= last; ++j) {
+    /* Predict the rise of this step from the samples on either side. */
+    const size_t before = j >= 2 ? j - 2 : 0;
+    const size_t after = j < last ? j + 1 : last;
+    const double expected =
+        fmax(0.0, (s[after].volume - s[before].volume) / (double)(after - before));
+    const double fall = s[j - 1].volume - s[j].volume;
+    if ((fall > 0.0 && fall + expected > allowed) || peak - s[j].volume > allowed) {
+      return refuse_fall(limb, &s[j], peak, error);
+    }
+    peak = fmax(peak, s[j].volume);
   }
-  const double low = gsl_vector_get(unknowns, LOW);
-  const double high = gsl_vector_get(unknowns, HIGH);
-  const double *end = limb->states + (limb->count - 1) * size;
+  return SUPINE_OK;
+}
+
+/* Compute q at the samples; false where a control parameter is beyond its bounds. */
+static bool find_shape(const problem *limb, const double *control, double *q) {
+  supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
+  memcpy(curve.control, control, sizeof curve.control);
+  return supine_breath_curve_evaluate(&curve, limb->count, limb->x, q, NULL, NULL) == SUPINE_OK;
+}
+
+/* V(x) - V_j with V = (1 - q) V_low + q V_high. */
+static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
+  static const double wall = 1e6; /* residual beyond the bounds, so that the search steps back */
+  const problem *limb = context;
+  if (!find_shape(limb, unknowns->data, limb->q)) {
+    gsl_vector_set_all(residual, wall);
+    return GSL_SUCCESS;
+  }
   for (size_t j = 0; j < limb->count; ++j) {
-    const double *state = limb->states + j * size;
-    const double q = state[0] / end[0];
-    if (residual != NULL) {
-      gsl_vector_set(residual, j, (1.0 - q) * low + q * high - limb->v[j]);
-    }
-    for (size_t i = 0; jacobian != NULL && i < SUPINE_PV_CONTROLS; ++i) {
-      const size_t k = PV_STATE + 2 * i;
-      gsl_matrix_set(jacobian, j, i, (high - low) * (state[k] - q * end[k]) / end[0]);
-    }
-    if (jacobian != NULL) {
-      gsl_matrix_set(jacobian, j, LOW, 1.0 - q);
-      gsl_matrix_set(jacobian, j, HIGH, q);
-    }
+    const double q = limb->q[j];
+    gsl_vector_set(residual, j,
+                   (1.0 - q) * unknowns->data[LOW] + q * unknowns->data[HIGH] - limb->v[j]);
   }
   return GSL_SUCCESS;
 }
 
-static int problem_residual(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
-  return problem_evaluate(unknowns, context, residual, NULL);
+/* dV/dc_i by central differences, which are accurate to about 1e-10; V is linear in V_low and
+ * V_high. */
+static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
+  static const double step = 1e-5;
+  const problem *limb = context;
+  const double span = unknowns->data[HIGH] - unknowns->data[LOW];
+  double control[SUPINE_PV_CONTROLS];
+  memcpy(control, unknowns->data, sizeof control);
+  for (size_t i = 0; i < SUPINE_PV_CONTROLS; ++i) {
+    const double up = fmin(control[i] + step, SUPINE_PV_CONTROL_MAX);
+    const double down = fmax(control[i] - step, -SUPINE_PV_CONTROL_MAX);
+    for (int side = 0; side < 2; ++side) {
+      control[i] = side == 0 ? up : down;
+      (void)find_shape(limb, control, limb->q);
+      for (size_t j = 0; j < limb->count; ++j) {
+        double *entry = gsl_matrix_ptr(jacobian, j, i);
+        *entry = side == 0 ? limb->q[j] : span * (*entry - limb->q[j]) / (up - down);
+      }
+    }
+    control[i] = unknowns->data[i];
+  }
+  (void)find_shape(limb, control, limb->q);
+  for (size_t j = 0; j < limb->count; ++j) {
+    gsl_matrix_set(jacobian, j, LOW, 1.0 - limb->q[j]);
+    gsl_matrix_set(jacobian, j, HIGH, limb->q[j]);
+  }
+  return GSL_SUCCESS;
 }
 
-static int problem_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
-  return problem_evaluate(unknowns, context, NULL, jacobian);
+/* Return the ratio of the extreme singular values of J with columns scaled to unit length, in
+ * `scaled`; 0 where LAPACK fails. */
+static double jacobian_condition(const gsl_matrix *jacobian, double *scaled) {
+  const int rows = (int)jacobian->size1;
+  const int columns = (int)jacobian->size2;
+  double s[SUPINE_PV_UNKNOWNS];
+  for (int j = 0; j < columns; ++j) {
+    cblas_dcopy(rows, jacobian->data + j, (int)jacobian->tda, scaled + j, columns);
+    const double length = cblas_dnrm2(rows, scaled + j, columns);
+    cblas_dscal(rows, length > 0.0 ? 1.0 / length : 1.0, scaled + j, columns);
+  }
+  const bool found = LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'N', rows, columns, scaled, columns, s, NULL,
+                                    columns, NULL, columns) == 0;
+  return found ? s[0] / s[columns - 1] : 0.0;
+}
+
+/* Fill the report of a minimum found, and estimate the noise of a volume, mL, from the median
+ * residual, which outliers do not affect. */
+static void describe(const problem *limb, double span, double confidence, supine_pv_report *report,
+                     double *sigma) {
+  static const double normal = 1.4826; /* sigma over median |error| of the normal distribution */
+  const gsl_matrix *jacobian = gsl_multifit_nlinear_jac(limb->work);
+  const gsl_vector *residual = gsl_multifit_nlinear_residual(limb->work);
+  const size_t count = residual->size;
+  const double freedom = (double)(count - SUPINE_PV_UNKNOWNS);
+  const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
+  const double share = misfit / sqrt((double)count);
+  *report = (supine_pv_report){.samples = count,
+                               .rms = span * share,
+                               .rms_percent = 100.0 * share,
+                               .condition = jacobian_condition(jacobian, limb->scratch)};
+  /* covariance = sigma^2 (J^T J)^-1 */
+  (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
+  const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
+  for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
+    const double interval = t * misfit * sqrt(gsl_matrix_get(limb->covariance, i, i) / freedom);
+    *(i < LOW ? &report->control_interval[i] : &report->volume_interval[i - LOW]) =
+        i < LOW ? interval : span * interval;
+  }
+  for (size_t j = 0; j < count; ++j) {
+    limb->scratch[j] = fabs(gsl_vector_get(residual, j));
+  }
+  *sigma =
+      span * normal * gsl_stats_median(limb->scratch, 1, count) * sqrt((double)count / freedom);
 }
 
 /* Levenberg-Marquardt from the straight line between the end samples. */
-static supine_status problem_solve(problem *limb, gsl_multifit_nlinear_workspace *work) {
+static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;
   double start[SUPINE_PV_UNKNOWNS] = {0};
   start[LOW] = limb->v[0];
   start[HIGH] = limb->v[limb->count - 1];
   gsl_vector_view unknowns = gsl_vector_view_array(start, SUPINE_PV_UNKNOWNS);
-  gsl_multifit_nlinear_fdf system = {.f = problem_residual,
-                                     .df = problem_jacobian,
+  gsl_multifit_nlinear_fdf system = {.f = find_residuals,
+                                     .df = find_jacobian,
                                      .n = limb->count,
                                      .p = SUPINE_PV_UNKNOWNS,
                                      .params = limb};
   int info = 0;
-  int code = gsl_multifit_nlinear_init(&unknowns.vector, &system, work);
+  int code = gsl_multifit_nlinear_init(&unknowns.vector, &system, limb->work);
   if (code == GSL_SUCCESS) {
-    code =
-        gsl_multifit_nlinear_driver(STEPS_MAX, tolerance, tolerance, 0.0, NULL, NULL, &info, work);
-  }
-  if (limb->status != SUPINE_OK) {
-    return limb->status;
+    code = gsl_multifit_nlinear_driver(STEPS_MAX, tolerance, tolerance, 0.0, NULL, NULL, &info,
+                                       limb->work);
   }
   /* A minimum reached to rounding makes no further progress. */
   return code == GSL_SUCCESS || code == GSL_ENOPROG ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
 }
 
-/* Samples by rising pressure, shifted and scaled to the unit range. */
-static void problem_fill(problem *limb, const double *pressures, const double *volumes,
-                         const supine_pv_curve *curve, double span) {
-  const size_t last = limb->count - 1;
-  const bool falling = pressures[last] < pressures[0];
-  for (size_t j = 0; j < limb->count; ++j) {
-    const size_t from = falling ? last - j : j;
-    limb->x[j] = supine_breath_normalise(curve, pressures[from]);
-    limb->v[j] = (volumes[from] - curve->volume[0]) / span;
+/* Fit sorted samples. */
+static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curve *curve,
+                                supine_pv_report *report, supine_error *error) {
+  const size_t count = limb->count;
+  const supine_pv_sample *s = limb->sample;
+  const double low = s[0].pressure;
+  const double high = s[count - 1].pressure;
+  double least = s[0].volume;
+  double largest = s[0].volume;
+  double sigma = 0.0;
+  for (size_t j = 1; j < count; ++j) {
+    least = fmin(least, s[j].volume);
+    largest = fmax(largest, s[j].volume);
   }
-}
-
-static supine_status fit_curve(problem *limb, double span, double confidence,
-                               supine_pv_curve *curve, supine_pv_report *report, double *sigma) {
-  gsl_multifit_nlinear_parameters options = gsl_multifit_nlinear_default_parameters();
-  gsl_multifit_nlinear_workspace *work = gsl_multifit_nlinear_alloc(
-      gsl_multifit_nlinear_trust, &options, limb->count, SUPINE_PV_UNKNOWNS);
-  if (work == NULL) {
-    return SUPINE_ERROR_MEMORY;
+  const double span = largest - least;
+  for (size_t j = 0; j < count; ++j) {
+    limb->x[j] = ((s[j].pressure - low) - (high - s[j].pressure)) / (high - low);
+    limb->v[j] = (s[j].volume - s[0].volume) / span;
   }
-  supine_status status = problem_solve(limb, work);
-  if (status == SUPINE_OK) {
-    const double *found = gsl_multifit_nlinear_position(work)->data;
-    const double shift = curve->volume[0];
-    for (size_t i = 0; i < SUPINE_PV_CONTROLS; ++i) {
-      curve->control[i] = found[i];
-    }
-    curve->volume[0] = shift + span * found[LOW];
-    curve->volume[1] = shift + span * found[HIGH];
-    status = supine_breath_report_fill(gsl_multifit_nlinear_jac(work),
-                                       gsl_multifit_nlinear_residual(work), span, confidence,
-                                       report, sigma);
-  }
-  gsl_multifit_nlinear_free(work);
-  return status;
-}
-
-/* Fit both limbs. Nine parameters, over 60 lines: samples, options of the fit, and its results. */
-supine_status supine_breath_fit(size_t count, const double *pressures, const double *volumes,
-                                const size_t *lines, const char *name, double confidence,
-                                supine_pv_curve *curve, supine_pv_report *report,
-                                supine_error *error) {
-  enum { TELLING = 15 }; /* samples that let noise be estimated beside the unknowns */
-  static const double allowed_share_few = 0.08;
-  static const double allowed_share = 0.15;
-  static const double allowed_sigmas = 7.0;
-  if (!(confidence > 0.0 && confidence < 1.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "confidence %g is not between 0 and 1: give "
-                            "--confidence 0.95, for example",
-                            confidence);
-  }
-  const pv_origin origin = {name, lines, count, pressures, volumes};
-  supine_status status = supine_breath_samples_check(&origin, error);
+  supine_status status = check_falls(limb, (count < NOISE_KNOWN ? 0.08 : 0.15) * span, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  double span = 0.0;
-  supine_pv_curve found = {0};
-  supine_pv_report told = {0};
-  supine_breath_samples_range(&origin, &found, &span);
-  double sigma = 0.0;
-  problem limb = {.count = count,
-                  .x = calloc(count, sizeof(double)),
-                  .v = calloc(count, sizeof(double)),
-                  .states = calloc(count, PV_STATE_WITH_RESPONSES * sizeof(double))};
-  if (limb.x == NULL || limb.v == NULL || limb.states == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
+  if (minimise(limb) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "%s: no pressure-volume curve fits: look for an outlier and remove it",
+                            limb->name);
   }
-  problem_fill(&limb, pressures, volumes, &found, span);
-  status = supine_breath_check_falls(&origin, limb.v,
-                                     count < TELLING ? allowed_share_few : allowed_share, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
+  const double *found = gsl_multifit_nlinear_position(limb->work)->data;
+  *curve = (supine_pv_curve){
+      .pressure = {low, high},
+      .volume = {s[0].volume + span * found[LOW], s[0].volume + span * found[HIGH]}};
+  memcpy(curve->control, found, sizeof curve->control);
+  describe(limb, span, confidence, report, &sigma);
+  if (count >= NOISE_KNOWN) {
+    status = check_falls(limb, 7.0 * sqrt(2.0) * sigma, error);
   }
-  status = fit_curve(&limb, span, confidence, &found, &told, &sigma);
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "%s: %s", name != NULL ? name : "samples",
-                           status == SUPINE_ERROR_MEMORY
-                               ? "out of memory"
-                               : "no pressure-volume curve fits: look for an outlier and "
-                                 "remove it");
-    goto cleanup;
+  return status == SUPINE_OK ? supine_breath_curve_check(curve, error) : status;
+}
+
+supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
+                                double confidence, supine_pv_curve *curve, supine_pv_report *report,
+                                supine_error *error) {
+  gsl_multifit_nlinear_parameters options = gsl_multifit_nlinear_default_parameters();
+  if (count <= SUPINE_PV_UNKNOWNS) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: %zu samples in a limb are too few for %d unknowns: give at least %d", name, count,
+        (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
   }
-  if (count >= TELLING) {
-    status = supine_breath_check_falls(&origin, limb.v, allowed_sigmas * sqrt(2.0) * sigma, error);
+  problem limb = {.name = name,
+                  .count = count,
+                  .sample = malloc(count * sizeof *limb.sample),
+                  .work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &options, count,
+                                                     SUPINE_PV_UNKNOWNS),
+                  .covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS),
+                  .x = malloc((3 + SUPINE_PV_UNKNOWNS) * count * sizeof(double))};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (limb.sample == NULL || limb.work == NULL || limb.covariance == NULL || limb.x == NULL) {
+    (void)supine_error_set(error, status, "%s: no memory for %zu samples", name, count);
+  } else {
+    limb.v = limb.x + count;
+    limb.q = limb.v + count;
+    limb.scratch = limb.q + count;
+    status = sort(&limb, samples, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_breath_curve_check(&found, error);
+    status = fit_sorted(&limb, confidence, curve, report, error);
   }
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  *curve = found;
-  if (report != NULL) {
-    *report = told;
-  }
-cleanup:
-  free(limb.states);
-  free(limb.v);
+  gsl_multifit_nlinear_free(limb.work);
+  gsl_matrix_free(limb.covariance);
   free(limb.x);
+  free(limb.sample);
   return status;
 }

@@ -35,17 +35,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   for (size_t i = 0; status == SUPINE_OK && i < (size_t)3 * VERTICES; ++i) {
     supine_fuzz_expect(isfinite(vectors[i]), "a direction");
   }
-  supine_pv_samples samples = {0};
-  status = supine_breath_samples_load(path, &samples, &error);
-  expect_words(status, &error);
-  for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    for (size_t i = 0; i < samples.count[limb]; ++i) {
-      supine_fuzz_expect(isfinite(samples.pressure[limb][i]) && isfinite(samples.volume[limb][i]),
-                         "a sample");
-    }
-  }
-  supine_breath_samples_clear(&samples);
   supine_pv pv;
+  supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
+  status = supine_breath_fit_file(path, 0.95, &pv, reports, &error);
+  expect_words(status, &error);
   status = supine_breath_load(path, &pv, &error);
   expect_words(status, &error);
   for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
