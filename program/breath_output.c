@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Where the frames of a breath go: one VTP file over time or a series of them, or safetensors. */
+/* Write the frames of a breath: VTP over time, a series of VTP files, or safetensors. */
+#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include "sh/base/folder.h"
 #include "sh/base/output.h"
 #include "sh/base/text.h"
 #include <supine/safetensors.h>
@@ -21,31 +23,23 @@ enum { FIELDS = 3 };
 
 struct breath_output {
   breath_content content;
-  supine_mesh mesh; /* mesh of the frame: its own vertices, the basis' triangles */
+  const char *path;
+  supine_mesh mesh; /* of the frame: its own vertices, the triangles of the basis */
   supine_mesh_save_options save;
   supine_mesh_field fields[FIELDS];
-  float *normals; /* [N, 3] */
-  char *path;
-  supine_mesh_series *series; /* NULL: the output is not one file */
-  supine_folder folder; /* of a file a frame, with the PVD file beside it, or NULL: it is inside */
-  float *positions;     /* positions of all frames [T, N, 3], mm */
-  size_t next;
+  float *normals;             /* [N, 3] */
+  supine_mesh_series *series; /* of a .vtp file; else NULL */
+  char *folder;               /* of a .pvd file until it is complete; else NULL */
+  float *positions;           /* [T, N, 3] mm, of a .safetensors file; else NULL */
+  size_t next;                /* frame */
   char comment[512];
 };
-
-static char *join(const char *first, const char *second) {
-  char *text = malloc(strlen(first) + strlen(second) + 1);
-  if (text != NULL) {
-    (void)stpcpy(stpcpy(text, first), second);
-  }
-  return text;
-}
 
 static supine_status no_memory(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
 }
 
-/* What VTP files have of each frame: the first one's, or all of them. */
+/* Describe the content of VTP files; the fields point to the first frame. */
 static void fill_save(breath_output *made) {
   const breath_content *content = &made->content;
   const supine_tensor *lung = supine_basis_tensor(content->basis, "lung");
@@ -66,7 +60,7 @@ static void fill_save(breath_output *made) {
   made->save.rounding = rounding;
 }
 
-static supine_status open_series(breath_output *made, supine_error *error) {
+static supine_status open_vtp(breath_output *made, supine_error *error) {
   const size_t count = 3 * made->content.rest->vertex_count;
   const breath_course *course = made->content.course;
   made->mesh = *made->content.rest;
@@ -77,21 +71,26 @@ static supine_status open_series(breath_output *made, supine_error *error) {
   }
   memcpy(made->mesh.vertices, made->content.rest->vertices, count * sizeof *made->mesh.vertices);
   fill_save(made);
-  if (supine_text_ends_in(made->path, ".vtp")) {
+  if (supine_text_ends_in_any_case(made->path, ".vtp")) {
     made->save.field_count = FIELDS - 1; /* the file holds the time of each frame */
     return supine_mesh_series_open(made->path, &made->mesh, &made->save, course->count,
                                    course->time, &made->series, error);
   }
-  if (!supine_text_ends_in(made->path, ".pvd")) {
-    return supine_folder_open(made->path, NULL, &made->folder, error);
-  }
-  char *stem = strndup(made->path, strlen(made->path) - strlen(".pvd"));
-  if (stem == NULL) {
+  char *folder = strndup(made->path, strlen(made->path) - strlen(".pvd"));
+  if (folder == NULL) {
     return no_memory(made->path, error);
   }
-  const supine_status status = supine_folder_open(stem, made->path, &made->folder, error);
-  free(stem);
-  return status;
+  (void)rmdir(folder); /* one that is not empty stays */
+  if (mkdir(folder, 0777) != 0) {
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE,
+                           "%s: cannot create this folder for the frames (%s): remove it, or "
+                           "choose another name",
+                           folder, strerror(errno));
+    free(folder);
+    return SUPINE_ERROR_WRITE;
+  }
+  made->folder = folder;
+  return SUPINE_OK;
 }
 
 static supine_status open_tensors(breath_output *made, supine_error *error) {
@@ -104,10 +103,10 @@ static supine_status open_tensors(breath_output *made, supine_error *error) {
     return supine_error_set(
         error, SUPINE_ERROR_MEMORY,
         "%s: no memory for %zu frames of %zu vertices (%.1f GB): take fewer, or "
-        "write a series",
+        "write a .vtp file",
         made->path, frames, frame / 3, 4e-9 * (double)frame * (double)frames);
   }
-  return supine_output_try(made->path, error); /* before the work */
+  return SUPINE_OK;
 }
 
 supine_status supine_command_breath_output_open(const char *path, const breath_content *content,
@@ -118,14 +117,10 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
     return no_memory(path, error);
   }
   made->content = *content;
-  made->path = join(path, "");
-  supine_status status = SUPINE_OK;
-  if (made->path == NULL) {
-    status = no_memory(path, error);
-  } else {
-    status = supine_text_ends_in(path, ".safetensors") ? open_tensors(made, error)
-                                                       : open_series(made, error);
-  }
+  made->path = path;
+  const supine_status status = supine_text_ends_in_any_case(path, ".safetensors")
+                                   ? open_tensors(made, error)
+                                   : open_vtp(made, error);
   if (status != SUPINE_OK) {
     supine_command_breath_output_close(made);
     return status;
@@ -134,40 +129,37 @@ supine_status supine_command_breath_output_open(const char *path, const breath_c
   return SUPINE_OK;
 }
 
-/* Bytes per vertex, measured on synthetic lungs of 40,000 vertices (tests/bench/bench_breath.py);
- * with triangles where each frame stores them. */
-double supine_command_breath_output_size(const char *path, const breath_content *content) {
-  const double each = supine_text_ends_in(path, ".safetensors") ? 12.0
-                      : supine_text_ends_in(path, ".vtp")       ? 23.0
-                                                                : 29.0;
-  return each * (double)content->rest->vertex_count * (double)content->course->count;
+/* Return the path of a frame's file in a folder; NULL: no memory. */
+static char *frame_path(const char *folder, size_t frame) {
+  char *path = NULL;
+  return asprintf(&path, "%s/frame_%05zu.vtp", folder, frame) < 0 ? NULL : path;
 }
 
 void supine_command_breath_output_close(breath_output *output) {
   if (output == NULL) {
     return;
   }
+  for (size_t t = 0; output->folder != NULL && t < output->next; ++t) {
+    char *path = frame_path(output->folder, t);
+    if (path != NULL) {
+      (void)unlink(path);
+    }
+    free(path);
+  }
+  if (output->folder != NULL) {
+    (void)rmdir(output->folder);
+  }
   supine_mesh_series_close(output->series);
-  supine_folder_close(&output->folder);
-  free(output->path);
+  free(output->folder);
   free(output->mesh.vertices);
   free(output->normals);
   free(output->positions);
   free(output);
 }
 
-enum { FRAME_NAME_SIZE = 32 };
-
-static void frame_name(size_t frame, char name[FRAME_NAME_SIZE]) {
-  (void)snprintf(name, FRAME_NAME_SIZE, "frame_%05zu.vtp", frame);
-}
-
 static supine_status add_file(breath_output *output, size_t frame, supine_error *error) {
   const breath_course *course = output->content.course;
-  char name[FRAME_NAME_SIZE + 1];
-  name[0] = '/';
-  frame_name(frame, name + 1);
-  char *path = join(output->folder.temporary, name);
+  char *path = frame_path(output->folder, frame);
   if (path == NULL) {
     return no_memory(output->path, error);
   }
@@ -195,11 +187,11 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
                                 : add_file(output, frame, error);
 }
 
-/* The list of the frames; `folder` before each name, "" where they lie beside it. */
-static supine_status write_index(const breath_output *output, const char *path, const char *folder,
-                                 supine_error *error) {
+/* Write the index of the frames, with their times in seconds. */
+static supine_status write_index(breath_output *output, supine_error *error) {
+  const char *slash = strrchr(output->folder, '/');
   supine_output file = {0};
-  const supine_status status = supine_output_open(path, &file, error);
+  supine_status status = supine_output_open(output->path, &file, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -208,66 +200,18 @@ static supine_status write_index(const breath_output *output, const char *path, 
               "<Collection>\n",
               file.file);
   for (size_t t = 0; t < output->content.course->count; ++t) {
-    char name[FRAME_NAME_SIZE];
-    frame_name(t, name);
+    char *path = frame_path(slash == NULL ? output->folder : slash + 1, t);
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
                   output->content.course->time[t]);
-    supine_template_escape(folder, file.file);
-    (void)fprintf(file.file, "%s%s\"/>\n", folder[0] == '\0' ? "" : "/", name);
+    supine_template_escape(path != NULL ? path : "", file.file);
+    (void)fputs("\"/>\n", file.file);
+    free(path);
   }
   (void)fputs("</Collection>\n</VTKFile>\n", file.file);
-  return supine_output_commit(&file, error);
-}
-
-/* Time, volumes and gravity of each frame, beside its surface. */
-static supine_status write_table(const breath_output *output, supine_error *error) {
-  const breath_course *course = output->content.course;
-  const double *volumes = output->content.volumes;
-  supine_output file = {0};
-  char *path = join(output->folder.temporary, "/breath.csv");
-  if (path == NULL) {
-    return no_memory(output->path, error);
-  }
-  supine_status status = supine_output_open(path, &file, error);
-  free(path);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  (void)fputs("frame,time_s", file.file);
-  for (size_t lung = 0; lung < course->lungs; ++lung) {
-    (void)fprintf(file.file, ",volume_%zu_mL", lung);
-  }
-  (void)fputs(",gravity_x,gravity_y,gravity_z\n", file.file);
-  for (size_t t = 0; t < course->count; ++t) {
-    const double *g = course->gravity + 3 * t;
-    (void)fprintf(file.file, "%zu,%.9g", t, course->time[t]);
-    for (size_t lung = 0; lung < course->lungs; ++lung) {
-      (void)fprintf(file.file, ",%.9g", volumes[t * course->lungs + lung]);
-    }
-    (void)fprintf(file.file, ",%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
-  }
-  return supine_output_commit(&file, error);
-}
-
-static supine_status commit_series(breath_output *output, supine_error *error) {
-  supine_status status = write_table(output, error);
-  if (status == SUPINE_OK && output->folder.index == NULL) {
-    char *inside = join(output->folder.temporary, "/breath.pvd");
-    status =
-        inside == NULL ? no_memory(output->path, error) : write_index(output, inside, "", error);
-    free(inside);
-  }
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = supine_folder_rename(&output->folder, error);
-  if (status == SUPINE_OK && output->folder.index != NULL) {
-    const char *slash = strrchr(output->folder.path, '/');
-    status = write_index(output, output->folder.index,
-                         slash == NULL ? output->folder.path : slash + 1, error);
-  }
+  status = supine_output_commit(&file, error);
   if (status == SUPINE_OK) {
-    supine_folder_keep(&output->folder);
+    free(output->folder);
+    output->folder = NULL;
   }
   return status;
 }
@@ -294,5 +238,5 @@ static supine_status commit_tensors(const breath_output *output, supine_error *e
 supine_status supine_command_breath_output_commit(breath_output *output, supine_error *error) {
   return output->positions != NULL ? commit_tensors(output, error)
          : output->series != NULL  ? supine_mesh_series_commit(output->series, error)
-                                   : commit_series(output, error);
+                                   : write_index(output, error);
 }

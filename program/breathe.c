@@ -4,6 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_statistics.h>
+
+#include "sh/base/text.h"
+
 #include "program/breath/breath_frames.h"
 #include "program/breath_output.h"
 #include "program/drawing.h"
@@ -36,12 +40,12 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as sup
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.vtp: one file for ParaView, the triangles once, whose time is the frame's number; "
-     "NAME.pvd: time in seconds, and a folder NAME with a VTP file a frame, a quarter larger. Both "
-     "to 1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: one file with "
-     "positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]; anything else: "
-     "a folder with breath.pvd and the VTP files. A folder must be new or empty",
-     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT_FOLDER},
+     "NAME.vtp: one file for ParaView, which counts its time in frames; NAME.pvd: time in seconds, "
+     "with a VTP file per frame in the folder NAME, which must be new or empty. Both have "
+     "positions rounded to 1/256 mm, normals, lungs, gravity and volumes. NAME.safetensors: "
+     "positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]",
+     SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
+     .endings = SUPINE_BREATH_ENDINGS},
     {"turn", 0, "FROM:TO:SECONDS",
      "turn gravity from one posture to another at constant speed, as supine:left:10s; between "
      "opposite postures, over the left side. The volume at rest follows the posture",
@@ -88,8 +92,7 @@ static int complete(request *wanted, size_t *count) {
     breath->inhale_fraction = 0.5;
     breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
   }
-  const char *ending = strrchr(wanted->path, '.');
-  if (wanted->as_scanned && ending != NULL && strcmp(ending, ".safetensors") == 0) {
+  if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
     return supine_options_usage(name, "--as-scanned is for VTP files only (tensors are in LPS "
                                       "and mm): leave it out");
   }
@@ -117,60 +120,40 @@ static int complete(request *wanted, size_t *count) {
   return SUPINE_EXIT_OK;
 }
 
-static int compare(const void *a, const void *b) {
-  const double x = *(const double *)a;
-  const double y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-/* Compare the volumes that the surfaces of the frames enclose with those requested. */
-typedef struct gauge {
-  supine_mesh mesh;          /* shares the triangles of the reference surface */
-  double least, peak, worst; /* mL */
-} gauge;
-
-static supine_status gauge_begin(const supine_mesh *rest, gauge *g) {
-  *g = (gauge){.mesh = *rest, .least = INFINITY, .peak = -INFINITY};
-  g->mesh.vertices = malloc(3 * rest->vertex_count * sizeof *g->mesh.vertices);
-  return g->mesh.vertices != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
-}
-
-static void gauge_frame(gauge *g, const float *xyz, double wanted) {
-  for (size_t i = 0; i < 3 * g->mesh.vertex_count; ++i) {
-    g->mesh.vertices[i] = (double)xyz[i];
-  }
-  const double held = 1e-3 * supine_mesh_volume(&g->mesh);
-  g->peak = fmax(g->peak, held);
-  g->least = fmin(g->least, held);
-  g->worst = fmax(g->worst, fabs(held - wanted));
-}
-
+/* Print the volumes, and the time that frames took. */
 static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
-                   const gauge *measured, double *seconds) {
-  qsort(seconds, course->count, sizeof *seconds, compare);
-  const double median = seconds[course->count / 2];
-  const double most = seconds[course->count - 1];
-  (void)printf("%s: %zu frames, %.2f s at %.4g a second; the surfaces hold %.2f to %.2f mL, each "
-               "within %.2g mL of its volume\n",
-               wanted->path, course->count, course->time[course->count - 1], wanted->fps,
-               measured->least, measured->peak, measured->worst);
+                   double *seconds) {
+  const double *volumes = supine_breath_frames_volumes(frames);
+  double least = INFINITY;
+  double peak = 0.0;
+  for (size_t t = 0; t < course->count; ++t) {
+    double sum = 0.0;
+    for (size_t lung = 0; lung < course->lungs; ++lung) {
+      sum += volumes[t * course->lungs + lung];
+    }
+    least = fmin(least, sum);
+    peak = fmax(peak, sum);
+  }
+  (void)printf("%s: %zu frames, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+               wanted->path, course->count, course->time[course->count - 1], wanted->fps, least,
+               peak);
   if (course->fixed) {
     (void)printf("one posture: %zu of the frames by three additions a vertex\n",
                  supine_breath_frames_stepped(frames));
   }
-  (void)printf("compute time a frame: median %.3f ms, longest %.3f ms, of %.0f ms\n", 1e3 * median,
-               1e3 * most, 1e3 * budget);
+  (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, of %.0f ms\n",
+               1e3 * gsl_stats_median(seconds, 1, course->count),
+               1e3 * gsl_stats_max(seconds, 1, course->count), 1e3 * budget);
 }
 
-/* Write all frames. Eight parameters: the frames, their targets and the outputs. */
+/* Compute and write all frames. */
 static supine_status play_frames(const breath_course *course, breath_frames *frames,
-                                 breath_output *output, const double *asked, gauge *measured,
-                                 float *xyz, double *seconds, supine_error *error) {
+                                 breath_output *output, float *xyz, double *seconds,
+                                 supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < course->count && status == SUPINE_OK; ++t) {
     seconds[t] = supine_breath_frames_next(frames, xyz);
-    gauge_frame(measured, xyz, asked[t]);
     status = supine_command_breath_output_add(output, xyz, error);
     if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)course->count)) {
       status =
@@ -204,20 +187,7 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
-/* Warn before the work about outputs so large that they are probably unintended. */
-static void warn_of_size(const request *wanted, const breath_content *content) {
-  static const double large = 2e9; /* bytes */
-  const double bytes = supine_command_breath_output_size(wanted->path, content);
-  if (bytes >= large) {
-    supine_options_say(name,
-                       "%s: %zu frames of %zu vertices will take about %.1f GB; --fps or --seconds "
-                       "make them fewer",
-                       wanted->path, content->course->count, content->rest->vertex_count,
-                       1e-9 * bytes);
-  }
-}
-
-/* Positions [N, 3] that displacement counts from; NULL: no memory. */
+/* Return the positions [N, 3] that displacement is measured from; NULL: no memory. */
 static double *find_origin(const supine_basis *basis, const supine_pose *pose, float *xyz) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
   double *origin = malloc(count * sizeof *origin);
@@ -226,27 +196,6 @@ static double *find_origin(const supine_basis *basis, const supine_pose *pose, f
     origin[i] = (double)xyz[i];
   }
   return origin;
-}
-
-/* Compute the total volume of the lungs in each frame, mL: rest in the posture, or the scan, plus
- * the breath. */
-static supine_status find_asked(const supine_basis *basis, const breath_course *course,
-                                double *asked, supine_error *error) {
-  for (size_t t = 0; t < course->count; ++t) {
-    supine_pose pose;
-    double held[SUPINE_LUNGS_MAX];
-    const supine_state begin = supine_breath_state(basis, course->gravity + 3 * t, 0.0);
-    const supine_status status = supine_basis_pose(basis, &begin, &pose, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
-    supine_basis_volumes(basis, &pose, held);
-    asked[t] = course->volume[t];
-    for (size_t lung = 0; lung < course->lungs; ++lung) {
-      asked[t] += held[lung];
-    }
-  }
-  return SUPINE_OK;
 }
 
 /* Over 60 lines: what a breath needs is made in one place and freed in one. */
@@ -259,16 +208,12 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   breath_course course = {0};
   breath_frames *frames = NULL;
   breath_output *output = NULL;
-  gauge measured = {0};
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
   double *origin = NULL;
-  double *asked = malloc(count * sizeof *asked);
   supine_reference_pose from;
   supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || asked == NULL ||
-      supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK ||
-      gauge_begin(&rest, &measured) != SUPINE_OK) {
+  if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
   }
@@ -278,9 +223,6 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   if (status == SUPINE_OK) {
     status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
                                          info->lung_count, &course, error);
-  }
-  if (status == SUPINE_OK) {
-    status = find_asked(basis, &course, asked, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_reference(basis, &wanted->from, false, &from, error);
@@ -306,27 +248,24 @@ static supine_status play(const supine_basis *basis, const request *wanted,
                                     .course = &course,
                                     .volumes = supine_breath_frames_volumes(frames),
                                     .made_by = made_by};
-    warn_of_size(wanted, &content);
     status = supine_command_breath_output_open(wanted->path, &content, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = play_frames(&course, frames, output, asked, &measured, xyz, seconds, error);
+  status = play_frames(&course, frames, output, xyz, seconds, error);
   if (status == SUPINE_OK) {
     status = supine_command_breath_output_commit(output, error);
   }
   if (status == SUPINE_OK) {
-    report(wanted, &course, frames, &measured, seconds);
+    report(wanted, &course, frames, seconds);
   }
 cleanup:
   supine_command_breath_output_close(output);
   supine_breath_frames_destroy(frames);
   supine_breath_course_free(&course);
   supine_mesh_free(&rest);
-  free(measured.mesh.vertices);
   free(origin);
-  free(asked);
   free(xyz);
   free(seconds);
   return status;

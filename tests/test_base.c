@@ -8,7 +8,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#include "sh/base/folder.h"
 #include "sh/base/output.h"
 #include "sh/base/parallel.h"
 #include "sh/base/text.h"
@@ -256,87 +255,6 @@ static void test_output_abandon_all_removes_temporary_names(void **state) {
   assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
 }
 
-/* Waits for what another process does next: true when the file is there, or not, within ten
- * seconds. */
-static bool comes_true(const char *path, bool there) {
-  for (int i = 0; i < 1000; ++i) {
-    if ((access(path, F_OK) == 0) == there) {
-      return true;
-    }
-    (void)usleep(10000);
-  }
-  return false;
-}
-
-static void touch(const char *folder, const char *name) {
-  char path[128];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "w");
-  assert_non_null(file);
-  assert_int_equal(fclose(file), 0);
-}
-
-static void test_folder_appears_whole_or_not_at_all(void **state) {
-  (void)state;
-  char outer[] = "/tmp/supine-folder-XXXXXX";
-  char path[64];
-  char index[64];
-  assert_non_null(mkdtemp(outer));
-  (void)snprintf(path, sizeof path, "%s/series", outer);
-  (void)snprintf(index, sizeof index, "%s/series.pvd", outer);
-  touch(outer, "series.pvd"); /* an old one */
-  supine_folder folder;
-  assert_int_equal(supine_folder_open(path, index, &folder, NULL), SUPINE_OK);
-  touch(folder.temporary, "a");
-  supine_folder_close(&folder); /* given up */
-  assert_int_equal(supine_folder_open(path, index, &folder, NULL), SUPINE_OK);
-  touch(folder.temporary, "a");
-  assert_int_equal(supine_folder_rename(&folder, NULL), SUPINE_OK);
-  supine_folder_close(&folder); /* its index could not be written */
-  assert_int_not_equal(access(path, F_OK), 0);
-  assert_int_equal(access(index, F_OK), 0);
-
-  for (int stage = 0; stage < 2; ++stage) { /* before and after it has its name */
-    int line[2];
-    char temporary[128] = "";
-    assert_int_equal(pipe(line), 0);
-    const pid_t child = fork();
-    if (child == 0) {
-      if (supine_folder_open(path, index, &folder, NULL) == SUPINE_OK &&
-          (stage == 0 || supine_folder_rename(&folder, NULL) == SUPINE_OK) &&
-          write(line[1], folder.temporary, strlen(folder.temporary) + 1) > 0) {
-        touch(stage == 0 ? folder.temporary : path, "a");
-        (void)raise(SIGKILL);
-      }
-      _exit(1);
-    }
-    int status = 0;
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_true(WIFSIGNALED(status));
-    assert_true(read(line[0], temporary, sizeof temporary - 1) > 0);
-    assert_true(comes_true(temporary, false) && comes_true(path, false));
-    (void)close(line[0]);
-    (void)close(line[1]);
-  }
-  assert_true(comes_true(index, false)); /* it named a folder that is no more */
-
-  assert_int_equal(supine_folder_open(path, NULL, &folder, NULL), SUPINE_OK);
-  touch(folder.temporary, "a");
-  assert_int_equal(supine_folder_rename(&folder, NULL), SUPINE_OK);
-  supine_folder_keep(&folder);
-  supine_folder_close(&folder);
-  supine_error error;
-  assert_int_equal(supine_folder_open(path, NULL, &folder, &error), SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, "this folder is not empty"));
-  char inside[80];
-  (void)snprintf(inside, sizeof inside, "%s/a", path);
-  assert_int_equal(unlink(inside), 0);
-  assert_int_equal(rmdir(path), 0);
-  assert_int_equal(rmdir(outer), 0); /* nothing else was left */
-  assert_int_equal(supine_folder_open("/nonexistent-folder/x", NULL, &folder, NULL),
-                   SUPINE_ERROR_WRITE);
-}
-
 static void test_thread_count_bounded_and_nonsense_ignored(void **state) {
   (void)state;
   assert_int_equal(unsetenv("SUPINE_THREADS"), 0);
@@ -394,7 +312,6 @@ int main(void) {
       cmocka_unit_test(test_output_full_or_missing_target_reports_write),
       cmocka_unit_test(test_output_keeps_modes_links_and_old_files),
       cmocka_unit_test(test_output_abandon_all_removes_temporary_names),
-      cmocka_unit_test(test_folder_appears_whole_or_not_at_all),
       cmocka_unit_test(test_text_ends_in_with_something_before),
       cmocka_unit_test(test_thread_count_bounded_and_nonsense_ignored),
       cmocka_unit_test(test_parallel_for_any_split_covers_each_item_once),

@@ -156,25 +156,18 @@ writer inside.safetensors embed lungs.safetensors lungs.ply
 writer moved.csv deform points.safetensors --posture prone
 writer errors.png validate lungs.safetensors --state prone:lungs.ply
 
-# A series is a folder of files and an index, and a folder cannot be nameless: a process of its own
-# removes it, whatever ended the program, a moment later.
-settled() {
-  for _ in $(seq 1000); do
-    case "$(ls -A out)" in *.part-*) sleep 0.01 ;; *) return ;; esac
-  done
-}
+# A series: the signals that ask the program to end leave nothing of it.
 began=$(date +%s%N)
 mkdir out && "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null || fail "breathe"
 took=$((($(date +%s%N) - began) / 1000000))
 count=$(ls out/frames | wc -l)
 rm -rf out
-for signal in ${3:-KILL TERM INT HUP}; do
+for signal in TERM INT HUP; do
   done_whole=0
   for i in $(seq "$kills"); do
     moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
     mkdir out
     timeout -s $signal "$moment" "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null 2>&1
-    settled
     case "$(ls -A out | tr '\n' ' ')" in
     "") ;;
     "frames frames.pvd ")

@@ -300,8 +300,7 @@ static int check_output(const reading *r, const row *output, const supine_argume
     }
   }
   supine_error error;
-  if (result == SUPINE_EXIT_OK && output->option->file == SUPINE_FILE_OUT &&
-      supine_output_try(output->value, &error) != SUPINE_OK) {
+  if (result == SUPINE_EXIT_OK && supine_output_try(output->value, &error) != SUPINE_OK) {
     result = supine_options_fail(name, &error);
   }
   return result;
@@ -310,7 +309,7 @@ static int check_output(const reading *r, const row *output, const supine_argume
 static int check_outputs(const reading *r, const supine_arguments *given) {
   int result = SUPINE_EXIT_OK;
   for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
-    if (r->rows[i].given && r->rows[i].option->file >= SUPINE_FILE_OUT) {
+    if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT) {
       result = check_output(r, &r->rows[i], given);
     }
   }

@@ -44,8 +44,7 @@ typedef enum supine_option_kind {
 typedef enum supine_option_file {
   SUPINE_FILE_NONE,
   SUPINE_FILE_IN,
-  SUPINE_FILE_OUT,
-  SUPINE_FILE_OUT_FOLDER /* may be a folder: the command tries it itself */
+  SUPINE_FILE_OUT
 } supine_option_file;
 
 /* Reads `text` into `field` (where the option's field is; without one, where its table's struct
