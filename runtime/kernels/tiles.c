@@ -43,14 +43,10 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
 #endif
 
 const supine_kernels *supine_kernels_choose(supine_simd *simd) {
-  const bool vector128 = supine_kernels_vector128.deform != NULL;
   const bool avx2 = supine_kernels_avx2.deform != NULL && has_avx2();
   const bool avx512 = supine_kernels_avx512.deform != NULL && has_avx512();
   if (*simd == SUPINE_SIMD_AUTO) {
-    *simd = avx512      ? SUPINE_SIMD_AVX512
-            : avx2      ? SUPINE_SIMD_AVX2
-            : vector128 ? SUPINE_SIMD_VECTOR128
-                        : SUPINE_SIMD_PORTABLE;
+    *simd = avx512 ? SUPINE_SIMD_AVX512 : avx2 ? SUPINE_SIMD_AVX2 : SUPINE_SIMD_PORTABLE;
   }
   switch (*simd) {
   case SUPINE_SIMD_PORTABLE:
@@ -59,8 +55,6 @@ const supine_kernels *supine_kernels_choose(supine_simd *simd) {
     return avx2 ? &supine_kernels_avx2 : NULL;
   case SUPINE_SIMD_AVX512:
     return avx512 ? &supine_kernels_avx512 : NULL;
-  case SUPINE_SIMD_VECTOR128:
-    return vector128 ? &supine_kernels_vector128 : NULL;
   case SUPINE_SIMD_AUTO:
   case SUPINE_SIMD_COUNT:
     break;

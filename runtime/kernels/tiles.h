@@ -156,9 +156,8 @@ typedef struct supine_kernels {
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
-extern const supine_kernels supine_kernels_vector128; /**< NULLs where not built */
-extern const supine_kernels supine_kernels_avx2;      /**< NULLs where not built */
-extern const supine_kernels supine_kernels_avx512;    /**< NULLs where not built */
+extern const supine_kernels supine_kernels_avx2;   /**< NULLs where not built */
+extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
 
 /** The code of the given kind, or of the widest kind where AUTO (then *simd says which); NULL where
  * this processor or build has not got it. */

@@ -251,8 +251,7 @@ static size_t add_entries(bench *work, entry *entries) {
     }
   }
   for (size_t s = SUPINE_SIMD_PORTABLE; s < SUPINE_SIMD_COUNT; ++s) {
-    static const char *const codes[SUPINE_SIMD_COUNT] = {"auto", "portable", "avx2", "avx512",
-                                                         "vector128"};
+    static const char *const codes[SUPINE_SIMD_COUNT] = {"auto", "portable", "avx2", "avx512"};
     if (work->simd[s] != NULL) {
       entries[count++] =
           (entry){"supine", codes[s], run_deform, work, work->simd[s], 1, packed + 12.0, INFINITY};

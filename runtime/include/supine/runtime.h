@@ -56,11 +56,10 @@ typedef enum supine_storage {
 
 /** Which code evaluates. All give the same positions within supine_basis_error. */
 typedef enum supine_simd {
-  SUPINE_SIMD_AUTO = 0,  /**< the widest that this processor has */
-  SUPINE_SIMD_PORTABLE,  /**< C alone */
-  SUPINE_SIMD_AVX2,      /**< AVX2 and FMA */
-  SUPINE_SIMD_AVX512,    /**< AVX-512 F and BW */
-  SUPINE_SIMD_VECTOR128, /**< four numbers at a time: SSE2, NEON, WebAssembly */
+  SUPINE_SIMD_AUTO = 0, /**< the widest that this processor has */
+  SUPINE_SIMD_PORTABLE, /**< vectors of four numbers: SSE2, NEON, WebAssembly */
+  SUPINE_SIMD_AVX2,     /**< AVX2 and FMA */
+  SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
   SUPINE_SIMD_COUNT
 } supine_simd;
 

@@ -43,7 +43,7 @@ Doubles = NDArray[np.float64]
 _FLOAT = np.dtype(np.float32)
 STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
-SIMDS = ("auto", "portable", "avx2", "avx512", "vector128")
+SIMDS = ("auto", "portable", "avx2", "avx512")
 _SUPINE = (0.0, 1.0, 0.0)
 _VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32", "uint32": "uint32",
            "float32": "float", "float64": "double"}  # as NRRD names them

@@ -1,0 +1,387 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * The loops that evaluate tiles, for vectors of LANES floats. Each kernel_*.c includes it once,
+ * after its definitions of
+ *
+ *     KERNELS          the name of its supine_kernels
+ *     LANES            4, 8 or 16
+ *     FMA(a, b, c)     a * b + c
+ *     RSQRT(x)         an estimate of 1 / sqrt(x), of 12 bits at least
+ *     STREAM(to, v)    store a vector past the cache, or OWN_WRITER in place of the writer here
+ */
+#include "runtime/kernels/tiles.h"
+#include <string.h>
+
+#define INLINE static inline __attribute__((always_inline))
+
+typedef float vf __attribute__((vector_size(4 * LANES)));
+typedef int32_t vi __attribute__((vector_size(4 * LANES)));
+typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
+
+enum {
+  GROUPS = TILE / LANES, /* vectors of one number of each vertex */
+  PIECES = TILE_NUMBERS / LANES,
+  CHAINS = GROUPS == 1 ? 2 : 1, /* sums over the modes: one vector alone waits for its additions */
+  KNOWN_MODES = 16              /* most modes whose weights stay in registers */
+};
+
+/* One number of each vertex of a tile. */
+typedef struct row {
+  vf v[GROUPS];
+} row;
+
+/* The tile's 48 numbers x y z x y z ... */
+typedef struct triples {
+  vf v[PIECES];
+} triples;
+
+/* F(j, 0), F(j, 1), ... F(j, LANES - 1) */
+#define EACH4(F, j, i) F(j, i), F(j, (i) + 1), F(j, (i) + 2), F(j, (i) + 3)
+#if LANES == 4
+#define EACH(F, j) EACH4(F, j, 0)
+#elif LANES == 8
+#define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4)
+#else
+#define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4), EACH4(F, j, 8), EACH4(F, j, 12)
+#endif
+
+/* Lane i of piece j of x y z x y z ... holds coordinate AXIS of vertex VERTEX. */
+#define VERTEX(j, i) (((j)*LANES + (i)) / 3)
+#define AXIS(j, i) (((j)*LANES + (i)) % 3)
+
+INLINE vf load(const unsigned char *at) {
+  vf v;
+  memcpy(&v, at, sizeof v);
+  return v;
+}
+
+/* The signed integers that begin `shift` bits below the top of words (compact.h). */
+INLINE vf integers(vu words, int shift) {
+  return __builtin_convertvector((vi)(words << shift), vf);
+}
+
+INLINE vf splat(float value) {
+  return value - (vf){0};
+}
+
+typedef struct weights {
+  const float *at;
+  vf v[KNOWN_MODES];
+} weights;
+
+INLINE vf weight(const weights *w, size_t k, bool known) {
+  return known ? w->v[k] : splat(w->at[k]);
+}
+
+/* A loop that the compiler specialises: for one storage and kind and, where `modes` is not 0, that
+ * many modes and positions in one array. */
+typedef struct form {
+  supine_storage storage;
+  size_t modes;
+  bool vector;
+} form;
+
+/* Add w times a mode of 16 vertices: floats, or words from `shift` on. */
+INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool compact) {
+  for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
+    sum->v[q] = FMA(w, compact ? integers((vu)load(at), shift) : load(at), sum->v[q]);
+  }
+}
+
+/* Sum w_k c_k over the modes of 16 vertices. */
+INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights *w, form f) {
+  const bool compact = supine_tiles_compact(f.storage);
+  const bool known = f.modes > 0;
+  const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
+  row sum[CHAINS];
+  row *even = &sum[0];
+  row *odd = &sum[CHAINS - 1];
+  for (size_t q = 0; q < CHAINS * GROUPS; ++q) {
+    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* what changes no product added to it */
+  }
+  for (size_t k = 0; k < paired / 2; ++k, at += compact ? 64 : 128) {
+    add_mode(even, weight(w, 2 * k, known), at, 16, compact);
+    add_mode(odd, weight(w, 2 * k + 1, known), compact ? at : at + 64, 0, compact);
+  }
+  if (paired % 2 != 0) {
+    add_mode(even, weight(w, paired - 1, known), at, 16, compact);
+    at += 64;
+  }
+  for (size_t k = paired; k < tiles->modes; k += 3, at += 64) {
+    add_mode(odd, weight(w, k, known), at, 0, true);
+    add_mode(even, weight(w, k + 1, known), at, 11, true);
+    add_mode(odd, weight(w, k + 2, known), at, 22, true);
+  }
+  for (size_t q = 0; q < GROUPS && CHAINS == 2; ++q) {
+    even->v[q] += odd->v[q];
+  }
+  return *even;
+}
+
+/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+INLINE triples numbers(const unsigned char *at, bool compact) {
+  triples n;
+  for (size_t j = 0; j < PIECES && !compact; ++j) {
+    n.v[j] = load(at + sizeof(vf) * j);
+  }
+  for (size_t q = 0; q < GROUPS && compact; ++q, at += sizeof(vf)) {
+    const vu first = (vu)load(at);
+    const vu second = (vu)load(at + 64);
+    n.v[q] = integers(first, 0);
+    n.v[GROUPS + q] = integers(second, 0);
+    n.v[2 * GROUPS + q] = integers(first << 21 | (second << 10 & 0x1FFC00), 0);
+  }
+  return n;
+}
+
+/* Positions of the reference surface, mm. */
+INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
+  triples p = numbers(tile + tiles->rest_begin, compact);
+  for (size_t j = 0; j < PIECES && compact; ++j) {
+    p.v[j] = (vf)((vu)p.v[j] + tiles->rest_unit);
+  }
+  return p;
+}
+
+/* x y z x y z ... of 16 vertices: x and y into place first, then z. */
+INLINE triples interleave(const row *x, const row *y, const row *z) {
+#define FROM_XY(j, i) (VERTEX(j, i) + (AXIS(j, i) == 1 ? LANES : 0))
+#define FROM_Z(j, i) (AXIS(j, i) == 2 ? VERTEX(j, i) + LANES : (i))
+#define PIECE(j)                                                                                   \
+  __builtin_shufflevector(__builtin_shufflevector(x->v[q], y->v[q], EACH(FROM_XY, j)), z->v[q],    \
+                          EACH(FROM_Z, j))
+  triples t;
+  for (size_t q = 0; q < GROUPS; ++q) {
+    t.v[3 * q] = PIECE(0);
+    t.v[3 * q + 1] = PIECE(1);
+    t.v[3 * q + 2] = PIECE(2);
+  }
+  return t;
+#undef PIECE
+}
+
+/* One number of each vertex, three times. */
+INLINE triples spread(const row *a) {
+  triples t;
+  for (size_t q = 0; q < GROUPS; ++q) {
+    t.v[3 * q] = __builtin_shufflevector(a->v[q], a->v[q], EACH(VERTEX, 0));
+    t.v[3 * q + 1] = __builtin_shufflevector(a->v[q], a->v[q], EACH(VERTEX, 1));
+    t.v[3 * q + 2] = __builtin_shufflevector(a->v[q], a->v[q], EACH(VERTEX, 2));
+  }
+  return t;
+}
+
+#ifndef OWN_WRITER
+/* An array that is written in order, past the cache where `stream`. */
+typedef struct writer {
+  float *to;
+  bool stream;
+} writer;
+
+INLINE writer writer_open(float *to, const supine_target *target) {
+  return (writer){to, target->stream};
+}
+
+INLINE void writer_put(writer *w, vf v) {
+  if (w->stream) {
+    STREAM(w->to, v);
+  } else {
+    memcpy(w->to, &v, sizeof v);
+  }
+  w->to += LANES;
+}
+
+INLINE void writer_close(const writer *w, const supine_target *target) {
+  (void)w, (void)target;
+}
+#endif
+
+/* Coordinate a of the vertices in three pieces of x y z x y z ... */
+#define FROM_01(a, i) ((3 * (i) + (a)) % (2 * LANES))
+#define FROM_2(a, i) (3 * (i) + (a) < 2 * LANES ? (i) : 3 * (i) + (a)-LANES)
+#define SEPARATE(a)                                                                                \
+  __builtin_shufflevector(__builtin_shufflevector(t->v[3 * q], t->v[3 * q + 1], EACH(FROM_01, a)), \
+                          t->v[3 * q + 2], EACH(FROM_2, a))
+
+INLINE void put_tile(writer *out, const triples *t, bool joined) {
+  for (size_t j = 0; j < PIECES && joined; ++j) {
+    writer_put(&out[0], t->v[j]);
+  }
+  for (size_t q = 0; q < GROUPS && !joined; ++q) {
+    writer_put(&out[0], SEPARATE(0));
+    writer_put(&out[1], SEPARATE(1));
+    writer_put(&out[2], SEPARATE(2));
+  }
+}
+
+INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights *w,
+                           const vf *gain, bool with_rest, form f) {
+  const bool compact = supine_tiles_compact(f.storage);
+  const row x = dot(tiles, tile, w, f);
+  triples amount;
+  triples factor = {{{0}}};
+  if (f.vector) {
+    const row y = dot(tiles, tile + tiles->axis_bytes, w, f);
+    const row z = dot(tiles, tile + 2 * tiles->axis_bytes, w, f);
+    amount = interleave(&x, &y, &z);
+  } else {
+    amount = spread(&x);
+    factor = numbers(tile + tiles->direction_begin, compact);
+  }
+  const triples rest = with_rest ? rest_positions(tiles, tile, compact) : (triples){{{0}}};
+  for (size_t j = 0; j < PIECES; ++j) {
+    factor.v[j] = f.vector ? gain[j % 3] : factor.v[j] * gain[j % 3];
+    amount.v[j] = with_rest ? FMA(amount.v[j], factor.v[j], rest.v[j]) : amount.v[j] * factor.v[j];
+  }
+  return amount;
+}
+
+INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t first, size_t count,
+                         const supine_target *target, form f) {
+  const bool rest = f.modes > 0 || target->rest;
+  const bool joined = f.modes > 0 || target->y == NULL;
+  supine_tiles tiles = *any;
+  if (f.modes > 0) {
+    supine_tiles_layout(&tiles, f.storage, f.modes, f.vector, any->count);
+  }
+  const unsigned char *tile = tiles.bytes + first * tiles.stride;
+  const float *g = folded + tiles.modes;
+#define GAIN(j, i) g[AXIS(j, i)]
+  const vf gain[3] = {{EACH(GAIN, 0)}, {EACH(GAIN, 1)}, {EACH(GAIN, 2)}};
+  writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
+                   writer_open(target->z, target)}; /* joined: the first alone */
+  weights w = {.at = folded};
+  for (size_t k = 0; k < KNOWN_MODES; ++k) {
+    w.v[k] = splat(k < f.modes ? folded[k] : 0);
+  }
+  for (size_t t = 0; t < count; ++t, tile += tiles.stride) {
+    supine_prefetch_tile(tile, tiles.stride, target->prefetch);
+    const triples xyz = deform_tile(&tiles, tile, &w, gain, rest, f);
+    put_tile(out, &xyz, joined);
+  }
+  for (size_t a = 0; a < (joined ? 1 : 3) && count > 0; ++a) {
+    writer_close(&out[a], target);
+  }
+}
+
+INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
+                        const supine_target *target, supine_storage storage, size_t modes) {
+  if (tiles->axes == 3) {
+    deform_tiles(tiles, folded, first, count, target, (form){storage, modes, true});
+  } else {
+    deform_tiles(tiles, folded, first, count, target, (form){storage, modes, false});
+  }
+}
+
+/* Choose the storage. MIXED differs from INT16 in numbers that a loop for any number of modes reads
+ * from `tiles`. */
+INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
+                           size_t count, const supine_target *target, size_t modes) {
+  if (tiles->storage == SUPINE_STORAGE_EXACT) {
+    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_EXACT, modes);
+  } else if (modes > 0 && tiles->storage == SUPINE_STORAGE_MIXED) {
+    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_MIXED, modes);
+  } else {
+    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_INT16, modes);
+  }
+}
+
+static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
+                   const supine_target *target) {
+  const bool registers = LANES == 16 && target->rest && target->y == NULL;
+  if (registers && tiles->modes == 4) { /* as the default law has */
+    deform_storage(tiles, folded, first, count, target, 4);
+  } else if (registers && tiles->modes == KNOWN_MODES) {
+    deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
+  } else {
+    deform_storage(tiles, folded, first, count, target, 0);
+  }
+}
+
+/* A normal's coordinate before its length is divided out: a chain for each place in the words. */
+INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
+  vf sum[3] = {{0}, {0}, {0}};
+  for (size_t j = 0; j < words; ++j, at += 64) {
+    const vu word = (vu)load(at);
+    sum[0] = FMA(splat(w[j]), integers(word, 0), sum[0]);
+    sum[1] = FMA(splat(w[words + j]), integers(word, 13), sum[1]);
+    sum[2] = FMA(splat(w[2 * words + j]), integers(word, 23), sum[2]);
+  }
+  return sum[0] + sum[1] + sum[2];
+}
+
+INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first, size_t count,
+                        const supine_target *target, size_t words) {
+  const size_t axis_bytes = 64 * words;
+  const unsigned char *tile = tiles->bytes + first * 3 * axis_bytes;
+  writer out = writer_open(target->x, target);
+  for (size_t t = 0; t < count; ++t, tile += 3 * axis_bytes) {
+    row n[3];
+    supine_prefetch_tile(tile, 3 * axis_bytes, target->prefetch);
+    for (size_t q = 0; q < GROUPS; ++q) {
+      vf v[3];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
+      }
+      /* The smallest normal number keeps 0 from becoming NaN; one Newton step doubles the bits of
+       * the estimate. */
+      const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
+      const vf guess = RSQRT(square);
+      const vf error = FMA(-(square * guess), guess, splat(1));
+      const vf inverse = FMA(guess * error, splat(0.5F), guess);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        n[axis].v[q] = v[axis] * inverse;
+      }
+    }
+    const triples xyz = interleave(&n[0], &n[1], &n[2]);
+    put_tile(&out, &xyz, true);
+  }
+  if (count > 0) {
+    writer_close(&out, target);
+  }
+}
+
+static void light(const supine_tiles *tiles, const float *w, size_t first, size_t count,
+                  const supine_target *target) {
+  const size_t words = supine_tiles_normal_words(tiles->modes);
+  if (LANES > 4 && words == 2) {
+    light_words(tiles, w, first, count, target, 2);
+  } else if (LANES > 4 && words == 3) {
+    light_words(tiles, w, first, count, target, 3);
+  } else {
+    light_words(tiles, w, first, count, target, words);
+  }
+}
+
+/* Write compact coefficients of one axis as floats. */
+static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, vf *to) {
+  const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
+  for (size_t k = 0; k < tiles->modes; ++k) {
+    const int shift = k >= paired ? 11 * (int)((k - paired) % 3) : k % 2 == 0 ? 16 : 0;
+    for (size_t q = 0; q < GROUPS; ++q) {
+      *to++ = integers((vu)load(at + supine_tiles_words_begin(paired, k) + sizeof(vf) * q), shift);
+    }
+  }
+}
+
+static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
+  for (size_t t = 0; t < count; ++t) {
+    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
+    unsigned char *wide = to->bytes + t * to->stride;
+    if (!supine_tiles_compact(tiles->storage)) {
+      memcpy(wide, tile, tiles->stride); /* the layout is the same */
+      continue;
+    }
+    for (size_t axis = 0; axis < tiles->axes; ++axis) {
+      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
+                         (vf *)(void *)(wide + axis * to->axis_bytes));
+    }
+    if (tiles->axes == 1) {
+      *(triples *)(void *)(wide + to->direction_begin) =
+          numbers(tile + tiles->direction_begin, true);
+    }
+    *(triples *)(void *)(wide + to->rest_begin) = rest_positions(tiles, tile, true);
+  }
+}
+
+const supine_kernels KERNELS = {deform, light, widen};
