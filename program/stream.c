@@ -216,16 +216,14 @@ static void close_points(watched *points, supine_stream_sensors *sensors) {
 
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
-  const char *colon = wanted->web == NULL ? NULL : strrchr(wanted->web, ':');
-  char address[256] = "";
-  supine_stream_address checked;
+  supine_stream_address address;
   supine_reference_pose from;
   supine_stream_site site = {
       .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->peers};
   if (wanted->web == NULL) {
     return SUPINE_OK;
   }
-  supine_status status = supine_stream_address_read(wanted->web, true, &checked, error);
+  supine_status status = supine_stream_address_read(wanted->web, true, &address, error);
   if (status == SUPINE_OK) {
     status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
@@ -237,21 +235,15 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
     status = supine_stream_live_page(path, &shown, page, &site.page_size, error);
   }
   if (status == SUPINE_OK) {
-    if (colon != NULL) {
-      const int bracket = wanted->web[0] == '[' ? 1 : 0; /* of version 6 */
-      (void)snprintf(address, sizeof address, "%.*s", (int)(colon - wanted->web) - 2 * bracket,
-                     wanted->web + bracket);
-      site.address = address;
-    }
-    site.port = (int)strtol(colon == NULL ? wanted->web : colon + 1, NULL, 10);
+    site.address = address.host;
+    site.port = address.port;
     site.page = *page;
     status = supine_stream_web_create(&site, web, error);
   }
   if (status == SUPINE_OK) {
-    const bool six = strchr(address, ':') != NULL;
+    const bool six = strchr(address.host, ':') != NULL;
     (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-                 six ? "[" : "", site.address != NULL ? address : "127.0.0.1", six ? "]" : "",
-                 supine_stream_web_port(*web));
+                 six ? "[" : "", address.host, six ? "]" : "", supine_stream_web_port(*web));
   }
   return status;
 }
@@ -272,15 +264,14 @@ static supine_status set_volume(const request *wanted, supine_stream_volume *vol
 static supine_status stream(const supine_basis *basis, const char *path, const request *wanted,
                             const supine_stream_options *given, supine_error *error) {
   supine_stream_options options = *given;
-  supine_stream_volume *volume = calloc(1, sizeof *volume);
+  supine_stream_volume volume = {0};
   supine_stream_poses poses = {0};
   supine_output record = {0};
   supine_stream_server *server = NULL;
   char *page = NULL;
   watched points = {0};
-  supine_status status = volume != NULL ? set_volume(wanted, volume, error)
-                                        : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory");
-  options.volume = volume;
+  supine_status status = set_volume(wanted, &volume, error);
+  options.volume = &volume;
   if (status == SUPINE_OK) {
     status = open_points(basis, wanted, &points, &options.sensors, error);
   }
@@ -319,7 +310,6 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   supine_stream_web_destroy(options.web);
   supine_stream_poses_free(&poses);
   close_points(&points, options.sensors);
-  free(volume);
   free(page);
   return status;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Addresses and sockets. */
+/* Parse addresses and open sockets. */
 #include <errno.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -11,13 +11,14 @@
 
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error) {
-  char host[256] = "127.0.0.1";
+  char *host = address->host;
   const char *colon = strrchr(text, ':');
   const char *port = colon == NULL ? text : colon + 1;
+  (void)strcpy(host, "127.0.0.1");
   if (colon != NULL) {
     const bool bracketed = text[0] == '[' && colon > text + 1 && colon[-1] == ']';
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
-    if (length == 0 || length >= sizeof host) {
+    if (length == 0 || length >= sizeof address->host) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "'%s' names no host before its port: give HOST:PORT", text);
     }
@@ -39,6 +40,7 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   }
   memcpy(&address->where, found->ai_addr, found->ai_addrlen);
   address->size = found->ai_addrlen;
+  address->port = (int)number;
   freeaddrinfo(found);
   return SUPINE_OK;
 }

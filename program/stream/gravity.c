@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Gravity in the body from exact or faulty rotations. */
+/* Compute the direction of gravity in the body from the pose of a tracker. */
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
 
 #include "sh/base/vec3.h"
 
 #include "program/stream/gravity.h"
 
-/* 32-bit floats leave 1e-6, trackers' own arithmetic up to about 1e-4. */
+/* Deviation from a rotation that is accepted silently: 32-bit floats give 1e-6, trackers' own
+ * arithmetic up to about 1e-4. */
 static const double slack = 1e-3;
-/* A calibration that stretches by a tenth is poor, yet its rotation is still within degrees. */
-static const double sheared = 0.1;
+static const double uneven_max = 0.1; /* largest stretch that is repaired */
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -29,112 +28,53 @@ void supine_stream_rotation(const double q[4], double r[9]) {
   memcpy(r, rows, sizeof rows);
 }
 
-/* Cofactors, so that m^-T = cofactors / determinant. */
-static double cofactors(const double m[9], double c[9]) {
+/* out = M^T v */
+static void apply_transpose(const double m[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const int a = (i + 1) % 3;
-      const int b = (i + 2) % 3;
-      const int u = (j + 1) % 3;
-      const int v = (j + 2) % 3;
-      c[3 * i + j] = m[3 * a + u] * m[3 * b + v] - m[3 * a + v] * m[3 * b + u];
-    }
-  }
-  return supine_dot(m, c);
-}
-
-static bool all_finite(const double *numbers, int count) {
-  for (int i = 0; i < count; ++i) {
-    if (!isfinite(numbers[i])) {
-      return false;
-    }
-  }
-  return true;
-}
-
-static double norm(const double *v, int count) {
-  double sum = 0.0;
-  for (int i = 0; i < count; ++i) {
-    sum += v[i] * v[i];
-  }
-  return sqrt(sum);
-}
-
-/* The rotation Q of m = Q S, by Newton's iteration X <- (X + X^-T) / 2, which begins near enough to
- * end after a few steps. `m` has determinant > 0 and size about 1. */
-static void nearest(const double m[9], double q[9]) {
-  memcpy(q, m, 9 * sizeof *q);
-  for (int step = 0; step < 50; ++step) {
-    double c[9];
-    const double determinant = cofactors(q, c);
-    double change = 0.0;
-    for (int i = 0; i < 9; ++i) {
-      const double next = 0.5 * (q[i] + c[i] / determinant);
-      change = fmax(change, fabs(next - q[i]));
-      q[i] = next;
-    }
-    if (change < 1e-15) {
-      return;
-    }
-  }
-}
-
-static void apply(const double m[9], const double v[3], double out[3]) {
-  for (int i = 0; i < 3; ++i) {
-    out[i] = m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2];
+    out[i] = m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2];
   }
 }
 
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  const double size = norm(rotation, 9) / sqrt(3.0);
-  *why = "it is not finite";
-  if (!all_finite(rotation, 9) || !isfinite(size)) {
-    return SUPINE_STREAM_REFUSED;
-  }
-  *why = "it is singular";
-  if (!(size > 1e-6)) {
-    return SUPINE_STREAM_REFUSED;
-  }
-  double even[9];
-  double c[9];
-  for (int i = 0; i < 9; ++i) {
-    even[i] = rotation[i] / size;
-  }
-  const double determinant = cofactors(even, c);
-  *why = determinant < 0.0 ? "it mirrors" : "it is singular";
-  if (!(determinant > 0.1)) { /* 1 for a rotation; a shear of a tenth leaves 0.98 */
-    return SUPINE_STREAM_REFUSED;
-  }
-  double q[9];
-  nearest(even, q);
-  double stretch = 0.0; /* of S = Q^T m / size, which is 1 for a rotation */
+  double product[9]; /* M^T M, a multiple of 1 for a rotation of any scale */
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const double s = q[i] * even[j] + q[3 + i] * even[3 + j] + q[6 + i] * even[6 + j];
-      stretch = fmax(stretch, fabs(s - (i == j ? 1.0 : 0.0)));
-    }
+    const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
+    apply_transpose(rotation, column, product + 3 * i);
+  }
+  const double square = (product[0] + product[4] + product[8]) / 3.0; /* of the scale */
+  *why = "it is not finite, or zero";
+  if (!(square > 1e-12) || !isfinite(square)) {
+    return SUPINE_STREAM_REFUSED;
+  }
+  double uneven = 0.0;
+  for (int i = 0; i < 9; ++i) {
+    uneven = fmax(uneven, 0.5 * fabs(product[i] / square - (i % 4 == 0 ? 1.0 : 0.0)));
   }
   *why = "it shears";
-  if (!(stretch <= sheared)) {
+  if (!(uneven <= uneven_max)) {
+    return SUPINE_STREAM_REFUSED;
+  }
+  *why = "it mirrors";
+  if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
   double falls[3];
-  const double transposed[9] = {q[0], q[3], q[6], q[1], q[4], q[7], q[2], q[5], q[8]};
-  apply(transposed, setup->down, falls);
+  apply_transpose(rotation, setup->down, falls);
   const supine_stream_verdict verdict = supine_stream_gravity_down(setup, falls, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || (stretch <= slack && fabs(size - 1.0) <= slack)) {
+  if (verdict != SUPINE_STREAM_EXACT || (uneven <= slack && fabs(sqrt(square) - 1.0) <= slack)) {
     return verdict;
   }
-  *why = stretch <= slack ? "it scales" : "it shears a little";
+  *why = uneven <= slack ? "it scales" : "it shears a little";
   return SUPINE_STREAM_REPAIRED;
 }
 
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why) {
-  const double size = norm(quaternion, 4);
+  const double size = sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1] +
+                           quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]);
   *why = "its quaternion is zero or not finite";
   if (!isfinite(size) || !(size > 1e-6)) {
     return SUPINE_STREAM_REFUSED;
@@ -164,7 +104,9 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
   }
   const double unit[3] = {down[0] / size, down[1] / size, down[2] / size};
   double turned[3];
-  apply(setup->body, unit, turned);
+  for (int i = 0; i < 3; ++i) {
+    turned[i] = supine_dot(setup->body + 3 * i, unit);
+  }
   const double length = supine_length(turned); /* 1 but for rounding */
   for (int i = 0; i < 3; ++i) {
     gravity[i] = turned[i] / length;

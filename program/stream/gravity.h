@@ -1,53 +1,54 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Where gravity points in the body, from what a tracker or a tilt sensor says.
+ * Compute the direction of gravity in the body from what a tracker or a tilt sensor sends.
  *
  *     gravity = B R^T down        R: v_world = R v_tracker,  B: v_body = B v_tracker
  *
- * Body axes are DICOM LPS. Only tilt matters: turning about `down` changes nothing. */
+ * Body axes are DICOM LPS. Only the tilt matters: a turn about `down` changes nothing. */
 #ifndef SUPINE_STREAM_GRAVITY_H
 #define SUPINE_STREAM_GRAVITY_H
 
 /** How the tracker is set up. */
 typedef struct supine_stream_setup {
-  double down[3]; /**< where things fall, in the tracker's world; unit */
-  double body[9]; /**< B, rows */
+  double down[3]; /**< direction of gravity in the tracker's world; unit */
+  double body[9]; /**< B, by rows */
 } supine_stream_setup;
 
-/** World z up, and the tracked marker's axes those of the body. */
+/** Return the default setup: z of the world points up, and the marker's axes are the body's. */
 supine_stream_setup supine_stream_setup_default(void);
 
-/** The rotation of a unit quaternion W, X, Y, Z, rows. */
+/** Convert a unit quaternion W, X, Y, Z to a rotation matrix, by rows. */
 void supine_stream_rotation(const double quaternion[4], double rotation[9]);
 
 /** Verdict on a pose. */
 typedef enum supine_stream_verdict {
   SUPINE_STREAM_EXACT = 0,
-  SUPINE_STREAM_REPAIRED, /**< not quite a rotation: the nearest one was taken */
-  SUPINE_STREAM_REFUSED   /**< `gravity` is untouched */
+  SUPINE_STREAM_REPAIRED, /**< not quite a rotation, but near enough to use */
+  SUPINE_STREAM_REFUSED   /**< `gravity` is unchanged */
 } supine_stream_verdict;
 
-/** Of a matrix R. Within 0.001 of a rotation in every stretch it is taken as one (its nearest); one
- * that is scaled evenly, or unevenly by at most a tenth, is repaired. Refused: not finite,
- * singular, mirrored, sheared.
- * @param why  written where the verdict is not exact */
+/** Compute gravity from a matrix R. A matrix within 0.001 of a rotation is exact. One that is
+ * scaled evenly, or stretched unevenly by at most a tenth, is repaired: its direction is then
+ * within 3 degrees. Others are refused: not finite, singular, mirrored, sheared.
+ * @param why  set to the reason where the verdict is not exact, else to NULL */
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Of a quaternion W, X, Y, Z: any length but 0; one that is more than 0.001 off 1 is repaired. */
+/** Compute gravity from a quaternion W, X, Y, Z of any length but 0; one whose length differs from
+ * 1 by more than 0.001 counts as repaired. */
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why);
 
-/** Of the direction in which things fall, in the tracker's axes; any length but 0. */
+/** Compute gravity from its direction in the tracker's axes, of any length but 0. */
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why);
 
-/** Moves `smooth` towards `gravity` as a first-order lag of `seconds` would over `step`: along the
- * arc, by a share 1 - exp(-step / seconds) of it. Behind a steady turn it stays `seconds` behind.
- * @return the angle that is left, radians */
+/** Move `smooth` along the arc towards `gravity`, by a share 1 - exp(-step / seconds) of it: a
+ * first-order lag, which follows a steady turn `seconds` late.
+ * @return the angle that remains, radians */
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]);
 

@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Poses from a file and into one. */
+/* Read and write recorded poses. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
 #include "program/stream/poses.h"
 #include "sh/base/csv.h"
+#include "sh/base/vec3.h"
 
 static const char *const columns[] = {"seconds", "gravity_x", "gravity_y", "gravity_z"};
 
-static supine_status take(const supine_csv *csv, supine_stream_poses *poses, supine_error *error) {
-  supine_stream_pose *pose = &poses->pose[poses->count];
+/* Read a row into a pose that follows one at `before` s. */
+static supine_status read_pose(const supine_csv *csv, double before, supine_stream_pose *pose,
+                               supine_error *error) {
   double number[4];
   for (size_t i = 0; i < 4; ++i) {
     const supine_status status = supine_csv_number(csv, i, columns[i], &number[i], error);
@@ -18,8 +20,7 @@ static supine_status take(const supine_csv *csv, supine_stream_poses *poses, sup
       return status;
     }
   }
-  const double length = sqrt(number[1] * number[1] + number[2] * number[2] + number[3] * number[3]);
-  const double before = poses->count == 0 ? 0.0 : pose[-1].seconds;
+  const double length = supine_length(number + 1);
   if (!(number[0] >= before)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s:%zu: %g s comes after %g s: times begin at 0 and must not fall",
@@ -27,42 +28,32 @@ static supine_status take(const supine_csv *csv, supine_stream_poses *poses, sup
   }
   if (!(length > 1e-9) || !isfinite(length)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: gravity is 0,0,0: give a direction", csv->path, csv->line);
+                            "%s:%zu: gravity has no direction: give one, as 0,1,0 for supine",
+                            csv->path, csv->line);
   }
   *pose =
       (supine_stream_pose){number[0], {number[1] / length, number[2] / length, number[3] / length}};
-  ++poses->count;
   return SUPINE_OK;
 }
 
 supine_status supine_stream_poses_load(const char *path, supine_stream_poses *poses,
                                        supine_error *error) {
   supine_csv csv = {0};
-  size_t room = 0;
   bool more = true;
   *poses = (supine_stream_poses){0};
   supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
-  while (status == SUPINE_OK) {
+  while (status == SUPINE_OK && more) {
+    supine_stream_pose *grown = reallocarray(poses->pose, poses->count + 1, sizeof *grown);
+    if (grown == NULL) {
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+      break;
+    }
+    poses->pose = grown;
     status = supine_csv_next(&csv, &more, error);
-    if (status != SUPINE_OK || !more) {
-      break;
+    if (status == SUPINE_OK && more) {
+      const double before = poses->count == 0 ? 0.0 : grown[poses->count - 1].seconds;
+      status = read_pose(&csv, before, &grown[poses->count++], error);
     }
-    if (poses->count == SUPINE_STREAM_POSES_MAX) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: more than %d poses: split the file",
-                           path, SUPINE_STREAM_POSES_MAX);
-      break;
-    }
-    if (poses->count == room) {
-      room = room == 0 ? 1024 : 2 * room;
-      supine_stream_pose *larger = realloc(poses->pose, room * sizeof *larger);
-      if (larger == NULL) {
-        status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-        break;
-      }
-      poses->pose = larger;
-    }
-    status = take(&csv, poses, error);
   }
   supine_csv_close(&csv);
   if (status == SUPINE_OK && poses->count == 0) {

@@ -226,7 +226,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
-  info.iface = site->address != NULL ? site->address : "127.0.0.1";
+  info.iface = site->address;
   info.protocols = protocols;
   info.user = w;
   info.gid = -1;

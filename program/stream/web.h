@@ -17,7 +17,7 @@ typedef struct supine_stream_web supine_stream_web;
 
 /** Where it is served; one that trusts its network only. */
 typedef struct supine_stream_site {
-  const char *address;           /**< a numeric address; NULL: this machine alone */
+  const char *address;           /**< numeric */
   int port;                      /**< 0: any that is free */
   const char *certificate, *key; /**< PEM files; NULL: without encryption */
   const void *page;              /**< HTML; kept by the caller until the site is destroyed */
