@@ -132,23 +132,13 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-/* Print the state of the last second on a terminal, over the previous line. */
+/* Print the counts on a terminal, over the previous line. */
 static void show(void *context, supine_stream_server *server) {
   const supine_stream_counts *counts = supine_stream_server_counts(server);
   (void)context;
-  (void)fprintf(stderr, "\r%llu poses, %zu peers", (unsigned long long)counts->poses,
+  (void)fprintf(stderr, "\r%llu poses, %llu frames sent, %zu peers\033[K",
+                (unsigned long long)counts->poses, (unsigned long long)counts->sent,
                 counts->present);
-  for (int surfaces = 0; surfaces < 2; ++surfaces) {
-    const supine_stream_latency *latency = supine_stream_server_latency(
-        server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
-    if (latency->count > 0) {
-      (void)fprintf(stderr, ", %s %.2f ms (99 %% %.2f, worst %.2f)",
-                    surfaces != 0 ? "surface" : "weights",
-                    1e3 * supine_stream_latency_share(latency, 0.5),
-                    1e3 * supine_stream_latency_share(latency, 0.99), 1e3 * latency->worst);
-    }
-  }
-  (void)fputs("\033[K", stderr);
 }
 
 static void report(const supine_stream_server *server, const request *wanted) {
