@@ -4,6 +4,7 @@
 
 #include <base64.h>
 #include <export.h>
+#include <meshoptimizer.h>
 
 #include "export_helpers.h"
 
@@ -63,77 +64,107 @@ static int digit(char c) {
   return (int)(at - digits);
 }
 
-/* The `size` bytes of a tensor of the page (malloc). */
-static void *take_tensor(const char *page, const char *name, size_t size) {
+/* The bytes of a tensor of the page (malloc). */
+static unsigned char *take_bytes(const char *page, const char *name, size_t *size) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "id=\"tensor-%s\">", name);
   const char *at = strstr(page, tag);
-  unsigned char *bytes = malloc(size);
-  assert_true(at != NULL && bytes != NULL);
+  assert_non_null(at);
   at += strlen(tag);
+  unsigned char *bytes = malloc(strcspn(at, "<"));
+  assert_non_null(bytes);
   unsigned bits = 0;
   unsigned held = 0;
-  size_t count = 0;
+  *size = 0;
   for (; *at != '<' && *at != '='; ++at) {
     bits = bits << 6 | (unsigned)digit(*at);
     held += 6;
     if (held >= 8) {
       held -= 8;
-      assert_true(count < size);
-      bytes[count++] = bits >> held & 255;
+      bytes[(*size)++] = bits >> held & 255;
     }
   }
-  assert_int_equal(count, size);
   return bytes;
 }
 
 /* Compares a tensor of the page with bytes. */
 static void check_tensor(const char *page, const char *name, const void *bytes, size_t size) {
-  void *found = take_tensor(page, name, size);
+  size_t got = 0;
+  unsigned char *found = take_bytes(page, name, &got);
+  assert_int_equal(got, size);
   assert_memory_equal(found, bytes, size);
   free(found);
 }
 
-/* What moves the lungs is rounded to half a count of 16 bits: directions to unit length, each
- * mode's coefficients, with the directions' lengths in them, to the mode's largest. */
+/* Rows of an even number of counts (malloc). */
+static int16_t *take_rows(const char *page, const char *name, size_t rows, size_t columns) {
+  size_t size = 0;
+  unsigned char *packed = take_bytes(page, name, &size);
+  int16_t *counts = malloc(rows * columns * sizeof *counts);
+  assert_non_null(counts);
+  assert_int_equal(meshopt_decodeVertexBuffer(counts, rows, columns * sizeof *counts, packed, size),
+                   0);
+  free(packed);
+  return counts;
+}
+
+/* A number of the page's description. */
+static double number_of(const char *page, const char *name) {
+  char tag[64];
+  (void)snprintf(tag, sizeof tag, "&quot;%s&quot;:", name);
+  const char *at = strstr(page, tag);
+  assert_non_null(at);
+  at += strlen(tag);
+  return strtod(at + (*at == '['), NULL);
+}
+
+/* Positions and coefficients, for directions of unit length, are within half a count. */
 static void check_motion(const char *page, const export_source *s) {
-  enum { COUNT_MAX = 32767 };
-  const double half = 0.5 * (1 + 1e-6) / COUNT_MAX; /* and the doubles' own rounding */
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;
-  int16_t *direction = take_tensor(page, "direction", 3 * n * sizeof *direction);
-  int16_t *counts = take_tensor(page, "coefficients", modes * n * sizeof *counts);
-  for (size_t k = 0; k < modes; ++k) {
-    double largest = 0;
-    for (int pass = 0; pass < 2; ++pass) {
-      for (size_t i = 0; i < n; ++i) {
-        const float *d = s->direction + 3 * i;
-        const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
-        const double c = (double)s->coefficients[i * modes + k] * length;
-        if (pass == 0) {
-          largest = fmax(largest, fabs(c));
-          continue;
-        }
-        assert_true(fabs(counts[i * modes + k] * largest / COUNT_MAX - c) <= half * largest);
-        for (size_t axis = 0; axis < 3 && k == 0; ++axis) {
-          assert_true(
-              fabs((double)direction[3 * i + axis] / COUNT_MAX - (double)d[axis] / length) <= half);
-        }
-      }
+  const double place_unit = number_of(page, "placeUnit");
+  const double unit = number_of(page, "unit");
+  const double middle = number_of(page, "middle");
+  int16_t *places = take_rows(page, "vertices", n, 4);
+  int16_t *directions = take_rows(page, "direction", n, 4);
+  int16_t *counts = take_rows(page, "coefficients", n, modes);
+  meshopt_decodeFilterOct(directions, n, 4 * sizeof *directions);
+  assert_true(place_unit > 0 && place_unit <= 0.005 && unit > 0 && unit <= 0.005);
+  for (size_t i = 0; i < n; ++i) {
+    const float *d = s->direction + 3 * i;
+    const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
+    assert_true(fabs(places[4 * i] * place_unit + middle - (double)s->vertices[3 * i]) <=
+                0.5001 * place_unit);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      assert_true(fabs(directions[4 * i + axis] / 32767.0 - (double)d[axis] / length) < 1e-4);
     }
-    assert_true(largest > 0);
+    for (size_t k = 0; k < modes; ++k) {
+      const double c = (double)s->coefficients[i * modes + k] * length;
+      assert_true(fabs(counts[i * modes + k] * unit - c) <= 0.5001 * unit);
+    }
   }
-  free(direction);
+  free(places);
+  free(directions);
   free(counts);
 }
 
-/* Corners of 16 bits. */
-static void check_corners(const char *page, const char *name, const uint32_t *corners,
-                          size_t count) {
-  uint16_t *found = take_tensor(page, name, count * sizeof *found);
-  for (size_t i = 0; i < count; ++i) {
-    assert_int_equal(found[i], corners[i]);
+/* Every triangle is there, from one corner or another. */
+static void check_corners(const char *page, const uint32_t *corners, size_t count) {
+  size_t size = 0;
+  unsigned char *packed = take_bytes(page, "triangles", &size);
+  uint32_t *found = malloc(count * sizeof *found);
+  assert_non_null(found);
+  assert_int_equal(meshopt_decodeIndexBuffer(found, count, sizeof *found, packed, size), 0);
+  for (size_t t = 0; t < count; t += 3) {
+    size_t matches = 0;
+    for (size_t u = 0; u < count; ++u) {
+      const size_t first = u / 3 * 3;
+      matches += found[u] == corners[t] && found[first + (u + 1) % 3] == corners[t + 1] &&
+                 found[first + (u + 2) % 3] == corners[t + 2];
+    }
+    assert_int_equal(matches, 1);
   }
+  free(packed);
   free(found);
 }
 
@@ -143,9 +174,8 @@ static void test_page_carries_the_basis(void **state) {
   char *page = read_page();
   export_source s = {0};
   assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
-  check_tensor(page, "vertices", s.vertices, 40 * 3 * sizeof(float));
   check_motion(page, &s);
-  check_corners(page, "triangles", s.triangles, 3 * s.info->triangle_count);
+  check_corners(page, s.triangles, 3 * s.info->triangle_count);
   check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
   check_tensor(page, "linear", s.info->volume_linear, 2 * 6 * sizeof(double));
   check_tensor(page, "quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));

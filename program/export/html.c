@@ -7,22 +7,25 @@
 #include "sh/base/output.h"
 
 #include "program/export/base64.h"
-#include "program/export/export.h"
+#include "program/export/packed.h"
 #include "program/export/template.h"
 #include "program/render/render.h"
 
 extern const supine_asset supine_export_assets[]; /* page/, put in by the build */
 
-/* Counts of 16 bits go from -COUNT_MAX to COUNT_MAX. */
-enum { COUNT_MAX = 32767 };
+enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3 };
 
-/* How the lungs and what is inside move, ready to be counted. */
+/* A page being printed. Positions and displacements are stored as 16-bit counts. */
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double unit[EXPORT_PAGE_MODES_MAX];        /* mm per count, for each mode of the lungs */
-  double inside_unit[EXPORT_PAGE_MODES_MAX]; /* mm per count, for each mode of the embedded
-                                                structures */
+  double middle[3];   /* of the box of all vertices, mm: positions count from there */
+  double place_unit;  /* mm per count of a position */
+  double unit;        /* mm per count of a coefficient, for directions of unit length */
+  double inside_unit; /* the same for what is inside */
+  uint32_t *corners;  /* of the triangles, lung by lung */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1];
+  supine_status *status;
 } page;
 
 static void write_tensor(FILE *file, const char *name, const void *bytes, size_t size) {
@@ -31,86 +34,131 @@ static void write_tensor(FILE *file, const char *name, const void *bytes, size_t
   (void)fputs("</script>\n", file);
 }
 
-/* Return a vertex's direction as in the file; its length is moved into the coefficients. */
-static double length_of_direction(const export_source *s, size_t vertex) {
+static void write_packed(const page *p, FILE *file, const char *name, supine_status status,
+                         export_packed packed) {
+  if (status == SUPINE_OK) {
+    write_tensor(file, name, packed.bytes, packed.size);
+    free(packed.bytes);
+  } else {
+    *p->status = status;
+  }
+}
+
+static int16_t count_of(double value, double unit) {
+  return (int16_t)lrint(value / unit);
+}
+
+static double length_of(const float v[3]) {
+  return hypot(hypot((double)v[0], (double)v[1]), (double)v[2]);
+}
+
+static void place_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    row[axis] = count_of((double)s->vertices[3 * vertex + axis] - p->middle[axis], p->place_unit);
+  }
+}
+
+static void direction_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   const float *d = s->direction + 3 * vertex;
-  const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
-  return length > 0 ? length : 1;
+  const double length = length_of(d);
+  const double up[3] = {0, 0, 1};
+  const double unit[3] = {(double)d[0] / length, (double)d[1] / length, (double)d[2] / length};
+  (void)p;
+  supine_export_pack_direction(length > 0 ? unit : up, 16, row);
 }
 
-static double direction_at(const page *p, size_t i) {
-  return COUNT_MAX * (double)p->source->direction[i] / length_of_direction(p->source, i / 3);
-}
-
-static double coefficient_at(const page *p, size_t i) {
-  const size_t k = p->source->info->mode_count;
-  return (double)p->source->coefficients[i] * length_of_direction(p->source, i / k) /
-         p->unit[i % k];
-}
-
-static double inside_at(const page *p, size_t i) {
-  return (double)p->shown->inside->coefficients[i] /
-         p->inside_unit[i % p->source->info->mode_count];
-}
-
-/* Numbers rounded to 16 bits: as many at once as make whole groups of 3 bytes, so that base64 has
- * no remainder between. */
-static void write_counts(FILE *file, const char *name, const page *p, size_t count,
-                         double (*at)(const page *p, size_t i)) {
-  enum { AT_ONCE = 3072 };
-  int16_t counts[AT_ONCE];
-  (void)fprintf(file, "<script type=\"text/plain\" id=\"tensor-%s\">", name);
-  for (size_t i = 0; i < count; i += AT_ONCE) {
-    const size_t some = count - i < AT_ONCE ? count - i : AT_ONCE;
-    for (size_t j = 0; j < some; ++j) {
-      counts[j] = (int16_t)lrint(at(p, i + j));
-    }
-    supine_export_base64_write(counts, some * sizeof *counts, file);
-  }
-  (void)fputs("</script>\n", file);
-}
-
-/* Units in which each mode's largest number is COUNT_MAX. */
-static void find_units(page *p) {
-  const size_t n = p->source->info->vertex_count;
-  const size_t k = p->source->info->mode_count;
+static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+  const size_t k = s->info->mode_count;
   for (size_t i = 0; i < k; ++i) {
-    p->unit[i] = p->inside_unit[i] = 0;
-  }
-  for (size_t i = 0; i < n * k; ++i) {
-    const double c = (double)p->source->coefficients[i] * length_of_direction(p->source, i / k);
-    p->unit[i % k] = fmax(p->unit[i % k], fabs(c) / COUNT_MAX);
-  }
-  if (p->shown->inside != NULL) {
-    for (size_t i = 0; i < 3 * k * p->shown->inside->info->vertex_count; ++i) {
-      const double c = fabs((double)p->shown->inside->coefficients[i]);
-      p->inside_unit[i % k] = fmax(p->inside_unit[i % k], c / COUNT_MAX);
-    }
-  }
-  for (size_t i = 0; i < k; ++i) { /* a mode without displacement needs no unit */
-    p->unit[i] = p->unit[i] > 0 ? p->unit[i] : 1;
-    p->inside_unit[i] = p->inside_unit[i] > 0 ? p->inside_unit[i] : 1;
+    row[i] = count_of(
+        (double)s->coefficients[vertex * k + i] * length_of(s->direction + 3 * vertex), p->unit);
   }
 }
 
-/* Write triangles as 16-bit indices where these can number every vertex, else as 32-bit ones. */
-static void write_triangles(FILE *file, const char *name, const export_source *s) {
-  enum { AT_ONCE = 3072 };
-  uint16_t corners[AT_ONCE];
-  const size_t count = 3 * s->info->triangle_count;
-  if (s->info->vertex_count > UINT16_MAX + (size_t)1) {
-    write_tensor(file, name, s->triangles, count * sizeof *s->triangles);
-    return;
+static void inside_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+  const size_t columns = 3 * s->info->mode_count;
+  for (size_t i = 0; i < columns; ++i) {
+    row[i] = count_of((double)s->coefficients[vertex * columns + i], p->inside_unit);
   }
-  (void)fprintf(file, "<script type=\"text/plain\" id=\"tensor-%s\">", name);
-  for (size_t i = 0; i < count; i += AT_ONCE) {
-    const size_t some = count - i < AT_ONCE ? count - i : AT_ONCE;
-    for (size_t j = 0; j < some; ++j) {
-      corners[j] = (uint16_t)s->triangles[i + j];
+}
+
+/* The three numbers of a word of the normals, which supine.glsl reads from its bits: the first of
+ * all words and axes, then the second, then the third. */
+static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+  uint32_t words[3 * NORMAL_WORDS];
+  const size_t count = (s->info->normal_count + 2) / 3 * 3;
+  (void)p;
+  (void)supine_gl_pack_normals(s->basis, vertex, vertex + 1, words);
+  for (size_t i = 0; i < count; ++i) {
+    row[i] = (int16_t)((int32_t)words[i] >> 19);
+    row[count + i] = (int16_t)((int32_t)(words[i] << 13) >> 22);
+    row[2 * count + i] = (int16_t)((int32_t)(words[i] << 23) >> 23);
+  }
+}
+
+typedef void fill_row(const page *p, const export_source *s, size_t vertex, int16_t *row);
+
+/* Write a row of `columns` counts for each vertex, padded to an even number. */
+static void write_rows(const page *p, FILE *file, const char *name, const export_source *s,
+                       size_t columns, fill_row *fill) {
+  const size_t n = s->info->vertex_count;
+  const size_t stride = (columns + 1) / 2 * 2;
+  export_packed packed = {0};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  int16_t *rows = calloc(n * stride, sizeof *rows);
+  if (rows != NULL) {
+    for (size_t i = 0; i < n; ++i) {
+      fill(p, s, i, rows + i * stride);
     }
-    supine_export_base64_write(corners, some * sizeof *corners, file);
+    status = supine_export_pack_rows(rows, n, stride * sizeof *rows, &packed);
   }
-  (void)fputs("</script>\n", file);
+  write_packed(p, file, name, status, packed);
+  free(rows);
+}
+
+static void write_corners(const page *p, FILE *file, const char *name, const export_source *s,
+                          const uint32_t *corners) {
+  export_packed packed = {0};
+  const supine_status status = supine_export_pack_corners(corners, 3 * s->info->triangle_count,
+                                                          s->info->vertex_count, &packed);
+  write_packed(p, file, name, status, packed);
+}
+
+static void add_to_box(const export_source *s, double low[3], double high[3]) {
+  for (size_t i = 0; i < 3 * s->info->vertex_count; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)s->vertices[i]);
+    high[i % 3] = fmax(high[i % 3], (double)s->vertices[i]);
+  }
+}
+
+/* Choose the sizes of counts: fine enough for positions to 0.02 mm, and so that all fit. */
+static void find_units(page *p) {
+  static const double step = 0.005;
+  const export_source *s = p->source;
+  const export_source *inside = p->shown->inside;
+  const size_t k = s->info->mode_count;
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  double largest = 0;
+  double largest_inside = 0;
+  add_to_box(s, low, high);
+  for (size_t i = 0; i < s->info->vertex_count * k; ++i) {
+    largest =
+        fmax(largest, fabs((double)s->coefficients[i]) * length_of(s->direction + 3 * (i / k)));
+  }
+  if (inside != NULL) {
+    add_to_box(inside, low, high);
+    for (size_t i = 0; i < 3 * k * inside->info->vertex_count; ++i) {
+      largest_inside = fmax(largest_inside, fabs((double)inside->coefficients[i]));
+    }
+  }
+  p->place_unit = step;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    p->middle[axis] = (low[axis] + high[axis]) / 2;
+    p->place_unit = fmax(p->place_unit, (high[axis] - low[axis]) / (2 * COUNT_MAX));
+  }
+  p->unit = fmax(2 * step / (double)k, largest / COUNT_MAX);
+  p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
 /* A tensor of doubles as the basis has it. */
@@ -121,23 +169,6 @@ static void write_all(FILE *file, const char *name, const export_source *s, cons
     bytes *= tensor->shape[i];
   }
   write_tensor(file, name, tensor->data, bytes);
-}
-
-/* The normals' words, some vertices after the other: 12 bytes of each word and vertex, so that
- * base64 has no remainder between. */
-static void write_normals(FILE *file, const export_source *s) {
-  enum { AT_ONCE = 256 };
-  uint32_t words[AT_ONCE * (SUPINE_NORMAL_MODES_MAX + 2)];
-  const size_t n = s->info->vertex_count;
-  const size_t modes = s->info->normal_count;
-  (void)fputs("<script type=\"text/plain\" id=\"tensor-normals\">", file);
-  for (size_t i = 0; i < n; i += AT_ONCE) {
-    const size_t end = i + AT_ONCE < n ? i + AT_ONCE : n;
-    (void)supine_gl_pack_normals(s->basis, i, end, words);
-    supine_export_base64_write(words, (end - i) * ((modes + 2) / 3) * 3 * sizeof *words, file);
-  }
-  (void)fputs("</script>\n", file);
-  write_all(file, "normal-weights", s, "normal_weights");
 }
 
 /* Each map's 256 colours as hexadecimal digits. */
@@ -167,10 +198,11 @@ static json_t *numbers(const double *values, size_t count) {
   return list;
 }
 
-static json_t *lung_begins(const supine_basis_info *info) {
+/* Where each lung begins among vertices or corners, and the end. */
+static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
-  for (size_t i = 0; i <= info->lung_count; ++i) {
-    (void)json_array_append_new(list, json_integer((json_int_t)info->lung_begin[i]));
+  for (size_t i = 0; i <= s->info->lung_count; ++i) {
+    (void)json_array_append_new(list, json_integer((json_int_t)begin[i]));
   }
   return list;
 }
@@ -192,9 +224,10 @@ static json_t *describe_inside(const page *p) {
     const uint32_t first = ((const uint32_t *)rigid->data)[2 * i];
     (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->parts->of[first]));
   }
-  return json_pack("{s:I, s:o, s:o, s:o, s:o}", "vertices", (json_int_t)info->vertex_count,
-                   "lungBegin", lung_begins(info), "names", names, "rigid", parts, "units",
-                   numbers(p->inside_unit, info->mode_count));
+  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f}", "vertices", (json_int_t)info->vertex_count,
+                   "triangles", (json_int_t)info->triangle_count, "lungBegin",
+                   begins(p->shown->inside, info->lung_begin), "names", names, "rigid", parts,
+                   "unit", p->inside_unit);
 }
 
 /* mL of the scan beyond the reference surface. */
@@ -253,15 +286,16 @@ static json_t *describe(const page *p) {
   json_t *title = json_string(p->shown->title);
   const export_breath *breath = &p->shown->breath;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, "
-      "s:f, s:I, s:o}",
+      "{s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:f, s:f, "
+      "s:o, s:o, s:o, s:f, s:I, s:o}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
-      (json_int_t)info->band, "lungBegin", lung_begins(info), "hasVolume", (int)info->has_volume,
-      "hasResting", (int)(p->source->info->has_rest), "colours", colours(), "breathVolume",
-      breath->volume, "breathLargest", breath->largest, "breathScale", breath->scale, "metadata",
-      metadata, "title", title != NULL ? title : json_string("lungs"), "units",
-      numbers(p->unit, info->mode_count), "inside", describe_inside(p), "from", describe_from(p),
+      (json_int_t)info->band, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
+      begins(p->source, p->corner_begin), "hasVolume", (int)info->has_volume, "hasResting",
+      (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
+      "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
+      title != NULL ? title : json_string("lungs"), "middle", numbers(p->middle, 3), "placeUnit",
+      p->place_unit, "unit", p->unit, "inside", describe_inside(p), "from", describe_from(p),
       "references", numbers(info->reference_volume, info->lung_count), "scanVolume",
       scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
       numbers(info->bend, 3));
@@ -274,15 +308,15 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   if (strcmp(name, "tensors") != 0) {
     return;
   }
-  const size_t n = s->info->vertex_count;
   const size_t k = s->info->mode_count;
-  write_tensor(file, "vertices", s->vertices, 3 * n * sizeof *s->vertices);
-  write_counts(file, "direction", p, 3 * n, direction_at);
-  write_counts(file, "coefficients", p, n * k, coefficient_at);
-  write_triangles(file, "triangles", s);
+  write_rows(p, file, "vertices", s, 3, place_row);
+  write_rows(p, file, "direction", s, 4, direction_row);
+  write_rows(p, file, "coefficients", s, k, coefficient_row);
+  write_corners(p, file, "triangles", s, p->corners);
   write_tensor(file, "modes", s->modes, k * s->terms * sizeof *s->modes);
   if (s->info->normal_count > 0) {
-    write_normals(file, s);
+    write_rows(p, file, "normals", s, (s->info->normal_count + 2) / 3 * 9, normal_row);
+    write_all(file, "normal-weights", s, "normal_weights");
   }
   if (s->info->has_rest) {
     write_all(file, "resting", s, "resting_volume");
@@ -294,11 +328,11 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   }
   if (p->shown->inside != NULL) {
     const export_source *inside = p->shown->inside;
-    const size_t m = inside->info->vertex_count;
-    write_tensor(file, "inside-vertices", inside->vertices, 3 * m * sizeof *inside->vertices);
-    write_counts(file, "inside-coefficients", p, 3 * m * k, inside_at);
-    write_triangles(file, "inside-triangles", inside);
-    write_tensor(file, "inside-parts", p->shown->parts->of, m * sizeof *p->shown->parts->of);
+    write_rows(p, file, "inside-vertices", inside, 3, place_row);
+    write_rows(p, file, "inside-coefficients", inside, 3 * k, inside_row);
+    write_corners(p, file, "inside-triangles", inside, inside->triangles);
+    write_tensor(file, "inside-parts", p->shown->parts->of,
+                 inside->info->vertex_count * sizeof *p->shown->parts->of);
   }
 }
 
@@ -312,7 +346,15 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
                             EXPORT_PAGE_MODES_MAX, info->vector ? "a vector basis" : "scalar",
                             info->mode_count, EXPORT_PAGE_MODES_MAX);
   }
-  page p = {.source = source, .shown = shown};
+  supine_status status = supine_export_pack_begin(error);
+  page p = {.source = source, .shown = shown, .status = &status};
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  p.corners = supine_export_pack_order(source, p.corner_begin);
+  if (p.corners == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
+  }
   find_units(&p);
   json_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
@@ -323,7 +365,8 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   free(text);
   json_decref(data);
   json_decref(description);
-  return SUPINE_OK;
+  free(p.corners);
+  return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for the page");
 }
 
 supine_status supine_export_html_write(const char *path, const export_source *source,

@@ -15,41 +15,51 @@ function fromBase64(text) {
   return bytes;
 }
 
-/** Takes a tensor out of the page. */
-function takeTensor(name, Numbers) {
+/** Take the bytes of a tensor out of the page. */
+function takeBytes(name) {
   const element = document.getElementById(`tensor-${name}`);
   const text = element.textContent;
   element.remove();
-  return new Numbers(fromBase64(text).buffer);
+  return fromBase64(text);
 }
 
-/** Takes 16-bit counts out of the page: number i is in units[i % units.length]. */
-function takeCounts(name, units) {
-  const counts = takeTensor(name, Int16Array);
-  const numbers = new Float32Array(counts.length);
-  for (let i = 0; i < counts.length; i += units.length) for (let k = 0; k < units.length; ++k) numbers[i + k] = counts[i + k] * units[k];
+const takeTensor = (name, Numbers) => new Numbers(takeBytes(name).buffer);
+
+/** Take compressed rows of 16-bit counts, padded to an even number of columns. */
+function takeCounts(name, rows, columns, filter) {
+  const stride = 4 * Math.ceil(columns / 2);
+  const bytes = new Uint8Array(rows * stride);
+  MeshoptDecoder.decodeVertexBuffer(bytes, rows, stride, takeBytes(name), filter);
+  return new Int16Array(bytes.buffer);
+}
+
+/** Take `columns` numbers a row, counts of `unit` from middle[column]. */
+function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
+  const counts = takeCounts(name, rows, columns);
+  const numbers = new Float32Array(rows * columns);
+  const stride = counts.length / rows;
+  for (let i = 0; i < rows; ++i) for (let k = 0; k < columns; ++k) numbers[i * columns + k] = middle[k] + unit * counts[i * stride + k];
   return numbers;
 }
 
-/** Corners of triangles, of 16 bits where they name every vertex. */
-const takeTriangles = (name, vertices) => Uint32Array.from(takeTensor(name, vertices > 65536 ? Uint32Array : Uint16Array));
+/** Take the corners of compressed triangles. */
+function takeTriangles(name, count) {
+  const corners = new Uint32Array(3 * count);
+  MeshoptDecoder.decodeIndexBuffer(new Uint8Array(corners.buffer), 3 * count, 4, takeBytes(name));
+  return corners;
+}
 
-/** Triangles in the order of their lungs, and where each lung's corners begin. */
-function groupByLung(basis) {
-  const lungs = basis.lungBegin.length - 1;
-  const parts = Array.from({ length: lungs }, () => []);
-  for (let t = 0; t < basis.corners.length; t += 3) parts[lungOf(basis, basis.corners[t])].push(t);
-  const grouped = new Uint32Array(basis.corners.length);
-  basis.cornerBegin = [0];
-  let at = 0;
-  for (const part of parts) {
-    for (const t of part) {
-      grouped.set(basis.corners.subarray(t, t + 3), at);
-      at += 3;
-    }
-    basis.cornerBegin.push(at);
+/** Take the normals' words as supine.glsl reads them: three numbers, of 13, 10 and 9 bits, to a word. */
+function takeNormals(vertices, words) {
+  const columns = 3 * words;
+  const counts = takeCounts('normals', vertices, 3 * columns);
+  const packed = new Uint32Array(vertices * columns);
+  const stride = counts.length / vertices;
+  for (let i = 0; i < packed.length; ++i) {
+    const at = Math.floor(i / columns) * stride + (i % columns);
+    packed[i] = (counts[at] << 19) | ((counts[at + columns] & 1023) << 9) | (counts[at + 2 * columns] & 511);
   }
-  basis.corners = grouped;
+  return packed;
 }
 
 /** RGBA bytes of colours written as hexadecimal digits. */
@@ -63,10 +73,12 @@ function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
   basis.colours.expansion = divergingMap();
-  basis.rest = takeTensor('vertices', Float32Array);
-  basis.direction = takeCounts('direction', [1 / 32767]);
-  basis.coefficients = takeCounts('coefficients', basis.units);
-  basis.corners = takeTriangles('triangles', basis.vertices);
+  const { vertices: n } = basis;
+  basis.rest = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
+  const directions = takeCounts('direction', n, 4, 'OCTAHEDRAL');
+  basis.direction = Float32Array.from({ length: 3 * n }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
+  basis.coefficients = takeRows('coefficients', n, basis.modes, basis.unit);
+  basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
   if (basis.hasVolume) {
     basis.linear = takeTensor('linear', Float64Array);
@@ -74,20 +86,19 @@ function readBasis() {
     basis.cubic = takeTensor('cubic', Float64Array);
   }
   basis.words = Math.ceil(basis.normalModes / 3);
-  basis.normals = basis.words ? takeTensor('normals', Uint32Array) : new Uint32Array(0);
+  basis.normals = basis.words ? takeNormals(n, basis.words) : new Uint32Array(0);
   basis.turns = basis.words ? takeTensor('normal-weights', Float64Array) : null;
   basis.resting = basis.hasResting ? takeTensor('resting', Float64Array) : null;
   basis.byLung = basis.resting?.length > 9;
   basis.lungs = basis.lungBegin.length - 1;
   const names = (basis.metadata.lungs ?? '').split(',');
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
-  groupByLung(basis);
   basis.lungMiddles = basis.lungNames.map((_, lung) => [0, 1, 2].map((axis) => {
     let sum = 0;
     for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v + axis];
     return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]);
   }));
-  if (basis.inside) takeInside(basis.inside);
+  if (basis.inside) takeInside(basis);
   return basis;
 }
 

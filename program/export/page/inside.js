@@ -5,11 +5,11 @@
 const BALL_RADIUS = 4; // mm, of a point
 
 /** Takes it out of the page, points before meshes, so that each kind is drawn at once. */
-function takeInside(inside) {
-  const { vertices: n, units } = inside;
-  const k = units.length;
-  const [places, fields, of, corners] = [takeTensor('inside-vertices', Float32Array), takeCounts('inside-coefficients', units),
-    takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', n)];
+function takeInside({ inside, modes: k, placeUnit, middle }) {
+  const { vertices: n } = inside;
+  inside.modes = k;
+  const [places, fields, of, corners] = [takeRows('inside-vertices', n, 3, placeUnit, middle), takeRows('inside-coefficients', n, 3 * k, inside.unit),
+    takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
   of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // whose vertices stay together
@@ -48,7 +48,7 @@ function normalsOf({ rest, vertices, corners }) {
 }
 
 /** Where the field puts a vertex inside. */
-function fieldPlace({ rest, fields, units: { length: k } }, { weights, gains }, vertex) {
+function fieldPlace({ rest, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
     for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
