@@ -95,7 +95,7 @@ lungs of {best['vertices']:,} vertices.
 | III-C, displacement at one orientation against volume | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | off a straight line by {off_line():.1f} % of the largest at most, 0 to 500 mL, four postures | `deep` bends on purpose below full inflation; with `paper` each vertex moves on a line |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | springs are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row a vertex | |
-| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | visits of a link to 1e-6: {reached} | the product solves by conjugate gradients; the paper's iteration is the reference that tests hold it against |
+| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | visits of a link to 1e-6: {reached} | the product factorises the matrix (CHOLMOD); the paper's iteration is the reference that tests hold it against |
 | (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
 | (15)-(17), directions | `--law`, `--direction`, `supine fit` | {best['direction_constants']} | **Table I is lost**: these are fits to ten patients' 4-D CT (DIR-Lab); `supine fit` finds a person's own |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | `deep` turns only a part of the gradient with gravity |

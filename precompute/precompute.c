@@ -317,8 +317,6 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
   if (status == SUPINE_OK && report != NULL) {
     *report = (supine_precompute_report){.mode_count = p.compression.mode_count,
                                          .solve_count = p.projection.rank,
-                                         .iterations = p.projection.iterations,
-                                         .residual = p.projection.residual,
                                          .accuracy = p.accuracy,
                                          .turned_over = p.turned_over};
   }

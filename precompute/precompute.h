@@ -32,8 +32,6 @@ typedef struct supine_precompute_options {
 typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< directions solved for */
-  size_t iterations;
-  double residual;
   supine_accuracy accuracy;
   /** At the accuracy's state, see supine_accuracy_turned_over; 0 where the surface is open. */
   double turned_over;

@@ -53,19 +53,16 @@ static const supine_option table[] = {
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   supine_output output = {0};
   double *column = malloc(n * sizeof *column);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (column == NULL ||
-      supine_physics_model_network(lungs, &wanted->model.prepared.model, &network) != SUPINE_OK ||
-      supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK) {
+  if (column == NULL) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_equilibrium_set_stiffness(equilibrium,
-                                                    wanted->model.prepared.model.stiffness, error);
+  status =
+      supine_physics_model_equilibrium(lungs, &wanted->model.prepared.model, &equilibrium, error);
   if (status == SUPINE_OK) {
     status = supine_physics_transfer_column(equilibrium, wanted->vertex, column, error);
   }
@@ -82,7 +79,6 @@ static supine_status write_column(const supine_lungs *lungs, const request *want
   }
 cleanup:
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   free(column);
   return status;
 }
@@ -277,8 +273,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
       (void)printf(", %+.2f mL",
                    1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
     }
-    (void)printf("; %zu steps to residual %.1e\n", solution.report.iterations,
-                 solution.report.residual);
+    (void)putchar('\n');
   }
 cleanup:
   free(deformed.vertices);

@@ -13,27 +13,21 @@
 
 #include "lungs_helpers.h"
 
-static const double exact = 1e-13; /* doubles reach 1e-16 (R / link)^2 */
-
 static supine_model model; /* with the reach of the test that runs */
 
 /* Solves one right-hand side on lungs as they are. */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   double *out = calloc(n + 1, sizeof *out);
   supine_error error = {0};
-  assert_int_equal(supine_physics_model_network(lungs, &model, &network), SUPINE_OK);
-  assert_int_equal(supine_physics_equilibrium_create(network, 1, 0, &equilibrium), SUPINE_OK);
+  assert_int_equal(supine_physics_model_equilibrium(lungs, &model, &equilibrium, NULL), SUPINE_OK);
   assert_int_equal(supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL),
                    SUPINE_OK);
-  if (supine_physics_equilibrium_solve(equilibrium, 1, force, exact, false, out, NULL, &error) !=
-      SUPINE_OK) {
+  if (supine_physics_equilibrium_solve(equilibrium, 1, force, out, NULL, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   return out;
 }
 

@@ -13,9 +13,9 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
+#include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "precompute/lungs/disease.h"
 #include <supine/volume.h>
 
 /* Masses and the links between them; no surface need be there. */
@@ -59,36 +59,33 @@ static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
   f.topology.edges = calloc(2 * count, sizeof *f.topology.edges);
+  f.topology.edges[3] = (uint32_t)(count - 1);
   for (size_t i = 0; i < count; ++i) {
     const double angle = 2.0 * M_PI * (double)i / (double)count;
-    const size_t next = (i + 1) % count;
     f.mesh.vertices[3 * i] = radius * cos(angle);
     f.mesh.vertices[3 * i + 1] = radius * sin(angle);
-    f.topology.edges[2 * i] = (uint32_t)(i < next ? i : next);
-    f.topology.edges[2 * i + 1] = (uint32_t)(i < next ? next : i);
+    if (i > 0) { /* sorted: (0, 1), (0, count - 1), (1, 2), ... */
+      const size_t e = i == 1 ? 0 : i;
+      f.topology.edges[2 * e] = (uint32_t)(i - 1);
+      f.topology.edges[2 * e + 1] = (uint32_t)i;
+    }
   }
   return f;
 }
 
-/* F of the fast solve. */
+/* Solve for F. */
 static inline supine_status frame_solve(const frame *f, const double *stiffness,
-                                        const double *force, double tolerance, double *catch_,
-                                        supine_solve_report *report) {
-  supine_network *network = NULL;
+                                        const double *force, double *catch_) {
   supine_equilibrium *equilibrium = NULL;
-  supine_status status = supine_physics_network_create(&f->mesh, &f->topology, &network);
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_create(network, 1, 1, &equilibrium);
-  }
+  supine_status status =
+      supine_physics_equilibrium_create(&f->mesh, &f->topology, 0.0, NULL, &equilibrium, NULL);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL);
   }
   if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(equilibrium, 1, force, tolerance, false, catch_,
-                                              report, NULL);
+    status = supine_physics_equilibrium_solve(equilibrium, 1, force, catch_, NULL, NULL);
   }
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   return status;
 }
 
@@ -453,19 +450,12 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   double *area = calloc(n + 1, sizeof *area);
   double *column = calloc(n, sizeof *column);
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = reach;
-  supine_status status = supine_physics_model_network(lungs, &model, &network);
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_create(network, 1, 0, &equilibrium);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_set_stiffness(equilibrium, NULL, NULL);
-  }
+  supine_status status = supine_physics_model_equilibrium(lungs, &model, &equilibrium, NULL);
   if (status == SUPINE_OK) {
     status = supine_physics_transfer_column(equilibrium, vertex, column, NULL);
   }
@@ -484,7 +474,6 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
     *spread = sqrt(square / sum);
   }
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   free(area);
   free(column);
   return status;

@@ -8,7 +8,6 @@
 
 #include "precompute/patient/applied.h"
 
-#include "precompute/physics/inverse.h"
 #include "sh/base/parallel.h"
 
 enum { GRAIN = 64, COLUMNS = SUPINE_PATIENT_COLUMNS };
@@ -207,7 +206,10 @@ static supine_status find(study *s, const double *stiffness, const double gravit
     applied->matched += s->matched[v] ? 1.0 / (double)n : 0.0;
   }
   supine_status status =
-      supine_physics_inverse_force(s->m->network, stiffness, s->catch_, s->force, error);
+      supine_physics_equilibrium_set_stiffness(s->m->equilibrium, stiffness, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_equilibrium_force(s->m->equilibrium, s->catch_, s->force, error);
+  }
   if (status != SUPINE_OK) {
     return status;
   }

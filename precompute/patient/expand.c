@@ -34,7 +34,6 @@ static const double near_by = 1.7;   /* largest distance of neighbours over the 
 static const double least = 0.02;    /* Least a of a region. */
 static const double worth = 0.95;    /* ratio of held-out RMS, with over without, to keep it */
 static const double settled = 1e-3;  /* Change of every a at which the alternation ends. */
-static const double residual = 1e-6; /* relative residual of the solves */
 
 /* The regions' values and the law fitted with them. */
 typedef struct estimate {
@@ -219,17 +218,15 @@ static supine_status find_responses(const study *s, supine_error *error) {
   const supine_patient_matching *m = s->m;
   const size_t n = m->rest->mesh.vertex_count;
   double slopes[SUPINE_PATIENT_COLUMNS];
-  supine_equilibrium *equilibrium = NULL;
   double *force = malloc(n * sizeof *force);
   double *alone = calloc(n * LANES, sizeof *alone);
   double *caught = malloc(n * LANES * sizeof *caught);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (force == NULL || alone == NULL || caught == NULL ||
-      supine_physics_equilibrium_create(m->network, LANES, 0, &equilibrium) != SUPINE_OK) {
+  if (force == NULL || alone == NULL || caught == NULL) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_equilibrium_set_stiffness(equilibrium, NULL, error);
+  status = supine_physics_equilibrium_set_stiffness(m->equilibrium, NULL, error);
   if (status == SUPINE_OK) {
     status = find_force(s, force, slopes, error);
   }
@@ -245,8 +242,7 @@ static supine_status find_responses(const study *s, supine_error *error) {
         alone[i * lanes + r] = k < s->regions.count[side] ? force[i] * shares[k] : 0.0;
       }
     }
-    status = supine_physics_equilibrium_solve(equilibrium, lanes, alone, residual, false, caught,
-                                              NULL, error);
+    status = supine_physics_equilibrium_solve(m->equilibrium, lanes, alone, caught, NULL, error);
     for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
       memcpy(s->response + i * s->count + first, caught + m->vertex[i] * lanes,
              lanes * sizeof *caught);
@@ -256,7 +252,6 @@ static supine_status find_responses(const study *s, supine_error *error) {
     respond_landmark(s, i, slopes);
   }
 cleanup:
-  supine_physics_equilibrium_destroy(equilibrium);
   free(force);
   free(alone);
   free(caught);

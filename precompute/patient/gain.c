@@ -208,8 +208,8 @@ static supine_status solve_heights(const problem *p, const state *s, const doubl
   supine_status status =
       supine_physics_equilibrium_set_stiffness(s->matching.equilibrium, stiffness, error);
   if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(s->matching.equilibrium, 2, heights, 0.0, false,
-                                              caught, NULL, error);
+    status =
+        supine_physics_equilibrium_solve(s->matching.equilibrium, 2, heights, caught, NULL, error);
   }
   free(heights);
   return status;

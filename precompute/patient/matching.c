@@ -98,7 +98,7 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, stiffness, error);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
-                                              0.0, false, m->caught, NULL, error);
+                                              m->caught, NULL, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
     memcpy(m->rows[i].force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
@@ -107,14 +107,14 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   return status;
 }
 
-/* Set up the network with the model's stiffness, and the columns of the force. */
+/* Set up the equilibrium with the model's stiffness, and the columns of the force. */
 static supine_status set_up_forces(supine_patient_matching *m, const supine_model *model,
                                    supine_error *error) {
   const size_t n = m->rest->mesh.vertex_count;
-  if (supine_physics_model_network(m->rest, model, &m->network) != SUPINE_OK ||
-      supine_physics_equilibrium_create(m->network, SUPINE_PATIENT_COLUMNS, 0, &m->equilibrium) !=
-          SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+  const supine_status status =
+      supine_physics_model_equilibrium(m->rest, model, &m->equilibrium, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   for (size_t i = 0; i < n; ++i) {
     double box[3];
@@ -175,7 +175,6 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_patient_matching *m = matching;
   supine_inside_surface_destroy(m->tree);
   supine_physics_equilibrium_destroy(m->equilibrium);
-  supine_physics_network_destroy(m->network);
   free(m->columns);
   free(m->caught);
   free(m->state_normals);

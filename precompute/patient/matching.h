@@ -15,8 +15,7 @@ typedef struct supine_patient_matching {
   const supine_mesh *state;
   supine_patient_frame frame;
   supine_inside_surface *tree;
-  supine_network *network;
-  supine_equilibrium *equilibrium; /* of SUPINE_PATIENT_COLUMNS */
+  supine_equilibrium *equilibrium;
   double *columns;                 /* [N, SUPINE_PATIENT_COLUMNS] the force before spreading */
   double *caught;                  /* [N, SUPINE_PATIENT_COLUMNS] the force after spreading */
   double *state_normals;           /* [state vertices, 3], unit */

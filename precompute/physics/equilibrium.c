@@ -1,385 +1,439 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The equilibrium of (5), (8), (12)-(14): eliminate the springs, make the matrix symmetric, and
- * solve in single precision until the residual, computed in double, meets the tolerance. */
+ * factorise it with CHOLMOD. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "precompute/physics/conjugate_gradients.h"
+#include <suitesparse/cholmod.h>
 
-/* Most steps of a solve, and prefetch distance in rows. */
-enum { STEPS_MAX = 400, AHEAD = 4 };
+#include "precompute/physics/equilibrium.h"
+#include "sh/base/library.h"
+#include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
-/* Relative residual at which single-precision steps stop and the residual is recomputed in double.
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(cholmod_, start) EACH(cholmod_, finish) EACH(cholmod_, allocate_sparse)                     \
+  EACH(cholmod_, free_sparse) EACH(cholmod_, analyze) EACH(cholmod_, factorize)                    \
+  EACH(cholmod_, free_factor) EACH(cholmod_, allocate_dense) EACH(cholmod_, free_dense)            \
+  EACH(cholmod_, solve) EACH(cholmod_, sdmult)
+/* clang-format on */
+
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
+
+/* Right-hand sides that are solved together: bounds the work space. */
+enum { TOGETHER = 4 };
+
+/* Largest relative residual of a solve; double precision reaches some 1e-16 (R / link)^2. */
+static const double residual_limit = 1e-8;
+
+/* Vertices and edges that no edge links to others, as those of one lung: solved in a thread each.
  */
-static const double round_gain = 2.5e-6;
-
-/* Relative tolerance for one column of the transfer matrix, most of which is small. */
-static const double column_tolerance = 1e-14;
+typedef struct part {
+  size_t vertex, vertex_count; /* the first, and their number */
+  size_t edge, edge_count;
+  bool factorised; /* `factor` is that of `matrix` */
+  cholmod_sparse
+      *matrix; /* lower half: column i holds the diagonal and the edges that begin in i */
+  cholmod_factor *factor;
+  cholmod_common common;
+} part;
 
 struct supine_equilibrium {
-  const supine_network *network;
-  size_t rhs_max;
-  double *give;     /* [N] S of the operator, internal order; with a reach 1 */
-  double *load;     /* [N] factor of a force on the right side: 1; with a reach area / E */
-  bool prepared;    /* the system is set up for the stiffness */
-  size_t count;     /* right-hand sides of this solve */
-  double *solution; /* [N, count] t */
-  supine_system system;
-  supine_rows links; /* without a reach: the network's links with the stiffness in their values */
-  supine_gradients gradients;
+  size_t vertex_count;
+  const supine_topology *topology;
+  double *area;    /* [N] area of a vertex over the mean; NULL: the paper's springs */
+  double *link;    /* [edges] with a reach w / 2, without D(mass, spring) in mm */
+  double *lesions; /* [N] factors on the normalised stiffness */
+  double *give;    /* [N] S of the operator; with a reach 1 */
+  double *load;    /* [N] factor of a force on the right side: 1; with a reach area / E */
+  size_t part_count;
+  part parts[2];
 };
 
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
   if (equilibrium != NULL) {
-    for (size_t k = 0; k < SUPINE_LEVELS_MAX; ++k) {
-      supine_stage *stage = &equilibrium->system.stage[k];
-      free(stage->mass);
-      free(stage->inverse);
-      free(stage->solution);
-      free(stage->right);
-      free(stage->work);
+    for (size_t k = 0; k < equilibrium->part_count; ++k) {
+      part *p = &equilibrium->parts[k];
+      cholmod.free_sparse(&p->matrix, &p->common);
+      cholmod.free_factor(&p->factor, &p->common);
+      cholmod.finish(&p->common);
     }
-    free(equilibrium->links.value);
+    free(equilibrium->area);
+    free(equilibrium->link);
+    free(equilibrium->lesions);
     free(equilibrium->give);
     free(equilibrium->load);
-    free(equilibrium->solution);
-    free(equilibrium->gradients.direction);
-    free(equilibrium->gradients.product);
-    free(equilibrium->gradients.sums);
     free(equilibrium);
   }
 }
 
-static bool allocate_stage(supine_stage *stage, size_t rows, size_t lanes) {
-  const size_t values = rows * lanes;
-  stage->mass = malloc(rows * sizeof(float));
-  stage->inverse = malloc(rows * sizeof(float));
-  stage->solution = malloc(values * sizeof(float));
-  stage->right = malloc(values * sizeof(float));
-  stage->work = malloc(values * sizeof(float));
-  return stage->mass != NULL && stage->inverse != NULL && stage->solution != NULL &&
-         stage->right != NULL && stage->work != NULL;
+double supine_physics_link_distance(const double *first, const double *second) {
+  return fmax(1.0, 0.5 * supine_distance(first, second));
 }
 
-/* Allocate the stages: those of the network's hierarchy, or the network alone. */
-static bool allocate_system(supine_equilibrium *eq) {
-  const supine_network *net = eq->network;
-  supine_system *system = &eq->system;
-  bool whole = true;
-  if (net->coarse == NULL) {
-    eq->links = net->links;
-    eq->links.value = malloc((net->links.begin[net->vertex_count] + 1) * sizeof(float));
-    system->stage[0].links = &eq->links;
-    system->stage_count = 1;
-    return eq->links.value != NULL &&
-           allocate_stage(&system->stage[0], net->vertex_count, eq->rhs_max);
+supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
+                                                 double *scaled, supine_error *error) {
+  if (stiffness == NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      scaled[i] = 1.0;
+    }
+    return SUPINE_OK;
   }
-  system->stage_count = net->coarse->level_count;
-  for (size_t k = 0; k < system->stage_count && whole; ++k) {
-    const supine_level *level = &net->coarse->level[k];
-    system->stage[k].links = &level->links;
-    system->stage[k].part = &level->part;
-    system->stage[k].whole = &level->whole;
-    whole = allocate_stage(&system->stage[k], level->links.count, eq->rhs_max);
+  double logarithms = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    if (!(stiffness[i] > 0.0) || !isfinite(stiffness[i])) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "stiffness of vertex %zu is %g: it must be positive and finite", i,
+                              stiffness[i]);
+    }
+    logarithms += log(stiffness[i]);
   }
-  return whole;
+  const double factor = exp(-logarithms / (double)count);
+  for (size_t i = 0; i < count; ++i) {
+    scaled[i] = stiffness[i] * factor;
+  }
+  return SUPINE_OK;
 }
 
-supine_status supine_physics_equilibrium_create(const supine_network *network, size_t rhs_max,
-                                                size_t threads, supine_equilibrium **equilibrium) {
+/* Split the vertices where no edge passes, as near to the middle as possible. */
+static void split(supine_equilibrium *eq) {
+  const size_t n = eq->vertex_count;
+  const supine_topology *topology = eq->topology;
+  size_t last = 0; /* linked to a vertex before */
+  part *first = &eq->parts[0];
+  *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
+  for (size_t i = 1, e = 0; i < n; ++i) {
+    for (; e < topology->edge_count && topology->edges[2 * e] < i; ++e) {
+      last = topology->edges[2 * e + 1] > last ? topology->edges[2 * e + 1] : last;
+    }
+    const size_t larger = i < n - i ? n - i : i;
+    if (last < i && larger < first->vertex_count) {
+      *first = (part){.vertex_count = i, .edge_count = e};
+    }
+  }
+  eq->part_count = first->vertex_count < n ? 2 : 1;
+  eq->parts[1] = (part){.vertex = first->vertex_count,
+                        .vertex_count = n - first->vertex_count,
+                        .edge = first->edge_count,
+                        .edge_count = topology->edge_count - first->edge_count};
+}
+
+/* Lay out the matrix: topology->edges is sorted, so that edge e is entry e + i + 1 of column i,
+ * all counted within the part. */
+static bool create_matrix(const supine_topology *topology, part *p) {
+  const size_t entries = p->vertex_count + p->edge_count;
+  const uint32_t *edges = topology->edges + 2 * p->edge;
+  cholmod.start(&p->common);
+  p->common.print = 0;
+  p->common.supernodal = CHOLMOD_SUPERNODAL;
+  p->common.nmethods = 1;
+  p->common.method[0].ordering = CHOLMOD_AMD;
+  p->matrix = cholmod.allocate_sparse(p->vertex_count, p->vertex_count, entries, true, true, -1,
+                                      CHOLMOD_REAL, &p->common);
+  if (p->matrix == NULL) {
+    return false;
+  }
+  int *begin = p->matrix->p;
+  int *row = p->matrix->i;
+  size_t e = 0;
+  for (size_t i = 0; i < p->vertex_count; ++i) {
+    begin[i] = (int)(e + i);
+    row[e + i] = (int)i;
+    for (; e < p->edge_count && edges[2 * e] - p->vertex == i; ++e) {
+      row[e + i + 1] = (int)(edges[2 * e + 1] - p->vertex);
+    }
+  }
+  begin[p->vertex_count] = (int)entries;
+  return true;
+}
+
+static bool create_matrices(supine_equilibrium *eq) {
+  bool made = true;
+  split(eq);
+  for (size_t k = 0; k < eq->part_count; ++k) {
+    made = create_matrix(eq->topology, &eq->parts[k]) && made;
+  }
+  return made;
+}
+
+/* Index of the edge between two vertices of a triangle. */
+static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
+  const uint32_t first = a < b ? a : b;
+  const part *p = &eq->parts[first < eq->parts[0].vertex_count ? 0 : 1];
+  const int *begin = p->matrix->p;
+  size_t e = p->edge + (size_t)begin[first - p->vertex] - (first - p->vertex);
+  while (eq->topology->edges[2 * e + 1] != (a < b ? b : a)) {
+    ++e;
+  }
+  return e;
+}
+
+/* Compute areas and conductances of a reach.
+ *
+ * The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
+ * surface, where area_i is the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with
+ * link coefficients c that make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a
+ * link's own area a (a third of its triangles') and length h, c = 2 a / h^2 does so for links that
+ * run in all directions alike; unlike cotangents it is never negative, whatever the triangles, at
+ * the price of R^2 within a tenth or so. */
+static bool set_reach(supine_equilibrium *eq, const supine_mesh *mesh, double reach) {
+  const size_t n = eq->vertex_count;
+  const double *p = mesh->vertices;
+  double mean = 0.0;
+  eq->area = malloc(n * sizeof *eq->area);
+  if (eq->area == NULL) {
+    return false;
+  }
+  supine_mesh_vertex_area(mesh, eq->area);
+  for (size_t i = 0; i < n; ++i) {
+    mean += eq->area[i] / (double)n;
+  }
+  /* Neither a vertex's weight nor a link's may vanish. */
+  const double least = 1e-6 * mean;
+  for (size_t i = 0; i < n; ++i) {
+    eq->area[i] = fmax(eq->area[i], least) / mean;
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    double edge[2][3];
+    double normal[3]; /* twice the triangle's area long */
+    for (size_t k = 0; k < 3; ++k) {
+      edge[0][k] = p[3 * (size_t)corner[1] + k] - p[3 * (size_t)corner[0] + k];
+      edge[1][k] = p[3 * (size_t)corner[2] + k] - p[3 * (size_t)corner[0] + k];
+    }
+    supine_cross(edge[0], edge[1], normal);
+    for (size_t k = 0; k < 3; ++k) {
+      eq->link[find_edge(eq, corner[k], corner[(k + 1) % 3])] += supine_length(normal) / 6.0;
+    }
+  }
+  for (size_t e = 0; e < eq->topology->edge_count; ++e) {
+    const double *first = p + 3 * (size_t)eq->topology->edges[2 * e];
+    const double *second = p + 3 * (size_t)eq->topology->edges[2 * e + 1];
+    const double length = supine_distance(first, second);
+    eq->link[e] =
+        2.0 * reach * reach / mean * fmax(eq->link[e], least) / fmax(length * length, least);
+  }
+  return true;
+}
+
+supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
+                                                const supine_topology *topology, double reach,
+                                                const double *lesions,
+                                                supine_equilibrium **equilibrium,
+                                                supine_error *error) {
+  const size_t n = mesh->vertex_count;
   *equilibrium = NULL;
-  if (rhs_max < 1 || rhs_max > SUPINE_RHS_MAX) {
-    return SUPINE_ERROR_ARGUMENT;
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   supine_equilibrium *made = calloc(1, sizeof *made);
   if (made == NULL) {
-    return SUPINE_ERROR_MEMORY;
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the equilibrium");
   }
-  const size_t n = network->vertex_count;
-  const size_t blocks = n / SUPINE_SUM_ROWS + 1;
-  supine_gradients *gradients = &made->gradients;
-  made->network = network;
-  made->rhs_max = rhs_max;
-  made->system.threads = threads == 0 ? supine_thread_count() : threads;
-  made->give = malloc(n * sizeof(double));
-  made->load = malloc(n * sizeof(double));
-  made->solution = malloc(n * rhs_max * sizeof(double));
-  gradients->system = &made->system;
-  gradients->solution = made->solution;
-  gradients->direction = malloc(n * rhs_max * sizeof(float));
-  gradients->product = malloc(n * rhs_max * sizeof(float));
-  gradients->sums = malloc(blocks * 2 * rhs_max * sizeof(double));
-  if (!allocate_system(made) || made->give == NULL || made->load == NULL ||
-      made->solution == NULL || gradients->direction == NULL || gradients->product == NULL ||
-      gradients->sums == NULL) {
+  made->vertex_count = n;
+  made->topology = topology;
+  made->link = calloc(topology->edge_count + 1, sizeof *made->link);
+  made->lesions = malloc(n * sizeof *made->lesions);
+  made->give = malloc(n * sizeof *made->give);
+  made->load = malloc(n * sizeof *made->load);
+  if (made->link == NULL || made->lesions == NULL || made->give == NULL || made->load == NULL ||
+      !create_matrices(made) || (reach > 0.0 && !set_reach(made, mesh, reach))) {
     supine_physics_equilibrium_destroy(made);
-    return SUPINE_ERROR_MEMORY;
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    made->lesions[i] = lesions != NULL ? lesions[i] : 1.0;
+  }
+  for (size_t e = 0; e < topology->edge_count && !(reach > 0.0); ++e) {
+    made->link[e] =
+        supine_physics_link_distance(mesh->vertices + 3 * (size_t)topology->edges[2 * e],
+                                     mesh->vertices + 3 * (size_t)topology->edges[2 * e + 1]);
   }
   *equilibrium = made;
-  return SUPINE_OK;
+  return supine_physics_equilibrium_set_stiffness(made, NULL, error);
+}
+
+/* Fill in the values of a part's matrix. */
+static void set_values(const supine_equilibrium *eq, part *p) {
+  const int *begin = p->matrix->p;
+  double *value = p->matrix->x;
+  for (size_t i = 0; i < p->vertex_count; ++i) {
+    const double give = eq->give[p->vertex + i];
+    value[begin[i]] = (eq->area != NULL ? eq->area[p->vertex + i] : 1.0) * give * give;
+  }
+  for (size_t e = 0; e < p->edge_count; ++e) {
+    const uint32_t *edge = eq->topology->edges + 2 * (p->edge + e);
+    double *first = &value[begin[edge[0] - p->vertex]];
+    double *second = &value[begin[edge[1] - p->vertex]];
+    double c = eq->link[p->edge + e];
+    if (eq->area == NULL) {
+      const double d = eq->link[p->edge + e];
+      const double s[2] = {eq->give[edge[0]], eq->give[edge[1]]};
+      const double wide = d + 2.0 * s[0] * s[1];
+      c = s[0] * s[1] / (d * wide);
+      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* caught by the spring */
+      *second += (s[0] + s[1]) / (2.0 * s[0] * wide);
+    }
+    *first += c;
+    *second += c;
+    value[e + edge[0] - p->vertex + 1] = -c;
+  }
+  p->factorised = false;
 }
 
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error) {
-  const supine_network *net = equilibrium->network;
-  double *e = equilibrium->solution; /* [N] work space, file's order */
+  supine_equilibrium *eq = equilibrium;
   const supine_status status =
-      supine_physics_stiffness_normalise(net->vertex_count, stiffness, e, error);
-  for (size_t i = 0; status == SUPINE_OK && i < net->vertex_count; ++i) {
-    const uint32_t v = net->order[i];
-    const double a = 1.0 / (e[v] * (net->lesions != NULL ? net->lesions[v] : 1.0));
-    equilibrium->give[i] = net->area != NULL ? 1.0 : a;
-    equilibrium->load[i] = net->area != NULL ? net->area[i] * a : 1.0;
+      supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load, error);
+  for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
+    const double a = 1.0 / (eq->load[i] * eq->lesions[i]);
+    eq->give[i] = eq->area != NULL ? 1.0 : a;
+    eq->load[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
   }
-  equilibrium->prepared = equilibrium->prepared && net->area != NULL;
+  for (size_t k = 0; k < eq->part_count && status == SUPINE_OK; ++k) {
+    if (eq->area == NULL || !eq->parts[k].factorised) {
+      set_values(eq, &eq->parts[k]);
+    }
+  }
   return status;
 }
 
-typedef struct solve_pass {
+/* One solve of all right-hand sides. */
+typedef struct solve {
   supine_equilibrium *eq;
-  const double *force;           /* [N, lanes] */
-  double *catch_;                /* [N, lanes] */
-  bool warm;                     /* catch_ holds the first guess */
-  double unit[SUPINE_RHS_MAX];   /* norm of the force: the unit in single precision */
-  double wanted[SUPINE_RHS_MAX]; /* squared residual that ends the next round */
-  double relative;               /* largest residual relative to the force */
-} solve_pass;
+  size_t count;
+  const double *force; /* [N, count] */
+  double *catch_;      /* [N, count] */
+  supine_status status[2];
+  double residual[2]; /* largest of a part */
+} solve;
 
-static void run(const solve_pass *pass, supine_range_function *function) {
-  supine_physics_system_run(pass->eq->system.threads, pass->eq->network->vertex_count, function,
-                            (void *)pass);
-}
-
-/* Find 1 / value to 1e-14 by a single-precision division and a Newton step, several times faster
- * than a division in double. */
-SUPINE_INLINE double reciprocal(double value) {
-  const double guess = (double)(1.0F / (float)value);
-  return guess * (2.0 - value * guess);
-}
-
-/* Without a reach: find c of a link of length d, and its addition to the mass of its first end,
- * S^2 excluded: the share that the spring catches. */
-SUPINE_INLINE void paper_link(double give, double other, double d, double *c, double *mass) {
-  const double product = give * other;
-  const double share = reciprocal(2.0 * d * other * (d + 2.0 * product)); /* for both */
-  *c = 2.0 * other * product * share;
-  *mass = d * (give + other) * share;
-}
-
-/* Compute masses and, without a reach, conductances. */
-static void prepare_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  const supine_equilibrium *eq = pass->eq;
-  const supine_network *net = eq->network;
-  for (size_t i = begin; i < end; ++i) {
-    double more = 0.0;
-    for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1] && net->area == NULL; ++s) {
-      double c;
-      double caught;
-      paper_link(eq->give[i], eq->give[net->links.column[s]], net->distance[s], &c, &caught);
-      eq->links.value[s] = (float)c;
-      more += caught;
+/* Factorise the matrix of a part unless it is done. */
+static supine_status factorise(part *p) {
+  if (!p->factorised) {
+    if (p->factor == NULL) {
+      p->factor = cholmod.analyze(p->matrix, &p->common);
     }
-    eq->system.stage[0].mass[i] =
-        (float)((net->area == NULL ? 1.0 : net->area[i]) * eq->give[i] * eq->give[i] + more);
-  }
-}
-
-/* Set the system up for the stiffness if it changed. */
-static void prepare(const solve_pass *pass) {
-  supine_equilibrium *eq = pass->eq;
-  supine_system *system = &eq->system;
-  system->lanes = eq->count;
-  if (!eq->prepared) {
-    run(pass, prepare_range);
-    supine_physics_system_set_masses(system);
-    eq->prepared = true;
-  }
-}
-
-/* Compute the right-hand side's norm and the first t. */
-SUPINE_INLINE void load_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
-  const supine_equilibrium *eq = pass->eq;
-  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
-    double sums[SUPINE_RHS_MAX] = {0.0};
-    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
-      const size_t file = (size_t)eq->network->order[i] * lanes;
-      const double load = eq->load[i];
-      const double square = eq->give[i] * eq->give[i];
-      const double inverse = (double)eq->system.stage[0].inverse[i];
-      const double *force = pass->force + file;
-      const double *guess = pass->catch_ + file;
-      double *restrict t = eq->solution + i * lanes;
-      SUPINE_EACH_LANE(r, lanes) {
-        sums[r] += load * force[r] * (load * force[r]) * inverse;
-      }
-      SUPINE_EACH_LANE(r, lanes) {
-        t[r] = pass->warm ? guess[r] / square : 0.0;
-      }
+    if (p->factor == NULL || !cholmod.factorize(p->matrix, p->factor, &p->common)) {
+      return SUPINE_ERROR_MEMORY;
     }
-    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * lanes, sums, lanes * sizeof *sums);
+    if (p->common.status == CHOLMOD_NOT_POSDEF) {
+      return SUPINE_ERROR_NUMERICAL;
+    }
+    p->factorised = true;
   }
+  return SUPINE_OK;
 }
 
-SUPINE_CLONES static void load_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  SUPINE_FOR_LANES(pass->eq->count, load_rows, pass, begin, end);
+/* Solve a part for right-hand sides r to r + count - 1 and raise its residual to theirs. */
+static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
+  part *p = &s->eq->parts[k];
+  const size_t n = p->vertex_count;
+  const double *load = s->eq->load + p->vertex;
+  const double *give = s->eq->give + p->vertex;
+  const double *force = s->force + p->vertex * s->count + r;
+  double *catch_ = s->catch_ + p->vertex * s->count + r;
+  double norm[TOGETHER] = {0.0};
+  double square[TOGETHER] = {0.0};
+  double one[2] = {1.0, 0.0};
+  double minus[2] = {-1.0, 0.0};
+  cholmod_dense *right = cholmod.allocate_dense(n, count, n, CHOLMOD_REAL, &p->common);
+  cholmod_dense *t = NULL;
+  for (size_t c = 0; c < count && right != NULL; ++c) {
+    double *b = (double *)right->x + c * n;
+    for (size_t i = 0; i < n; ++i) {
+      b[i] = load[i] * force[i * s->count + c];
+      norm[c] += b[i] * b[i];
+    }
+  }
+  t = right != NULL ? cholmod.solve(CHOLMOD_A, p->factor, right, &p->common) : NULL;
+  const bool solved = t != NULL && cholmod.sdmult(p->matrix, 0, minus, one, t, right, &p->common);
+  for (size_t c = 0; c < count && solved; ++c) {
+    const double *x = (const double *)t->x + c * n;
+    const double *left = (const double *)right->x + c * n;
+    for (size_t i = 0; i < n; ++i) {
+      catch_[i * s->count + c] = give[i] * give[i] * x[i];
+      square[c] += left[i] * left[i];
+    }
+    const double relative = sqrt(square[c] / (norm[c] > 0.0 ? norm[c] : 1.0));
+    s->residual[k] = relative <= s->residual[k] ? s->residual[k] : relative; /* keeps NaN */
+  }
+  cholmod.free_dense(&right, &p->common);
+  cholmod.free_dense(&t, &p->common);
+  return solved ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
-/* Set the residual of t = 0: the right-hand side. */
-static void force_range(void *context, size_t begin, size_t end, size_t thread) {
+static void solve_parts(void *context, size_t begin, size_t end, size_t thread) {
+  solve *s = context;
   (void)thread;
-  const solve_pass *pass = context;
-  const supine_equilibrium *eq = pass->eq;
-  const size_t lanes = eq->count;
-  for (size_t i = begin; i < end; ++i) {
-    const double *force = pass->force + (size_t)eq->network->order[i] * lanes;
-    for (size_t r = 0; r < lanes; ++r) {
-      eq->system.stage[0].right[i * lanes + r] = (float)(eq->load[i] * force[r] / pass->unit[r]);
+  for (size_t k = begin; k < end; ++k) {
+    s->status[k] = factorise(&s->eq->parts[k]);
+    for (size_t r = 0; r < s->count && s->status[k] == SUPINE_OK; r += TOGETHER) {
+      const size_t left = s->count - r;
+      s->status[k] = solve_columns(s, k, r, left < TOGETHER ? left : TOGETHER);
     }
   }
 }
 
-/* Compute the residual, right-hand side minus A t, in double for the next round. */
-SUPINE_INLINE void residual_rows(size_t lanes, const solve_pass *pass, size_t begin, size_t end) {
-  const supine_equilibrium *eq = pass->eq;
-  const supine_network *net = eq->network;
-  const supine_stage *stage = &eq->system.stage[0];
-  for (size_t block = begin; block < end; block += SUPINE_SUM_ROWS) {
-    double sums[SUPINE_RHS_MAX] = {0.0};
-    for (size_t i = block; i < end && i < block + SUPINE_SUM_ROWS; ++i) {
-      const double give = eq->give[i];
-      const double load = eq->load[i];
-      const double own = (net->area == NULL ? 1.0 : net->area[i]) * give * give;
-      const double *force = pass->force + (size_t)net->order[i] * lanes;
-      const double *t = eq->solution + i * lanes;
-      if (i + AHEAD < end) { /* random access in the file's order */
-        __builtin_prefetch(pass->force + (size_t)net->order[i + AHEAD] * lanes);
-      }
-      double out[SUPINE_RHS_MAX];
-      SUPINE_EACH_LANE(r, lanes) {
-        out[r] = load * force[r] - own * t[r];
-      }
-      for (size_t s = net->links.begin[i]; s < net->links.begin[i + 1]; ++s) {
-        const size_t j = net->links.column[s];
-        const double *other = eq->solution + j * lanes;
-        double c = 0.0;
-        double mass = 0.0;
-        if (net->area == NULL) {
-          paper_link(give, eq->give[j], net->distance[s], &c, &mass);
-        } else {
-          c = net->conductance[s];
-        }
-        SUPINE_EACH_LANE(r, lanes) {
-          out[r] -= c * (t[r] - other[r]) + mass * t[r];
-        }
-      }
-      const double inverse = (double)stage->inverse[i];
-      float *restrict right = stage->right + i * lanes;
-      SUPINE_EACH_LANE(r, lanes) {
-        sums[r] += out[r] * out[r] * inverse;
-        right[r] = (float)(out[r] / pass->unit[r]);
-      }
-    }
-    memcpy(eq->gradients.sums + block / SUPINE_SUM_ROWS * 2 * lanes, sums, lanes * sizeof *sums);
-  }
-}
-
-SUPINE_CLONES static void residual_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  SUPINE_FOR_LANES(pass->eq->count, residual_rows, pass, begin, end);
-}
-
-/* Store F = S^2 t in the file's order. */
-static void store_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const solve_pass *pass = context;
-  const supine_equilibrium *eq = pass->eq;
-  const size_t count = eq->count;
-  for (size_t i = begin; i < end; ++i) {
-    double *out = pass->catch_ + (size_t)eq->network->order[i] * count;
-    for (size_t r = 0; r < count; ++r) {
-      out[r] = eq->give[i] * eq->give[i] * eq->solution[i * count + r];
-    }
-  }
-}
-
-static double total(const solve_pass *pass, size_t lane) {
-  const supine_equilibrium *eq = pass->eq;
-  return supine_physics_gradients_total(eq->gradients.sums, eq->network->vertex_count, eq->count, 0,
-                                        lane);
-}
-
-/* Set the residual that the next round must reach. */
-static void aim(solve_pass *pass, double tolerance) {
-  pass->relative = 0.0;
-  for (size_t r = 0; r < pass->eq->count; ++r) {
-    const double relative = sqrt(total(pass, r)) / pass->unit[r];
-    const double next = fmax(round_gain * relative, 0.5 * tolerance);
-    pass->wanted[r] = next * next;
-    pass->relative = relative <= pass->relative ? pass->relative : relative; /* keeps NaN */
-  }
-}
-
-/* Repeat rounds until the residual meets the tolerance or no longer halves. */
-static size_t iterate(solve_pass *pass, double tolerance) {
-  size_t steps = 0;
-  double last = INFINITY;
-  run(pass, pass->warm ? residual_range : force_range);
-  aim(pass, tolerance); /* cold start: the norms are known already */
-  while (pass->relative > tolerance && pass->relative < 0.5 * last && steps < STEPS_MAX) {
-    last = pass->relative;
-    steps += supine_physics_conjugate_gradients(&pass->eq->gradients, STEPS_MAX - steps);
-    run(pass, residual_range);
-    aim(pass, tolerance);
-  }
-  return steps;
-}
-
-/* Eight parameters: the system, the right-hand sides, the tolerance and the results. */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
-                                               const double *force, double tolerance, bool warm,
-                                               double *catch_, supine_solve_report *report,
+                                               const double *force, double *catch_,
+                                               double *residual, supine_error *error) {
+  solve s = {equilibrium, count, force, catch_, {SUPINE_OK, SUPINE_OK}, {0.0, 0.0}};
+  supine_parallel_for(equilibrium->part_count, 1, 0, solve_parts, &s);
+  const double largest = s.residual[0] >= s.residual[1] ? s.residual[0] : s.residual[1];
+  if (residual != NULL) {
+    *residual = largest;
+  }
+  for (size_t k = 0; k < 2; ++k) {
+    if (s.status[k] == SUPINE_ERROR_MEMORY) {
+      return supine_error_set(error, s.status[k], "no memory to solve %zu vertices",
+                              equilibrium->vertex_count);
+    }
+    if (s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit)) {
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "equilibrium: the relative residual is %.3g, above %.3g: check that "
+                              "forces and stiffnesses are finite, or give a shorter --reach",
+                              s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
+                                               const double *catch_, double *force,
                                                supine_error *error) {
   supine_equilibrium *eq = equilibrium;
-  const double wanted = tolerance > 0.0 ? tolerance : SUPINE_SOLVE_TOLERANCE;
-  if (count < 1 || count > eq->rhs_max) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu right-hand sides, but the solver was created for at most %zu",
-                            count, eq->rhs_max);
+  const size_t n = eq->vertex_count;
+  double one[2] = {1.0, 0.0};
+  double zero[2] = {0.0, 0.0};
+  double *t = malloc(n * sizeof *t);
+  if (t == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  solve_pass pass = {.eq = eq, .force = force, .catch_ = catch_, .warm = warm};
-  eq->count = count;
-  prepare(&pass);
-  run(&pass, load_range);
-  for (size_t r = 0; r < count; ++r) {
-    const double norm = sqrt(total(&pass, r));
-    pass.unit[r] = norm > 0.0 ? norm : 1.0;
+  for (size_t i = 0; i < n; ++i) {
+    t[i] = catch_[i] / (eq->give[i] * eq->give[i]);
   }
-  eq->gradients.unit = pass.unit;
-  eq->gradients.wanted = pass.wanted;
-  const supine_solve_report made = {iterate(&pass, wanted), pass.relative};
-  run(&pass, store_range);
-  if (report != NULL) {
-    *report = made;
+  for (size_t k = 0; k < eq->part_count; ++k) {
+    part *p = &eq->parts[k];
+    const size_t m = p->vertex_count;
+    cholmod_dense from = {m, 1, m, m, t + p->vertex, NULL, CHOLMOD_REAL, CHOLMOD_DOUBLE};
+    cholmod_dense to = {m, 1, m, m, force + p->vertex, NULL, CHOLMOD_REAL, CHOLMOD_DOUBLE};
+    (void)cholmod.sdmult(p->matrix, 0, one, zero, &from, &to, &p->common);
   }
-  if (!(made.residual <= wanted)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_NUMERICAL,
-        "equilibrium: the relative residual is %.3g after %zu steps, above the tolerance %.3g",
-        made.residual, made.iterations, wanted);
+  for (size_t i = 0; i < n; ++i) {
+    force[i] /= eq->load[i];
   }
+  free(t);
   return SUPINE_OK;
 }
 
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error) {
-  const size_t n = equilibrium->network->vertex_count;
+  const size_t n = equilibrium->vertex_count;
   if (vertex >= n) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "vertex %zu is out of range: the mesh has %zu vertices, counted from 0",
@@ -390,8 +444,8 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu forces", n);
   }
   force[vertex] = 1.0;
-  const supine_status status = supine_physics_equilibrium_solve(
-      equilibrium, 1, force, column_tolerance, false, column, NULL, error);
+  const supine_status status =
+      supine_physics_equilibrium_solve(equilibrium, 1, force, column, NULL, error);
   free(force);
   return status;
 }

@@ -15,9 +15,8 @@
  *     c_ij = S_i S_j / (D (D + 2 S_i S_j))
  *     mass_i = S_i^2 + sum over edges ij of (S_i + S_j) / (2 S_j (D + 2 S_i S_j))
  *
- * It is symmetric, positive definite and well conditioned. Conjugate gradients in single
- * precision with a diagonal preconditioner solve it, corrected in double until the residual
- * meets the tolerance.
+ * It is symmetric and positive definite; CHOLMOD factorises it once and then solves for any number
+ * of forces.
  *
  * The transfer spreads over links, and the share that a mass catches falls with its number of
  * links, so results drift as links shrink. A reach R in mm removes this drift. It is the same
@@ -34,8 +33,7 @@
  *
  * which is a discrete (1 - R^2 Laplacian) F = a f on the surface, in which a disturbance decays
  * as exp(-r / R) whatever the mesh. The conserved quantity is then area F: sum of area_i F_i =
- * sum of area_i a_i f_i. The finer the mesh, the larger the condition number; a multilevel cycle
- * (coarse.h) keeps the number of steps nearly constant.
+ * sum of area_i a_i f_i.
  *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
  * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf.
@@ -45,33 +43,21 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Most right-hand sides of one solve. */
-enum { SUPINE_RHS_MAX = 64 };
-
-/** The geometry of the nodes: links and distances. Read-only after creation, so equilibria in
- * any threads may share it. */
-typedef struct supine_network supine_network;
-
-/** Build the network of a surface. Vertices are renumbered internally (breadth first) if the
- * file's order is slow; all functions here use the file's order.
- * @param mesh      [N] vertices in mm
- * @param topology  its edges
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_network_create(const supine_mesh *mesh,
-                                            const supine_topology *topology,
-                                            supine_network **network);
-
-void supine_physics_network_destroy(supine_network *network);
-
-/** One stiffness on a network, with the work space of its solves. Not thread-safe. */
+/** The matrix of one surface and its factor. Not thread-safe. */
 typedef struct supine_equilibrium supine_equilibrium;
 
-/** @param network   must outlive the equilibrium
- * @param rhs_max   most right-hand sides of one solve, 1 to SUPINE_RHS_MAX
- * @param threads   of one solve; 0: supine_thread_count()
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
-supine_status supine_physics_equilibrium_create(const supine_network *network, size_t rhs_max,
-                                                size_t threads, supine_equilibrium **equilibrium);
+/** Assemble the matrix of a surface with a stiffness of 1 everywhere.
+ * @param mesh      [N] vertices in mm
+ * @param topology  its edges; must outlive the equilibrium
+ * @param reach     R in mm; 0: the paper's springs
+ * @param lesions   [N] factors on the normalised stiffness, copied; NULL: 1
+ * @retval SUPINE_ERROR_MEMORY
+ * @retval SUPINE_ERROR_UNSUPPORTED  CHOLMOD is not installed */
+supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
+                                                const supine_topology *topology, double reach,
+                                                const double *lesions,
+                                                supine_equilibrium **equilibrium,
+                                                supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
 /** Set the stiffness; without a reach this changes the matrix.
@@ -81,30 +67,22 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        const double *stiffness,
                                                        supine_error *error);
 
-/** Result of a solve. */
-typedef struct supine_solve_report {
-  size_t iterations;
-  double residual; /**< the largest of |r| / |b|, of r = b - A t and b = area a f, which were
-                      computed in double, each square divided by A's diagonal */
-} supine_solve_report;
-
-/** Relative residual used for a tolerance of 0. A basis file resolves 6e-8, and the solve does
- * not magnify errors: F is as accurate as the residual. */
-#define SUPINE_SOLVE_TOLERANCE 1e-10
-
-/** Solve for the catch F of `count` applied forces.
- * @param force      [N, count] f on the masses (nothing is applied to springs)
- * @param tolerance  relative residual to stop at; 0: SUPINE_SOLVE_TOLERANCE. The least that
- *   double precision reaches is 1e-14, with a reach some 1e-16 (R / link)^2
- * @param warm       start from catch_ instead of zero
- * @param catch_     [N, count] F, written
- * @param report     optional
- * @retval SUPINE_ERROR_ARGUMENT   count out of range
- * @retval SUPINE_ERROR_NUMERICAL  the residual stopped falling above the tolerance; also if a
- *   force is not finite */
+/** Solve for the catch F of `count` applied forces. The first solve factorises the matrix, in
+ * about 30 N log2 N bytes.
+ * @param force     [N, count] f on the masses (nothing is applied to springs)
+ * @param catch_    [N, count] F, written
+ * @param residual  the largest of |b - A t| / |b|, b = area a f; NULL: not wanted
+ * @retval SUPINE_ERROR_MEMORY
+ * @retval SUPINE_ERROR_NUMERICAL  a residual above 1e-8, or a force that is not finite */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
-                                               const double *force, double tolerance, bool warm,
-                                               double *catch_, supine_solve_report *report,
+                                               const double *force, double *catch_,
+                                               double *residual, supine_error *error);
+
+/** Find the force f [N] whose equilibrium is the catch F [N]: f = A t / (area a) ([Santhanam2008]
+ * IV-B.3).
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
+                                               const double *catch_, double *force,
                                                supine_error *error);
 
 /** Compute column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force
@@ -128,5 +106,13 @@ supine_status supine_physics_pitcher_catcher(
     const supine_mesh *mesh, const supine_topology *topology, const double *stiffness,
     const double *force, double tolerance, double *masses, double *springs,
     void (*progress)(void *context, size_t steps, double held), void *context, supine_error *error);
+
+/** Scale a stiffness [N] to geometric mean 1; NULL: 1 everywhere.
+ * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
+supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
+                                                 double *scaled, supine_error *error);
+
+/** Compute D(mass, spring) of an edge: half its length in mm, at least 1. */
+double supine_physics_link_distance(const double *first, const double *second);
 
 #endif

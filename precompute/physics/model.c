@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The laws by name. */
+#include <math.h>
+
 #include "precompute/physics/model.h"
+#include "sh/base/vec3.h"
 
 #define LIST(...)                                                                                  \
   { __VA_ARGS__ }
@@ -27,4 +30,18 @@ supine_status supine_physics_model_check(const supine_model *model, supine_error
                                 "--soften needs a reach: the paper's transfer holds the stiffness, "
                                 "which may not turn with gravity. Give --reach 10, or leave "
                                 "--soften out");
+}
+
+supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
+                                               supine_equilibrium **equilibrium,
+                                               supine_error *error) {
+  /* A force that spreads over the whole lungs is even, and the matrix close to singular. */
+  const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
+  supine_status status =
+      supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, fmin(model->reach, longest),
+                                        model->lesions, equilibrium, error);
+  if (status == SUPINE_OK && model->stiffness != NULL) {
+    status = supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error);
+  }
+  return status;
 }

@@ -49,8 +49,6 @@ typedef struct supine_model {
   const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL: 1 */
   double reach;            /**< spreading length, mm, at most half the box's diagonal counts; 0: the
                                 paper's, a fixed number of links */
-  double tolerance;        /**< relative residual of every solve; 0: SUPINE_SOLVE_TOLERANCE
-                              (equilibrium.h), with softening 5e-6 */
   double share[2]; /**< of its healthy volume and breath that each lung has: 1 unless collapsed */
 } supine_model;
 
@@ -65,9 +63,11 @@ extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
  * stiffness, so that it would turn with gravity */
 supine_status supine_physics_model_check(const supine_model *model, supine_error *error);
 
-/** The network of lungs with the model's lesions and reach: what solves are set up with.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_model_network(const supine_lungs *lungs, const supine_model *model,
-                                           supine_network **network);
+/** Set up the equilibrium of lungs with the model's stiffness, lesions and reach.
+ * @param lungs  must outlive the equilibrium
+ * Statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness */
+supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
+                                               supine_equilibrium **equilibrium,
+                                               supine_error *error);
 
 #endif

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "precompute/physics/network.h"
+#include "precompute/physics/equilibrium.h"
 
 /* Nodes 0 to N - 1 are the masses, N + e the spring of edge e. A binary heap keeps the node that
  * holds most on top. */

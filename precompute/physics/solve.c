@@ -20,7 +20,6 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   static const double one = 1.0;
-  supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   supine_volume_forms forms = {0};
   supine_solution made = {.vertex_count = n, .has_volume = lungs->topology.closed};
@@ -29,26 +28,26 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   made.catch_ = malloc(n * sizeof *made.catch_);
   made.directions = malloc(3 * n * sizeof *made.directions);
   supine_status status = supine_physics_model_check(model, error);
+  if (status == SUPINE_OK) {
+    status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
+  }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   status = SUPINE_ERROR_MEMORY;
   if (work == NULL || made.catch_ == NULL || made.directions == NULL ||
-      supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
-      supine_physics_equilibrium_create(network, 1, 0, &equilibrium) != SUPINE_OK ||
       supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
   status = supine_physics_directions(lungs, &model->direction, made.directions, error);
-  if (status != SUPINE_OK || (status = supine_physics_equilibrium_set_stiffness(
-                                  equilibrium, model->stiffness, error)) != SUPINE_OK) {
+  if (status != SUPINE_OK) {
     goto cleanup;
   }
   const supine_gravities gravity = {1, g, range, range + 1};
   supine_physics_force(lungs, &model->force, &gravity, n, NULL, work);
-  status = supine_physics_equilibrium_solve(equilibrium, 1, work, model->tolerance, false,
-                                            made.catch_, &made.report, error);
+  status =
+      supine_physics_equilibrium_solve(equilibrium, 1, work, made.catch_, &made.residual, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -71,7 +70,6 @@ cleanup:
   supine_physics_solution_free(&made);
   free(work);
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   return status;
 }
 

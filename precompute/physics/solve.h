@@ -17,7 +17,7 @@ typedef struct supine_solution {
   bool has_volume;    /**< the surface is closed, and cubic is set */
   double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
   supine_volume_form form[2]; /**< of each lung, of three gains */
-  supine_solve_report report;
+  double residual;            /**< relative, of the equilibrium */
 } supine_solution;
 
 /** Solves for gravity along the unit vector `g`.

@@ -5,11 +5,11 @@
 #include <string.h>
 
 #include "precompute/physics/volume_forms.h"
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
-#include "precompute/physics/network.h"
 
 static const double millilitres = 1e-3; /* in a cubic millimetre */
 

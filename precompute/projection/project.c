@@ -103,28 +103,22 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   const size_t n = lungs->mesh.vertex_count;
   const size_t rank = made->rank;
   const size_t lanes = rank < LANES ? rank : LANES;
-  const double softened = model->force.soften == 0.0 ? 0.0 : SUPINE_SOFTENED_TOLERANCE;
-  const double tolerance = model->tolerance > 0.0 ? model->tolerance : softened;
   double range[2 * SUPINE_SPAN_MAX];
-  supine_network *network = NULL;
   supine_equilibrium *equilibrium = NULL;
   double *force = malloc(n * lanes * sizeof *force);
   double *caught = malloc(n * lanes * sizeof *caught);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (force == NULL || caught == NULL ||
       supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
-                                  range + rank) != SUPINE_OK ||
-      supine_physics_model_network(lungs, model, &network) != SUPINE_OK ||
-      supine_physics_equilibrium_create(network, lanes, 0, &equilibrium) != SUPINE_OK) {
+                                  range + rank) != SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_equilibrium_set_stiffness(equilibrium, model->stiffness, error);
+  status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
   for (size_t done = 0; done < rank && status == SUPINE_OK; done += lanes) {
     const size_t first = done + lanes < rank ? done : rank - lanes; /* full lanes are the fastest */
     const supine_gravities gravities = {lanes, made->span->directions + 3 * first, range + first,
                                         range + rank + first};
-    supine_solve_report report;
     if (caller->progress != NULL &&
         !caller->progress(caller->context, (double)done / (double)rank)) {
       status =
@@ -132,19 +126,15 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
       break;
     }
     supine_physics_force(lungs, &model->force, &gravities, n, NULL, force);
-    status = supine_physics_equilibrium_solve(equilibrium, lanes, force, tolerance, false, caught,
-                                              &report, error);
+    status = supine_physics_equilibrium_solve(equilibrium, lanes, force, caught, NULL, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
       memcpy(made->columns + i * rank + first, caught + i * lanes, lanes * sizeof *caught);
     }
-    made->iterations = report.iterations > made->iterations ? report.iterations : made->iterations;
-    made->residual = report.residual > made->residual ? report.residual : made->residual;
   }
 cleanup:
   free(force);
   free(caught);
   supine_physics_equilibrium_destroy(equilibrium);
-  supine_physics_network_destroy(network);
   return status;
 }
 

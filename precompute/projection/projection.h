@@ -22,18 +22,12 @@ typedef struct supine_projection {
   size_t rank;       /**< R */
   double *columns;   /**< [N, R] */
   double *functions; /**< [R, (band + 1)^2]; NULL where R = (band + 1)^2 and it is the identity */
-  size_t iterations; /**< of the solve that took most */
-  double residual;   /**< the largest */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
 
 /** Reports progress from 0 to 1; returns false to stop the work. */
 typedef bool supine_progress_function(void *context, double fraction);
-
-/** Relative residual of solves with softening where the model names none: what is left of its force
- * is some ten times more. */
-#define SUPINE_SOFTENED_TOLERANCE 5e-6
 
 /** Projects the field: solves for the span's directions, and transforms the span's functions on a
  * grid eight times finer than the band, so that their kinks, where another vertex becomes the

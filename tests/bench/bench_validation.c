@@ -89,16 +89,10 @@ static void convergence(void) {
   double *stiffness = ones(n);
   double *exact = calloc(n, sizeof *exact);
   double *found = calloc(n, sizeof *found);
-  need(frame_solve(&f, NULL, force, 0.0, exact, NULL) == SUPINE_OK, "no solution");
+  need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
-  curve c = {csv, "conjugate gradients", n, exact, links};
-  for (int k = 1; k <= 13; ++k) {
-    supine_solve_report report;
-    need(frame_solve(&f, NULL, force, pow(10.0, -k), found, &report) == SUPINE_OK, "no solution");
-    add_point(&c, (double)report.iterations, found);
-  }
-  c.method = "Pitcher/Catcher";
-  c.links = 2.0 * links / (double)(n + f.topology.edge_count); /* of a node's clique, mean */
+  curve c = {csv, "Pitcher/Catcher", n, exact,
+             2.0 * links / (double)(n + f.topology.edge_count)}; /* of a node's clique, mean */
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
     need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
@@ -114,8 +108,8 @@ static void convergence(void) {
              "set logscale xy\nset format y '10^{%T}'\nset xlabel 'work, link visits'\n"
              "set ylabel 'RMS error, relative'\n"
              "m(name) = sprintf(\"< awk -F, 'NR == 1 || $1 == \\\"%s\\\"' %s\", name, csv)\n"
-             "plot for [name in '\"conjugate gradients\" \"Pitcher/Catcher\" "
-             "\"mass-spring-damper\"'] m(name) using 2:3 with linespoints title name");
+             "plot for [name in '\"Pitcher/Catcher\" \"mass-spring-damper\"'] m(name) using 2:3 "
+             "with linespoints title name");
   damper_free(&system);
   frame_free(&f);
   free(force);
@@ -133,7 +127,7 @@ static void plane(void) {
   double *stiffness = ones(n);
   double *ours = calloc(n, sizeof *ours);
   double *theirs = calloc(n, sizeof *theirs);
-  need(frame_solve(&f, NULL, force, 0.0, ours, NULL) == SUPINE_OK, "no solution");
+  need(frame_solve(&f, NULL, force, ours) == SUPINE_OK, "no solution");
   mass_spring_damper system = damper_create(&f, stiffness, force);
   need(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL), "no integration");
   FILE *csv = begin_csv("fig8_plane", "x_mm,supine,mass-spring-damper");
@@ -163,7 +157,7 @@ static void ring(void) {
   double catch_[3][COUNT];
   for (size_t k = 0; k < 3; ++k) {
     double *stiffness = ring_stiffness(COUNT, factors[k]);
-    need(frame_solve(&f, stiffness, force, 0.0, catch_[k], NULL) == SUPINE_OK, "no solution");
+    need(frame_solve(&f, stiffness, force, catch_[k]) == SUPINE_OK, "no solution");
     free(stiffness);
   }
   FILE *csv = begin_csv("fig9_ring", "x0,y0,x1,uniform,x2,one third twice as stiff,x4,one third 4 "
