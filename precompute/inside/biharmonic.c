@@ -77,91 +77,22 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   return SUPINE_OK;
 }
 
-/* The centres' distance matrix reduced by its affine part. With l(p) the barycentric coordinates
- * in the tetrahedron of the first four centres q, a(p) the distances to p and G those among
- * them,
+/* The matrix of the centres, positive definite as they lie within a distance of 1 of the middle:
  *
- *     N_ij = l_i.b_j + b_i.l_j - |p_i - p_j|,    b = a - G l / 2
+ *     K_ij = ALPHA - |p_i - p_j|,    ALPHA > 2
  *
- * is positive definite over the other centres. */
-typedef struct reduced {
-  size_t size;        /* of N */
-  double slope[3][3]; /* of l_1, l_2, l_3 */
-  double *l, *b;      /* [4 + size, 4] */
-  double *matrix;     /* [size, size], the lower triangle column by column */
-  size_t done;        /* columns eliminated */
-} reduced;
+ * On weights with sum 0 it acts as -|p_i - p_j|. */
+typedef struct kernel {
+  size_t size;
+  double *matrix; /* [size, size], the lower triangle column by column */
+  size_t done;    /* columns eliminated */
+} kernel;
 
-/* Move centres far from a line and from a plane to the third and fourth place; false if all
- * points lie in one plane. */
-static bool find_tetrahedron(supine_inside_biharmonic *fit, double slope[3][3]) {
-  static const double flat = 1e-9;
-  double edge[3][3] = {{0.0}};
-  double across[3] = {0.0, 0.0, 0.0};
-  double most = 0.0;
-  double *c = fit->centres;
-  for (size_t corner = 1; corner < AFFINE && corner < fit->count; ++corner) {
-    size_t best = corner;
-    most = 0.0;
-    for (size_t i = corner; i < fit->count && corner > 1; ++i) {
-      const double to[3] = {c[3 * i] - c[0], c[3 * i + 1] - c[1], c[3 * i + 2] - c[2]};
-      double turned[3];
-      supine_cross(edge[0], to, turned);
-      const double size = corner == 2 ? supine_length(turned) : fabs(supine_dot(across, to));
-      best = size > most ? i : best;
-      most = size > most ? size : most;
-    }
-    const size_t which = fit->chosen[best];
-    fit->chosen[best] = fit->chosen[corner];
-    fit->chosen[corner] = which;
-    for (size_t k = 0; k < 3; ++k) {
-      const double at = c[3 * best + k];
-      c[3 * best + k] = c[3 * corner + k];
-      c[3 * corner + k] = at;
-      edge[corner - 1][k] = at - c[k];
-    }
-    supine_cross(edge[0], edge[1], across);
-  }
-  const double volume = supine_triple(edge[0], edge[1], edge[2]);
-  for (size_t k = 0; k < 3; ++k) {
-    supine_cross(edge[(k + 1) % 3], edge[(k + 2) % 3], slope[k]);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      slope[k][axis] /= volume;
-    }
-  }
-  return fit->count >= AFFINE && most > flat;
-}
-
-static void find_coordinates(const double *c, reduced *r) {
-  for (size_t i = 0; i < AFFINE + r->size; ++i) {
-    double *l = r->l + AFFINE * i;
-    const double to[3] = {c[3 * i] - c[0], c[3 * i + 1] - c[1], c[3 * i + 2] - c[2]};
-    l[0] = 1.0;
-    for (size_t k = 1; k < AFFINE; ++k) {
-      l[k] = supine_dot(r->slope[k - 1], to);
-      l[0] -= l[k];
-    }
-    for (size_t k = 0; k < AFFINE; ++k) {
-      double *b = r->b + AFFINE * i + k;
-      *b = apart(c + 3 * i, c + 3 * k);
-      for (size_t j = 0; j < AFFINE; ++j) {
-        *b -= 0.5 * apart(c + 3 * k, c + 3 * j) * l[j];
-      }
-    }
-  }
-}
-
-SUPINE_CLONES static void fill(const double *centres, const reduced *r) {
-  const double *c = centres + 3 * AFFINE;
-  const double *l = r->l + AFFINE * AFFINE;
-  const double *b = r->b + AFFINE * AFFINE;
-  for (size_t j = 0; j < r->size; ++j) {
-    for (size_t i = j; i < r->size; ++i) {
-      double sum = -apart(c + 3 * i, c + 3 * j);
-      for (size_t k = 0; k < AFFINE; ++k) {
-        sum += l[AFFINE * i + k] * b[AFFINE * j + k] + b[AFFINE * i + k] * l[AFFINE * j + k];
-      }
-      r->matrix[j * r->size + i] = sum;
+SUPINE_CLONES static void fill(const double *c, const kernel *k) {
+  static const double alpha = 3.0;
+  for (size_t j = 0; j < k->size; ++j) {
+    for (size_t i = j; i < k->size; ++i) {
+      k->matrix[j * k->size + i] = alpha - apart(c + 3 * i, c + 3 * j);
     }
   }
 }
@@ -169,112 +100,101 @@ SUPINE_CLONES static void fill(const double *centres, const reduced *r) {
 /* Subtract the last eliminated columns from those behind, alternating long and short blocks. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
-  const reduced *r = context;
-  const size_t n = r->size;
-  const size_t blocks = (n - r->done + COLUMNS - 1) / COLUMNS;
-  const double *last = r->matrix + (r->done - COLUMNS) * n;
+  const kernel *k = context;
+  const size_t n = k->size;
+  const size_t blocks = (n - k->done + COLUMNS - 1) / COLUMNS;
+  const double *last = k->matrix + (k->done - COLUMNS) * n;
   for (size_t i = begin; i < end; ++i) {
-    const size_t j = r->done + COLUMNS * (i % 2 == 0 ? i / 2 : blocks - 1 - i / 2);
+    const size_t j = k->done + COLUMNS * (i % 2 == 0 ? i / 2 : blocks - 1 - i / 2);
     const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
     cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(n - j), (int)width, COLUMNS, -1.0,
-                last + j, (int)n, last + j, (int)n, 1.0, r->matrix + j * n + j, (int)n);
+                last + j, (int)n, last + j, (int)n, 1.0, k->matrix + j * n + j, (int)n);
   }
 }
 
 /* Cholesky factorisation with a result that does not depend on the number of threads. */
-static lapack_int factorise(reduced *r) {
-  const size_t n = r->size;
+static lapack_int factorise(kernel *k) {
+  const size_t n = k->size;
   lapack_int failed = 0;
   for (size_t j = 0; j < n && failed == 0; j += COLUMNS) {
-    double *corner = r->matrix + j * n + j;
+    double *corner = k->matrix + j * n + j;
     const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
     const size_t below = n - j - width;
     failed = LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', (lapack_int)width, corner, (lapack_int)n);
     if (below > 0 && failed == 0) {
       cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)below,
                   (int)width, 1.0, corner, (int)n, corner + width, (int)n);
-      r->done = j + width;
-      supine_parallel_for((below + COLUMNS - 1) / COLUMNS, 2, 0, update_blocks, r);
+      k->done = j + width;
+      supine_parallel_for((below + COLUMNS - 1) / COLUMNS, 2, 0, update_blocks, k);
     }
   }
   return failed;
 }
 
-/* Find the weights of one column from N z = l.f(q) - f, solved in `z`: the weights of q cancel
- * the affine part of the others, and the affine function fits f(q). */
-static void finish_column(const supine_inside_biharmonic *fit, const reduced *r, const double *z,
-                          const double f[AFFINE], double *weights) {
-  const double *c = fit->centres;
-  const size_t m = fit->count;
-  double left[AFFINE];
-  memcpy(weights + AFFINE, z, r->size * sizeof *z);
-  for (size_t k = 0; k < AFFINE; ++k) {
-    weights[k] = 0.0;
-    for (size_t i = AFFINE; i < m; ++i) {
-      weights[k] -= r->l[AFFINE * i + k] * weights[i];
-    }
-  }
-  for (size_t k = 0; k < AFFINE; ++k) {
-    left[k] = f[k];
-    for (size_t i = 0; i < m; ++i) {
-      left[k] -= apart(c + 3 * k, c + 3 * i) * weights[i];
-    }
-  }
-  weights[m] = left[0];
-  for (size_t axis = 0; axis < 3; ++axis) {
-    double *slope = weights + m + 1 + axis;
-    *slope = 0.0;
-    for (size_t k = 1; k < AFFINE; ++k) {
-      *slope += (left[k] - left[0]) * r->slope[k - 1][axis];
-    }
-    weights[m] -= *slope * c[axis];
-  }
-}
-
-/* Solve [ |p_i - p_j|  1 p ; (1 p)^T  0 ] [w; a B] = [values; 0] by N. */
-static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
-  reduced r = {0};
-  if (!find_tetrahedron(fit, r.slope)) {
+/* With P = (1, x, y, z) of the centres, u = -sum of w_j |x - p_j| + P b passes through the values f
+ * if K w + P b = f and P' w = 0:
+ *
+ *     K y = f,    K z = P,    (P' z) b = P' y,    w = y - z b
+ *
+ * @param p  [4, size] column by column, then f [R, size]; overwritten by z and y
+ * @retval SUPINE_ERROR_NUMERICAL  K is singular, or P' z, as all centres lie in one plane */
+static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
+  static const double flat = 1e-5;
+  const int n = (int)k->size;
+  const int columns = (int)fit->columns;
+  const double *centre = fit->centres;
+  double affine[AFFINE * AFFINE] = {0.0};
+  if (factorise(k) != 0 ||
+      LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', n, AFFINE + columns, k->matrix, n, p, n) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
-  const size_t m = fit->count;
-  const size_t columns = fit->columns;
-  r.size = m - AFFINE;
-  r.l = malloc(AFFINE * m * sizeof *r.l);
-  r.b = malloc(AFFINE * m * sizeof *r.b);
-  r.matrix = malloc((r.size * r.size + 1) * sizeof *r.matrix);
-  double *z = malloc((r.size * columns + 1) * sizeof *z);
-  lapack_int failed = -1;
-  if (r.l != NULL && r.b != NULL && r.matrix != NULL && z != NULL) {
-    find_coordinates(fit->centres, &r);
-    fill(fit->centres, &r);
-    for (size_t i = 0; i < r.size; ++i) {
-      for (size_t c = 0; c < columns; ++c) {
-        double *to = &z[c * r.size + i];
-        *to = -values[fit->chosen[AFFINE + i] * columns + c];
-        for (size_t k = 0; k < AFFINE; ++k) {
-          *to += r.l[AFFINE * (AFFINE + i) + k] * values[fit->chosen[k] * columns + c];
-        }
+  for (int r = 0; r < AFFINE + columns; ++r) {
+    double *to = r < AFFINE ? affine + AFFINE * r
+                            : fit->weights + (size_t)(r - AFFINE) * (k->size + AFFINE) + k->size;
+    for (size_t i = 0; i < k->size; ++i) {
+      const double z = p[(size_t)r * k->size + i];
+      to[0] += z;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        to[1 + axis] += centre[3 * i + axis] * z;
       }
     }
-    failed = factorise(&r);
   }
-  if (failed == 0 && r.size > 0) {
-    failed = LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', (lapack_int)r.size, (lapack_int)columns,
-                            r.matrix, (lapack_int)r.size, z, (lapack_int)r.size);
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', AFFINE, affine, AFFINE) != 0 ||
+      !(affine[5] > flat * affine[0] && affine[10] > flat * affine[0] &&
+        affine[15] > flat * affine[0])) {
+    return SUPINE_ERROR_NUMERICAL;
   }
-  for (size_t c = 0; c < columns && failed == 0; ++c) {
-    double f[AFFINE];
-    for (size_t k = 0; k < AFFINE; ++k) {
-      f[k] = values[fit->chosen[k] * columns + c];
+  (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', AFFINE, columns, affine, AFFINE, fit->weights + n,
+                       n + AFFINE);
+  for (size_t r = 0; r < fit->columns; ++r) {
+    double *w = fit->weights + r * (k->size + AFFINE);
+    cblas_dgemv(CblasColMajor, CblasNoTrans, n, AFFINE, 1.0, p, n, w + n, 1, 0.0, w, 1);
+    cblas_daxpy(n, -1.0, p + (AFFINE + r) * k->size, 1, w, 1);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
+  const size_t n = fit->count;
+  kernel k = {.size = n, .matrix = malloc(n * n * sizeof *k.matrix)};
+  double *p = malloc(n * (AFFINE + fit->columns) * sizeof *p);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (k.matrix != NULL && p != NULL) {
+    fill(fit->centres, &k);
+    for (size_t i = 0; i < n; ++i) {
+      p[i] = 1.0;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        p[(1 + axis) * n + i] = fit->centres[3 * i + axis];
+      }
+      for (size_t c = 0; c < fit->columns; ++c) {
+        p[(AFFINE + c) * n + i] = values[fit->chosen[i] * fit->columns + c];
+      }
     }
-    finish_column(fit, &r, z + c * r.size, f, fit->weights + c * (m + AFFINE));
+    status = find_weights(fit, &k, p);
   }
-  free(r.l);
-  free(r.b);
-  free(r.matrix);
-  free(z);
-  return failed == 0 ? SUPINE_OK : failed > 0 ? SUPINE_ERROR_NUMERICAL : SUPINE_ERROR_MEMORY;
+  free(k.matrix);
+  free(p);
+  return status;
 }
 
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
