@@ -157,10 +157,8 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
   add(list, "route", "fields"); /* the run-time library evaluates them at gain 1 */
-  add(list, "directions", "%s", fit->grid ? "grid" : "scattered");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);
-  add(list, "scalar_loss_percent", "%.6g", 100.0 * fit->scalar_loss);
   add(list, "error_method", "leave-one-out");
 }
 

@@ -5,9 +5,7 @@
  *
  *     minimise over C:  sum over directions j of |u(g_j) - C Y(g_j)|^2
  *
- * Directions on a Gauss-Legendre x equispaced grid go through the transform instead; that is the
- * same fit, weighted by the rule. The band is the one whose leave-one-out error is least, among
- * those that the directions determine. */
+ * The band is the one of least leave-one-out error among those that the directions determine. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -22,15 +20,15 @@ typedef struct supine_fields {
   double *displacement;   /**< [M, N, 3] mm */
 } supine_fields;
 
-/** Reads a list (CSV with the columns gx,gy,gz,file: deformed surfaces of the same topology, named
+/** Read a list (CSV with the columns gx,gy,gz,file: deformed surfaces of the same topology, named
  * relative to the list) or a safetensors file with gravity [M, 3] and displacement [M, N, 3], F32
- * or F64, in the order of the rest surface's vertices.
+ * or F64, in the order of the reference surface's vertices.
  *
- * @param lungs    the rest surface; deformed surfaces are joined and grouped as it was
+ * @param lungs    the reference surface; deformed surfaces are joined and grouped as it was
  * @param options  axes and units of the deformed surfaces, or of a safetensors' displacements
  * @retval SUPINE_ERROR_READ    a file is missing
  * @retval SUPINE_ERROR_FORMAT  a malformed list or file, a direction that is zero or not finite, a
- * displacement that is not finite, two equal directions (line or row named)
+ *         displacement that is not finite, two equal directions (line or row named)
  * @retval SUPINE_ERROR_MESH    a surface of another topology
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
@@ -38,37 +36,37 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  supine_error *error);
 void supine_fields_free(supine_fields *fields);
 
-/** What a fit's directions can carry. */
-typedef struct supine_fit_report {
-  bool grid;           /**< the directions are a product grid */
-  size_t band_highest; /**< highest band that the directions determine */
-  double condition;    /**< of the harmonics at the directions, at the band that was chosen */
-  size_t band;         /**< the band that was chosen */
-  double error[12];    /**< leave-one-out error of each band up to band_highest, relative RMS */
-  double scalar_loss;  /**< what magnitude x best direction loses, relative RMS; 0 for vectors */
-  supine_accuracy accuracy; /**< leave-one-out; mm are those of the fields as given, volume 0 */
-} supine_fit_report;
-
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
-/** What a fit is asked for. */
+/** Result of a fit. */
+typedef struct supine_fit_report {
+  size_t band_highest;                   /**< highest band that the directions determine */
+  size_t band;                           /**< chosen band */
+  double condition;                      /**< condition number of its harmonics at the directions */
+  size_t mode_count;                     /**< of the basis, by supine_precompute_fields */
+  double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band up to band_highest,
+                                          * relative RMS */
+  supine_accuracy accuracy; /**< of the basis, leave-one-out; mm are those of the given fields,
+                             * volume 0 */
+} supine_fit_report;
+
+/** How to fit. */
 typedef struct supine_fit_options {
-  bool scalar;          /**< magnitude x best direction instead of three components */
-  int band;             /**< wanted; negative: chosen */
+  int band;             /**< negative: chosen */
   size_t modes;         /**< most modes; 0: the harmonics */
-  const char *findings; /**< what was found of the surface, a line each, for the basis; optional */
+  const char *findings; /**< notes on the surface for the basis, one a line; optional */
+  const char *made_by;  /**< for the basis's metadata; optional */
 } supine_fit_options;
 
-/** Fits, compresses, cross-validates.
+/** Fit, compress, cross-validate.
  *
- * @param directions   [N, 3] written: the best direction of each vertex (unit), scalar fields alone
- * @param compression  rows are vertices (scalar), or vertices x components (vector: 3 N rows)
+ * @param compression  rows are vertices x components, 3 N
  * @retval SUPINE_ERROR_ARGUMENT   a band that the directions do not determine, fewer than two
- * directions
+ *         directions
  * @retval SUPINE_ERROR_NUMERICAL  nothing moves
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
-                                double *directions, supine_compression *compression,
-                                supine_fit_report *report, supine_error *error);
+                                supine_compression *compression, supine_fit_report *report,
+                                supine_error *error);
 
 #endif

@@ -43,12 +43,11 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
-/** The same from another simulator's fields: fits, compresses, cross-validates, writes. Breath
- * scale 1 gives the fields as they were; closed surfaces can be asked for volumes.
- * @param made_by  how, for the file's metadata; optional */
+/** Fit, compress and cross-validate another simulator's fields, and write the basis file. Breath
+ * scale 1 gives the fields as they were; closed surfaces have volumes.
+ * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
-                                       const supine_fit_options *options, const char *made_by,
-                                       const char *path, supine_fit_report *report,
-                                       size_t *mode_count, supine_error *error);
+                                       const supine_fit_options *options, const char *path,
+                                       supine_fit_report *report, supine_error *error);
 
 #endif

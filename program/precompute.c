@@ -20,7 +20,6 @@ typedef struct request {
   const char *fields, *patient;
   char summary[256];
   bool has_band;
-  unsigned kind; /* 1: scalar */
 } request;
 
 static int read_modes(const char *command, const char *text, void *field) {
@@ -33,8 +32,6 @@ static int read_modes(const char *command, const char *text, void *field) {
   return supine_options_fits(supine_options_parse_count(text, modes) && *modes >= 1 &&
                              *modes <= SUPINE_MODES_MADE_MAX);
 }
-
-static const char *const kinds[] = {"vector", "scalar", NULL};
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", SUPINE_FILLS(request, path),
@@ -62,10 +59,6 @@ static const supine_option table[] = {
      "reference surface. Without --band, cross-validation chooses the band among those that "
      "the directions determine",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
-    {"kind", 0, "vector|scalar",
-     "vector: three components a vertex; scalar: one magnitude along the best direction of "
-     "each vertex, a third of the size; the loss is reported",
-     SUPINE_FILLS(request, kind), .choices = kinds, .standard = "vector", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -108,12 +101,11 @@ static void report_result(const char *path, const supine_lungs *lungs,
 }
 
 /* Report the fit: its error in each band and what the directions determine. */
-static void report_fit(const char *path, const supine_fields *fields, const supine_fit_report *fit,
-                       size_t mode_count, bool scalar) {
+static void report_fit(const char *path, const supine_fields *fields,
+                       const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
-  (void)printf("%s: %s field of %zu vertices from %zu %s directions, band %zu, %zu modes\n", path,
-               scalar ? "scalar" : "vector", fields->vertex_count, fields->direction_count,
-               fit->grid ? "gridded" : "scattered", fit->band, mode_count);
+  (void)printf("%s: field of %zu vertices from %zu directions, band %zu, %zu modes\n", path,
+               fields->vertex_count, fields->direction_count, fit->band, fit->mode_count);
   (void)printf("the directions determine bands up to %zu (%zu harmonics); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1));
   for (size_t band = 0; band <= highest; ++band) {
@@ -125,10 +117,6 @@ static void report_fit(const char *path, const supine_fields *fields, const supi
     (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
                  "missing: about\n%zu evenly spread directions would determine band %zu\n",
                  highest, 2 * (highest + 2) * (highest + 2), highest + 1);
-  }
-  if (scalar) {
-    (void)printf("keeping one direction per vertex loses %.3g %% RMS of the displacement\n",
-                 100.0 * fit->scalar_loss);
   }
   (void)printf("error of the basis, each direction predicted from the others:\n"
                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
@@ -164,20 +152,19 @@ static int check_fields(const char *list, const char *output) {
 static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
   const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
                                       .modes = wanted->basis.modes,
-                                      .scalar = wanted->kind == 1,
-                                      .findings = wanted->model.findings.text};
+                                      .findings = wanted->model.findings.text,
+                                      .made_by = made_by};
   supine_fields fields = {0};
   supine_fit_report report;
-  size_t mode_count = 0;
   supine_error error;
   int result = SUPINE_EXIT_OK;
   if (supine_fields_load(wanted->fields, lungs, &wanted->model.source.load, &fields, &error) !=
           SUPINE_OK ||
-      supine_precompute_fields(lungs, &fields, &options, made_by, wanted->path, &report,
-                               &mode_count, &error) != SUPINE_OK) {
+      supine_precompute_fields(lungs, &fields, &options, wanted->path, &report, &error) !=
+          SUPINE_OK) {
     result = supine_options_fail(name, &error);
   } else {
-    report_fit(wanted->path, &fields, &report, mode_count, options.scalar);
+    report_fit(wanted->path, &fields, &report);
     result = supine_options_finish(name);
   }
   supine_fields_free(&fields);

@@ -7,7 +7,6 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "sh/grid.h"
 #include "test.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
@@ -101,18 +100,16 @@ static supine_fields band_limited_fields(size_t band, size_t count, const double
   return fields;
 }
 
-static void check_band_limited(const supine_fields *fields, size_t band, bool grid) {
+static void check_band_limited(const supine_fields *fields, size_t band) {
   const supine_fit_options options = {.band = -1, .modes = 0};
   supine_compression field;
   supine_fit_report report;
   supine_error error;
-  if (supine_fields_fit(fields, &options, NULL, &field, &report, &error) != SUPINE_OK) {
+  if (supine_fields_fit(fields, &options, &field, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   assert_int_equal(report.band, band);
-  assert_int_equal(report.grid, grid);
   assert_true(report.accuracy.relative_rms < 1e-6); /* coefficients are floats */
-  assert_close(report.scalar_loss, 0.0, 0.0);
   assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
   supine_projection_compression_free(&field);
 }
@@ -126,24 +123,8 @@ static void test_fit_band_limited_fields_come_back(void **state) {
     random_direction(&seed, directions + 3 * d);
   }
   supine_fields fields = band_limited_fields(3, COUNT, directions);
-  check_band_limited(&fields, 3, false);
+  check_band_limited(&fields, 3);
   supine_fields_free(&fields);
-}
-
-static void test_fit_grid_directions_in_any_order_use_the_rule(void **state) {
-  (void)state;
-  enum { LATITUDES = 5, LONGITUDES = 9, COUNT = LATITUDES * LONGITUDES };
-  double directions[3 * COUNT];
-  supine_sh_grid *grid = NULL;
-  assert_int_equal(supine_sh_grid_create(LATITUDES, LONGITUDES, &grid), SUPINE_OK);
-  for (size_t d = 0; d < COUNT; ++d) {
-    const size_t node = (d * 7 + 3) % COUNT;
-    supine_sh_grid_direction(grid, node / LONGITUDES, node % LONGITUDES, directions + 3 * d);
-  }
-  supine_fields fields = band_limited_fields(3, COUNT, directions);
-  check_band_limited(&fields, 3, true);
-  supine_fields_free(&fields);
-  supine_sh_grid_destroy(grid);
 }
 
 /* The closed form of the leave-one-out error against fitting without each direction in turn. */
@@ -155,7 +136,7 @@ static void test_fit_leave_one_out_equals_fitting_without(void **state) {
   const supine_fit_options options = {.band = BAND, .modes = 0};
   supine_compression field;
   supine_fit_report report;
-  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
   supine_projection_compression_free(&field);
   double error2 = 0.0;
   double field2 = 0.0;
@@ -173,7 +154,7 @@ static void test_fit_leave_one_out_equals_fitting_without(void **state) {
       }
     }
     supine_fit_report ignored;
-    assert_int_equal(supine_fields_fit(&rest, &options, NULL, &field, &ignored, NULL), SUPINE_OK);
+    assert_int_equal(supine_fields_fit(&rest, &options, &field, &ignored, NULL), SUPINE_OK);
     assert_int_equal(supine_sh_evaluate(BAND, fields.directions + 3 * out, y), SUPINE_OK);
     for (size_t i = 0; i < 3 * n; ++i) {
       double is = 0.0;
@@ -194,21 +175,20 @@ static void test_fit_leave_one_out_equals_fitting_without(void **state) {
 }
 
 /* Error of a basis of 60 scattered directions, found on 40 others, against what it states. */
-static void check_stated_error(const supine_lungs *of, bool scalar, const char *what) {
+static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields fields = physics_fields(of, 60, 2008, 1.0);
   supine_fields others = physics_fields(of, 40, 1999, 1.0);
-  const supine_fit_options options = {.scalar = scalar, .band = -1, .modes = 16};
+  const supine_fit_options options = {.band = -1, .modes = 16};
   const char *path = in_folder("basis.safetensors");
   supine_fit_report report;
   supine_error error;
-  if (supine_precompute_fields(of, &fields, &options, NULL, path, &report, NULL, &error) !=
-      SUPINE_OK) {
+  if (supine_precompute_fields(of, &fields, &options, path, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
-  assert_int_equal(supine_basis_get_info(basis)->vector, !scalar);
+  assert_int_equal(supine_basis_get_info(basis)->vector, true);
   const size_t n = of->mesh.vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
   double error2 = 0.0;
@@ -231,9 +211,8 @@ static void check_stated_error(const supine_lungs *of, bool scalar, const char *
     }
   }
   const double truth = sqrt(error2 / field2);
-  printf("%s, %s, 60 directions, band %zu: stated %.2f %%, found on 40 others %.2f %%\n", what,
-         scalar ? "scalar" : "vector", report.band, 100.0 * report.accuracy.relative_rms,
-         100.0 * truth);
+  printf("%s, 60 directions, band %zu: stated %.2f %%, found on 40 others %.2f %%\n", what,
+         report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
   assert_true(report.accuracy.relative_rms > truth / 1.3333 &&
               report.accuracy.relative_rms < truth * 1.3333);
   free(xyz);
@@ -244,8 +223,7 @@ static void check_stated_error(const supine_lungs *of, bool scalar, const char *
 
 static void test_fit_stated_error_is_found_on_other_directions(void **state) {
   (void)state;
-  check_stated_error(&lungs, false, "phantom");
-  check_stated_error(&lungs, true, "phantom");
+  check_stated_error(&lungs, "phantom");
 }
 
 static void test_fit_real_lung_stated_error_is_found_on_other_directions(void **state) {
@@ -256,7 +234,7 @@ static void test_fit_real_lung_stated_error_is_found_on_other_directions(void **
     skip();
     return;
   }
-  check_stated_error(&real, false, "chaste_left_5k");
+  check_stated_error(&real, "chaste_left_5k");
   supine_lungs_free(&real);
 }
 
@@ -277,7 +255,7 @@ static double gain_of_band_2(double amount, size_t *band) {
   for (size_t i = 0; i < 3 * COUNT * fields.vertex_count; ++i) {
     fields.displacement[i] += amount * more.displacement[i] + random_signed(&seed);
   }
-  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
   supine_projection_compression_free(&field);
   supine_fields_free(&fields);
   supine_fields_free(&more);
@@ -301,37 +279,14 @@ static void test_fit_band_that_gains_less_than_a_hundredth_is_not_kept(void **st
   }
 }
 
-static void test_fit_scalar_states_what_it_loses(void **state) {
-  (void)state;
-  supine_fields fields = physics_fields(&lungs, 12, 3, 0.0);
-  double *d = malloc(3 * fields.vertex_count * sizeof *d);
-  const supine_fit_options options = {.scalar = true, .band = 1, .modes = 0};
-  supine_compression field;
-  supine_fit_report report;
-  assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
-  assert_true(report.scalar_loss < 1e-6); /* these fields do keep one direction a vertex */
-  supine_projection_compression_free(&field);
-  uint64_t seed = 8;
-  for (size_t i = 0; i < 3 * 12 * fields.vertex_count; ++i) {
-    fields.displacement[i] = random_signed(&seed);
-  }
-  assert_int_equal(supine_fields_fit(&fields, &options, d, &field, &report, NULL), SUPINE_OK);
-  assert_true(report.scalar_loss > 0.4 && report.scalar_loss < 0.9); /* these do not */
-  assert_true(report.accuracy.relative_rms >= report.scalar_loss);
-  supine_projection_compression_free(&field);
-  supine_fields_free(&fields);
-  free(d);
-}
-
 static void test_fit_vector_volumes_exact(void **state) {
   (void)state;
   supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
   const supine_fit_options options = {.band = -1, .modes = 8};
   const char *path = in_folder("volume.safetensors");
   supine_fit_report report;
-  assert_int_equal(
-      supine_precompute_fields(&lungs, &fields, &options, NULL, path, &report, NULL, NULL),
-      SUPINE_OK);
+  assert_int_equal(supine_precompute_fields(&lungs, &fields, &options, path, &report, NULL),
+                   SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
@@ -372,16 +327,16 @@ static void test_fit_few_directions_say_what_they_reach(void **state) {
   supine_compression field;
   supine_fit_report report;
   supine_error error;
-  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
   assert_in_range(report.band_highest, 1, 2);
   assert_true(report.band <= report.band_highest);
   supine_projection_compression_free(&field);
   options.band = 4;
-  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, &error),
+  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "10 directions do not determine band 4 (25 harmonics)"));
   memset(fields.displacement, 0, 3 * 10 * fields.vertex_count * sizeof(double));
-  assert_int_equal(supine_fields_fit(&fields, &options, NULL, &field, &report, &error),
+  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
                    SUPINE_ERROR_NUMERICAL);
   supine_fields_free(&fields);
 }
@@ -489,7 +444,7 @@ static void test_load_tensors_checked(void **state) {
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
   tensors[1].shape[1] = n / 2;
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the rest surface has");
+  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the reference surface has");
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
   free(displacement);
@@ -498,12 +453,10 @@ static void test_load_tensors_checked(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_fit_band_limited_fields_come_back),
-      cmocka_unit_test(test_fit_grid_directions_in_any_order_use_the_rule),
       cmocka_unit_test(test_fit_leave_one_out_equals_fitting_without),
       cmocka_unit_test(test_fit_stated_error_is_found_on_other_directions),
       cmocka_unit_test(test_fit_real_lung_stated_error_is_found_on_other_directions),
       cmocka_unit_test(test_fit_band_that_gains_less_than_a_hundredth_is_not_kept),
-      cmocka_unit_test(test_fit_scalar_states_what_it_loses),
       cmocka_unit_test(test_fit_vector_volumes_exact),
       cmocka_unit_test(test_fit_few_directions_say_what_they_reach),
       cmocka_unit_test(test_load_list_of_surfaces_gives_displacements),
