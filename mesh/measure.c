@@ -1,11 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volume, box and vertex areas of a surface. */
+/* Compute volume, box, areas and normals of a surface. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/vec3.h"
 
 #include "mesh/mesh.h"
+
+void supine_mesh_free(supine_mesh *mesh) {
+  free(mesh->vertices);
+  free(mesh->triangles);
+  *mesh = (supine_mesh){0};
+}
 
 double supine_mesh_volume(const supine_mesh *mesh) {
   double minimum[3];
@@ -20,14 +27,13 @@ double supine_mesh_volume(const supine_mesh *mesh) {
         p[k][axis] = vertex[axis] - 0.5 * (minimum[axis] + maximum[axis]);
       }
     }
-    double product[3];
-    supine_cross(p[1], p[2], product);
-    sum += supine_dot(p[0], product);
+    sum += supine_triple(p[0], p[1], p[2]);
   }
   return sum / 6.0;
 }
 
-void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]) {
+double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]) {
+  double side = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     minimum[axis] = mesh->vertex_count == 0 ? 0.0 : mesh->vertices[axis];
     maximum[axis] = minimum[axis];
@@ -38,6 +44,18 @@ void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[
       minimum[axis] = x < minimum[axis] ? x : minimum[axis];
       maximum[axis] = x > maximum[axis] ? x : maximum[axis];
     }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    side = fmax(side, maximum[axis] - minimum[axis]);
+  }
+  return side;
+}
+
+void supine_mesh_reverse(const supine_mesh *mesh) {
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t second = mesh->triangles[3 * t + 1];
+    mesh->triangles[3 * t + 1] = mesh->triangles[3 * t + 2];
+    mesh->triangles[3 * t + 2] = second;
   }
 }
 

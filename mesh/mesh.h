@@ -59,9 +59,6 @@ typedef struct supine_mesh_report {
   supine_axes axes;             /**< axes assumed for the file */
   bool axes_from_tag;           /**< the axes come from a SPACE tag */
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
-  double odd_side;              /**< longest side of the box, mm, if impossible for lungs; else 0 */
-  const char *likely_unit;      /**< "mm", "cm", "m", "um" or "in", a literal: the unit in which an
-                                 * odd file would hold lungs; else NULL */
 } supine_mesh_report;
 
 /** Read one surface: PLY, STL and VTP directly, other formats through assimp. Polygons are cut
@@ -86,10 +83,15 @@ typedef struct supine_mesh_report {
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** Return `side` if no lungs have a box with that longest side, mm, else 0. `likely`: the named
- * unit in which the file would hold lungs, or NULL.
- * @param millimetres  per unit, used to scale `side` */
-double supine_mesh_unit_check(double side, double millimetres, const char **likely);
+/** Report whether lungs can have a box with this longest side, mm.
+ * @param other  written: the unit other than mm, a literal, in which lungs could have it; or NULL
+ */
+bool supine_mesh_unit_is_likely(double side, const char **other);
+/** Find the millimetres of "mm", "cm", "m", "um" or "in"; false for any other name. */
+bool supine_mesh_unit_find(const char *name, double *millimetres);
+/** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
+ * @param text  [24], written */
+void supine_mesh_unit_name(double millimetres, char *text);
 
 /** Free the arrays and zero the struct; a zeroed struct is legal. */
 void supine_mesh_free(supine_mesh *mesh);
@@ -122,8 +124,11 @@ void supine_mesh_topology_free(supine_topology *topology);
  * positive if the triangles face outwards; meaningful only for closed surfaces; 0 if empty. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Find the axis-aligned box, mm; zeros without vertices. */
-void supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
+/** Find the axis-aligned box, mm, and return its longest side; zeros without vertices. */
+double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
+
+/** Reverse the triangles, so that they face the other way. */
+void supine_mesh_reverse(const supine_mesh *mesh);
 
 /** Find one third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
@@ -194,10 +199,6 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
 /** Free a series, and drop it if it was not committed. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
-
-/** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
- * @param text  [24], written */
-void supine_mesh_unit_name(double millimetres, char *text);
 
 /** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in
  * mesh/io. This is the only list of them. */

@@ -326,51 +326,40 @@ static void test_load_axes_foreign_tag_refused(void **state) {
               SUPINE_ERROR_FORMAT, "SPACE tag");
 }
 
-/* The tetrahedron `size` long in the file, read as `scale` mm per unit. */
-static void test_load_units_scaled_and_guessed(void **state) {
-  static const struct {
-    double size, scale;
-    double odd_side;
-    const char *likely;
-  } cases[] = {{120, 0.0, 0, NULL},
-               {120, 1.0, 0, NULL},
-               {600, 1.0, 0, NULL},
-               {80, 1.0, 0, NULL},
-               {12, 1.0, 12, "in"},
-               {24, 1.0, 24, "cm"},
-               {0.25, 0.0, 0.25, "m"},
-               {6, 0.0, 6, "in"},
-               {240000, 0.0, 240000, "um"},
-               {0.0625, 0.0, 0.0625, NULL},
-               {72, 0.0, 72, NULL},
-               {1048576, 0.0, 1048576, NULL},
-               /* units that were given and are wrong, or right */
-               {120, 10.0, 1200, "mm"},
-               {120, 0.125, 15, "mm"},
-               {0.25, 10.0, 2.5, "m"},
-               {12, 1000.0, 12000, "in"},
-               {24, 10.0, 0, NULL},
-               {72, 0.5, 36, NULL}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
-    char text[256];
+static void test_load_units_scaled(void **state) {
+  static const double scales[] = {0.0, 1.0, 10.0, 0.125};
+  for (size_t i = 0; i < sizeof scales / sizeof *scales; ++i) {
     char path[256];
-    const double size = cases[i].size;
-    (void)snprintf(
-        text, sizeof text,
-        SAMPLE_PLY(4, 4) "0 0 0\n%.9g 0 0\n0 %.9g 0\n0 0 %.9g\n3 0 2 1\n3 0 1 3\n3 0 3 2\n"
-                         "3 1 2 3\n",
-        size, size, size);
-    supine_mesh_report report = {0};
-    const supine_mesh_load_options options = {.millimetres_per_unit = cases[i].scale};
-    supine_mesh mesh = load(sample_text(state, "a.ply", text, path), &options, &report);
+    const supine_mesh_load_options options = {.millimetres_per_unit = scales[i]};
+    supine_mesh mesh = load(sample_text(state, "a.ply",
+                                        SAMPLE_PLY(4, 4) "0 0 0\n24 0 0\n0 24 0\n0 0 24\n3 0 2 1\n"
+                                                         "3 0 1 3\n3 0 3 2\n3 1 2 3\n",
+                                        path),
+                            &options, NULL);
     double minimum[3];
     double maximum[3];
-    supine_mesh_box(&mesh, minimum, maximum);
-    assert_true(maximum[0] == size * (cases[i].scale == 0.0 ? 1.0 : cases[i].scale));
-    assert_true(report.odd_side == cases[i].odd_side);
-    assert_string_equal(report.likely_unit == NULL ? "" : report.likely_unit,
-                        cases[i].likely == NULL ? "" : cases[i].likely);
+    const double side = supine_mesh_box(&mesh, minimum, maximum);
+    assert_true(side == 24.0 * (scales[i] == 0.0 ? 1.0 : scales[i]));
+    assert_true(maximum[0] == side && minimum[0] == 0.0);
     supine_mesh_free(&mesh);
+  }
+}
+
+static void test_unit_is_likely_sides_and_other_units(void **state) {
+  (void)state;
+  static const struct {
+    double side;
+    bool likely;
+    const char *other;
+  } cases[] = {{120, true, NULL}, {600, true, NULL},     {80, true, NULL},
+               {12, false, "in"}, {24, false, "cm"},     {0.25, false, "m"},
+               {6, false, "in"},  {240000, false, "um"}, {0.0625, false, NULL},
+               {72, false, NULL}, {1048576, false, NULL}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    const char *other = "";
+    assert_int_equal(supine_mesh_unit_is_likely(cases[i].side, &other), cases[i].likely);
+    assert_string_equal(cases[i].likely || other == NULL ? "" : other,
+                        cases[i].other == NULL ? "" : cases[i].other);
   }
 }
 
@@ -551,7 +540,8 @@ int main(void) {
       cmocka_unit_test(test_load_axes_tag_option_and_comment),
       cmocka_unit_test(test_load_axes_tag_in_stl_header),
       cmocka_unit_test(test_load_axes_foreign_tag_refused),
-      cmocka_unit_test(test_load_units_scaled_and_guessed),
+      cmocka_unit_test(test_load_units_scaled),
+      cmocka_unit_test(test_unit_is_likely_sides_and_other_units),
       cmocka_unit_test(test_load_units_not_positive_argument),
       cmocka_unit_test(test_load_missing_folder_device_unreadable_read),
       cmocka_unit_test(test_load_unknown_kind_format),

@@ -339,7 +339,7 @@ static void test_mesh_inward_lung_turned_round_and_told(void **state) {
   (void)state;
   write_text("in.obj",
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
-  EXPECT(0, "note: the triangles of the left lung faced inwards: turned round",
+  EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",
          "solve in.obj --posture prone -o h.ply");
   EXPECT(2, "surfaces 1 and 2 fill the same box: give each lung once",
          "solve in.obj in.obj --posture prone -o h.ply");

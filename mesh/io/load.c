@@ -43,11 +43,10 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   return SUPINE_OK;
 }
 
-/* Largest coordinate of a patient, mm, where single precision resolves 1 mm. */
+/* Largest coordinate, mm, that single precision resolves to 1 mm. */
 static const double farthest = 1e7;
 
-/* Convert to millimetres and LPS. Left-handed axes reverse the triangles, which are reversed
- * again. */
+/* Convert to millimetres and LPS. */
 static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,
                              supine_error *error) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
@@ -67,23 +66,10 @@ static supine_status convert(const char *path, double scale, supine_axes axes, s
     }
     supine_mesh_axes_apply(axes, scale, vertex);
   }
-  for (size_t t = 0; supine_mesh_axes_mirrored(axes) && t < mesh->triangle_count; ++t) {
-    const uint32_t second = mesh->triangles[3 * t + 1];
-    mesh->triangles[3 * t + 1] = mesh->triangles[3 * t + 2];
-    mesh->triangles[3 * t + 2] = second;
+  if (supine_mesh_axes_mirrored(axes)) {
+    supine_mesh_reverse(mesh);
   }
   return SUPINE_OK;
-}
-
-static double longest_side(const supine_mesh *mesh) {
-  double minimum[3];
-  double maximum[3];
-  supine_mesh_box(mesh, minimum, maximum);
-  double side = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    side = fmax(side, maximum[axis] - minimum[axis]);
-  }
-  return side;
 }
 
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
@@ -122,7 +108,6 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                               path, found.file_vertices, found.file_faces);
     goto cleanup;
   }
-  found.odd_side = supine_mesh_unit_check(longest_side(&loaded), scale, &found.likely_unit);
   *mesh = loaded;
   loaded = (supine_mesh){0};
   if (report != NULL) {

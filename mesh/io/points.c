@@ -148,10 +148,8 @@ static supine_status read_markup(reading *r, const json_t *markup) {
                            : json_is_integer(system)
                                ? json_integer_value(system) == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS
                                : SUPINE_AXES_LPS;
-  const double scale = unit != NULL && strcmp(unit, "um") == 0   ? 1e-3
-                       : unit != NULL && strcmp(unit, "cm") == 0 ? 10.0
-                       : unit != NULL && strcmp(unit, "m") == 0  ? 1000.0
-                                                                 : 1.0;
+  double scale = 1.0;
+  (void)(unit != NULL && supine_mesh_unit_find(unit, &scale));
   const json_t *list = json_object_get(markup, "controlPoints");
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < json_array_size(list) && status == SUPINE_OK; ++i) {

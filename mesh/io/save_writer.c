@@ -41,20 +41,6 @@ static void copy_comment(const char *comment, char *line, size_t size) {
   line[length] = '\0';
 }
 
-void supine_mesh_unit_name(double millimetres, char *text) {
-  static const struct {
-    const char *name;
-    double millimetres;
-  } units[] = {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}};
-  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
-    if (units[i].millimetres == millimetres) {
-      (void)snprintf(text, 24, "%s", units[i].name);
-      return;
-    }
-  }
-  (void)snprintf(text, 24, "%.9g mm", millimetres);
-}
-
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer) {
   const supine_mesh_save_options chosen =

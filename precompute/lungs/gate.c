@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From surfaces as files have them to lungs that can be computed with. */
+/* Check and repair surfaces, and join them into lungs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,11 +11,8 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 
-/* A piece below this share of its file's volume is no part of a lung. */
+/* Largest share of its file's volume of a piece that is dropped. */
 static const double speck_share = 0.01;
-/* Groups of pieces that overlap along an axis by less than this share of the narrower are two
- * lungs; lobes overlap by more. */
-static const double most_overlap = 0.5;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
@@ -42,12 +39,12 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         plural(report.loose));
   }
   if (report.reversed > 0) {
-    supine_findings_add(findings, "%s: note: turned %zu reversed triangle%s", name, report.reversed,
-                        plural(report.reversed));
+    supine_findings_add(findings, "%s: note: reversed %zu triangle%s that faced the other way",
+                        name, report.reversed, plural(report.reversed));
   }
   if (report.parted > 0) {
     supine_findings_add(findings, "%s: note: surfaces touched at %zu point%s: parted there", name,
-                        report.parted, report.parted == 1 ? "" : "s");
+                        report.parted, plural(report.parted));
   }
   if (specks > 0) {
     supine_findings_add(findings,
@@ -57,34 +54,21 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         pieces == 1 ? " is" : "s are");
   }
   if (pieces > 6) { /* more than lobes */
-    supine_findings_add(findings, "%s: warning: %zu pieces; remove what is no lung", name, pieces);
+    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are no lung", name,
+                        pieces);
   }
   return SUPINE_OK;
 }
 
-static supine_status check_size(const supine_mesh *meshes, size_t count,
-                                const supine_lungs_source *source, supine_findings *findings,
-                                supine_error *error) {
-  double low[3] = {INFINITY, INFINITY, INFINITY};
-  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  double side = 0.0;
-  for (size_t m = 0; m < count; ++m) {
-    double least[3];
-    double most[3];
-    supine_mesh_box(&meshes[m], least, most);
-    for (int k = 0; k < 3; ++k) {
-      low[k] = fmin(low[k], least[k]);
-      high[k] = fmax(high[k], most[k]);
-      side = fmax(side, high[k] - low[k]);
-    }
-  }
+static supine_status check_size(const supine_lungs *lungs, const supine_lungs_source *source,
+                                supine_findings *findings, supine_error *error) {
   const char *unit = NULL;
-  if (supine_mesh_unit_check(side, 1.0, &unit) == 0.0) {
-    return SUPINE_OK;
+  double side = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    side = fmax(side, lungs->maximum[k] - lungs->minimum[k]);
   }
-  char advice[96] = "check its units";
-  if (unit != NULL) {
-    (void)snprintf(advice, sizeof advice, "its unit is likely --units %s", unit);
+  if (supine_mesh_unit_is_likely(side, &unit)) {
+    return SUPINE_OK;
   }
   if (source->axes_given || source->units_given) {
     supine_findings_add(findings, "%s: warning: %.3g mm long, which no lung is", source->name,
@@ -92,74 +76,48 @@ static supine_status check_size(const supine_mesh *meshes, size_t count,
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "%s: %.3g mm long, which no lung is: %s. If it is right as it stands, "
+                          "%s: %.3g mm long, which no lung is: %s%s. If it is right as it stands, "
                           "add --units mm",
-                          source->name, side, advice);
+                          source->name, side,
+                          unit != NULL ? "its unit is likely --units " : "check its units",
+                          unit != NULL ? unit : "");
 }
 
-/* Parts connected pieces into two groups along an axis. @return the overlap as a share of the
- * narrower group, or INFINITY where all are on one side
- * @param group  [components] written */
-static double part_along(const supine_lungs *lungs, int axis, uint8_t *group) {
-  const size_t n = lungs->mesh.vertex_count;
-  const uint32_t *piece = lungs->topology.component;
-  const double middle = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
-  double range[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-  long *votes = calloc(lungs->topology.component_count, sizeof *votes);
-  if (votes == NULL) {
-    return INFINITY;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    votes[piece[i]] += lungs->mesh.vertices[3 * i + (size_t)axis] > middle ? 1 : -1;
-  }
-  for (size_t p = 0; p < lungs->topology.component_count; ++p) {
-    group[p] = votes[p] > 0;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const double x = lungs->mesh.vertices[3 * i + (size_t)axis];
-    double *of = range[group[piece[i]]];
-    of[0] = fmin(of[0], x);
-    of[1] = fmax(of[1], x);
-  }
-  free(votes);
-  const double narrower = fmin(range[0][1] - range[0][0], range[1][1] - range[1][0]);
-  return narrower > 0.0 ? (range[0][1] - range[1][0]) / narrower : INFINITY;
-}
-
-/* Sorts the triangles of the two lungs apart, whatever axes they lie along. @return lungs, 1 or 2
- * @param parts  share the lungs' vertices; their triangles are the caller's to free */
+/* Sort the triangles of two lungs apart, whatever axes they lie along. Return the number of lungs.
+ * @param parts  share the lungs' vertices; the caller frees their triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
-  uint8_t *group = calloc(4, lungs->topology.component_count);
-  double least = most_overlap;
+  const supine_topology *topology = &lungs->topology;
+  uint8_t *group = malloc(topology->component_count);
+  double least = SUPINE_LUNGS_MOST_OVERLAP;
   int along = -1;
-  for (int axis = 0; group != NULL && axis < 3; ++axis) {
-    const double overlap =
-        part_along(lungs, axis, group + (size_t)axis * lungs->topology.component_count);
-    if (overlap < least) {
-      least = overlap;
-      along = axis;
-    }
-  }
-  const uint8_t *chosen =
-      group == NULL ? NULL
-                    : group + (size_t)(along < 0 ? 3 : along) * lungs->topology.component_count;
   for (size_t g = 0; g < 2; ++g) {
     parts[g] = (supine_mesh){.vertex_count = mesh->vertex_count, .vertices = mesh->vertices};
     parts[g].triangles = malloc((3 * mesh->triangle_count + 1) * sizeof *parts[g].triangles);
   }
-  for (size_t t = 0; parts[0].triangles != NULL && parts[1].triangles != NULL && chosen != NULL &&
-                     t < mesh->triangle_count;
-       ++t) {
+  if (group == NULL || parts[0].triangles == NULL || parts[1].triangles == NULL) {
+    free(group);
+    return 1; /* without triangles */
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const double middle = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
+    const double overlap = supine_lungs_sides(mesh, topology, axis, middle, group);
+    along = overlap < least ? axis : along;
+    least = fmin(least, overlap);
+  }
+  const double middle =
+      along < 0 ? INFINITY : 0.5 * (lungs->minimum[along] + lungs->maximum[along]);
+  (void)supine_lungs_sides(mesh, topology, along < 0 ? 0 : along, middle, group);
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    supine_mesh *part = &parts[chosen[lungs->topology.component[corner[0]]]];
+    supine_mesh *part = &parts[group[topology->component[corner[0]]]];
     memcpy(part->triangles + 3 * part->triangle_count++, corner, 3 * sizeof *corner);
   }
   free(group);
   return along < 0 ? 1 : 2;
 }
 
-/* "left and right, head and feet" */
+/* Describe axes other than LPS, as "left and right, head and feet exchanged". */
 static void describe(supine_axes axes, char *text, size_t size) {
   static const char *const ends[] = {"left and right", "front and back", "head and feet"};
   double matrix[3][3];
@@ -177,7 +135,8 @@ static void describe(supine_axes axes, char *text, size_t size) {
   supine_text_add(text, size, " exchanged");
 }
 
-/* Judges axes, and whether it is one lung; @param side  of a single lung, 0: cannot be told */
+/* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
+ * @param side  written: that of a single lung, +1 left, -1 right; 0: unknown */
 static supine_status judge(const supine_lungs *lungs, const supine_lungs_source *source, int *side,
                            bool *axes_hold, supine_findings *findings, supine_error *error) {
   supine_mesh parts[2];
@@ -206,7 +165,7 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
   return SUPINE_OK;
 }
 
-/* Takes a single lung for the side that its shape shows. */
+/* Choose the side of a single lung by its shape, or else by its place. */
 static supine_status take_side(const supine_mesh *meshes, size_t count,
                                const supine_lungs_source *source, int side, supine_lungs *lungs,
                                supine_findings *findings, supine_error *error) {
@@ -226,13 +185,12 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
   return supine_lungs_create(meshes, count, &midline, lungs, error);
 }
 
-/* What is to be known of the lungs as a whole. */
 static void note_lungs(const supine_lungs *lungs, const char *name, supine_findings *findings) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (lungs->turned[lung]) {
       supine_findings_add(findings,
-                          "%s: note: the triangles of the %s lung faced inwards: turned round",
-                          name, supine_lungs_name(lungs, lung));
+                          "%s: note: the triangles of the %s lung faced inwards: reversed", name,
+                          supine_lungs_name(lungs, lung));
     }
   }
   const supine_topology *t = &lungs->topology;
@@ -254,14 +212,14 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
   for (size_t m = 0; m < count && status == SUPINE_OK; ++m) {
     status = mend(&meshes[m], source->name, findings, error);
   }
-  status = status == SUPINE_OK ? check_size(meshes, count, source, findings, error) : status;
   if (status == SUPINE_OK) {
     status = supine_lungs_create(meshes, count, source->midline, lungs, error);
   }
   if (status != SUPINE_OK) {
     return status;
   }
-  status = judge(lungs, source, &side, &hold, findings, error);
+  status = check_size(lungs, source, findings, error);
+  status = status == SUPINE_OK ? judge(lungs, source, &side, &hold, findings, error) : status;
   if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     status = take_side(meshes, count, source, side, lungs, findings, error);
   }

@@ -8,25 +8,25 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** How the surfaces came. */
+/** Where the surfaces come from. */
 typedef struct supine_lungs_source {
   const char *name;      /**< the first file, for messages */
-  supine_axes axes;      /**< that they were read in; AUTO: several */
-  bool axes_given;       /**< the user named the axes: impossible sizes are then only warned of */
-  bool units_given;      /**< likewise the units */
-  const double *midline; /**< as of supine_lungs_create */
+  supine_axes axes;      /**< axes they were read in; AUTO: several */
+  bool axes_given;       /**< by the user: impossible sizes are then only warned of */
+  bool units_given;      /**< likewise */
+  const double *midline; /**< as for supine_lungs_create */
 } supine_lungs_source;
 
-/** Mends and checks surfaces, and joins them into lungs.
+/** Repair and check surfaces, and join them into lungs.
  *
- * Duplicate and loose triangles are dropped, reversed ones turned, closed surfaces that touch
- * parted, and pieces below 1 % of their file's volume dropped. The longest side must be one that
- * lungs have. The axes are compared with the shape (supine_mesh_anatomy_find). A single lung's side
- * is told from its shape, or else from its place. All that was done or found goes to `findings`.
+ * Repairs are those of supine_mesh_repair; pieces below 1 % of their file's volume are dropped. The
+ * longest side must be possible for lungs. The axes are compared with the shape
+ * (supine_mesh_anatomy_find). A single lung's side is judged by its shape, or else by its place.
+ * Notes and warnings go to `findings`.
  *
  * @param meshes     [count] changed in place
- * @param axes_hold  optional, written: the shape agrees with the axes, and no others come near
- * @retval SUPINE_ERROR_MESH  a size that no lungs have, both lungs in one piece; and those of
+ * @param axes_hold  optional, written: the shape agrees with the axes, and with no others
+ * @retval SUPINE_ERROR_MESH  a size impossible for lungs, both lungs in one piece; and those of
  *                            supine_lungs_create */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,

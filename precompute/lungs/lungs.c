@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The lungs of one model: join, tell left from right, group, measure. */
+/* Join surfaces into lungs, tell left from right, check, measure. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "precompute/lungs/lungs.h"
-#include "precompute/lungs/sound.h"
 
-/* A component of fewer vertices than this share follows its side and does not make a lung. */
+/* A component with less than this share of the vertices does not make a lung. */
 static const double significant_share = 0.05;
+/* Boxes whose faces differ by less than this share of their size are of one lung: halving a mesh
+ * moves its box by thousandths, and no two lobes or lungs come near. */
+static const double same_box_share = 0.01;
+/* Least ratio of the sizes of two surfaces: those of lobes and lungs of one chest are within a
+ * factor of ten. */
+static const double least_side_share = 0.05;
+/* Largest share of a lung beyond the midline: lungs meet behind the breastbone. */
+static const double most_beyond_share = 0.5;
 
-/* Where and how large one connected component is. */
-typedef struct component {
-  size_t count;
-  double sum_x, minimum_x, maximum_x;
-} component;
-
-/* A surface of the input and where its vertices lie on average, to join from left to right. */
+/* A surface and the mean x of its vertices: surfaces are joined from left to right. */
 typedef struct placed_mesh {
   const supine_mesh *mesh;
   double mean_x;
@@ -78,102 +79,78 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
   return SUPINE_OK;
 }
 
-static component *measure_components(const supine_mesh *mesh, const supine_topology *topology) {
-  component *parts = malloc(topology->component_count * sizeof *parts);
+double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
+                          double middle, uint8_t *above) {
+  typedef struct component {
+    double count, sum, low, high;
+  } component;
+  double range[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+  component *parts = calloc(topology->component_count, sizeof *parts);
   if (parts == NULL) {
-    return NULL;
-  }
-  for (size_t c = 0; c < topology->component_count; ++c) {
-    parts[c] = (component){0, 0.0, INFINITY, -INFINITY};
+    return NAN;
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     component *part = &parts[topology->component[i]];
-    const double x = mesh->vertices[3 * i];
-    ++part->count;
-    part->sum_x += x;
-    part->minimum_x = fmin(part->minimum_x, x);
-    part->maximum_x = fmax(part->maximum_x, x);
+    const double x = mesh->vertices[3 * i + (size_t)axis];
+    part->low = part->count == 0.0 ? x : fmin(part->low, x);
+    part->high = part->count == 0.0 ? x : fmax(part->high, x);
+    part->sum += x;
+    part->count += 1.0;
   }
-  return parts;
-}
-
-static bool part_is_left(const component *part, double x) {
-  return part->sum_x > x * (double)part->count;
-}
-
-/* Whether the significant components fall into two groups, left and right of x, that overlap by
- * less than half the width of the narrower. */
-static bool two_sided(const component *parts, size_t count, size_t vertices, double x) {
-  double left[2] = {INFINITY, -INFINITY};
-  double right[2] = {INFINITY, -INFINITY};
-  for (size_t c = 0; c < count; ++c) {
-    if ((double)parts[c].count >= significant_share * (double)vertices) {
-      double *range = part_is_left(&parts[c], x) ? left : right;
-      range[0] = fmin(range[0], parts[c].minimum_x);
-      range[1] = fmax(range[1], parts[c].maximum_x);
+  for (size_t c = 0; c < topology->component_count; ++c) {
+    above[c] = parts[c].sum > middle * parts[c].count;
+    if (parts[c].count >= significant_share * (double)mesh->vertex_count) {
+      double *of = range[above[c]];
+      of[0] = fmin(of[0], parts[c].low);
+      of[1] = fmax(of[1], parts[c].high);
     }
   }
-  const double narrower = fmin(left[1] - left[0], right[1] - right[0]);
-  return narrower > 0.0 && right[1] - left[0] < 0.5 * narrower;
+  free(parts);
+  const double narrower = fmin(range[0][1] - range[0][0], range[1][1] - range[1][0]);
+  return narrower > 0.0 ? (range[0][1] - range[1][0]) / narrower : INFINITY;
 }
 
-/* Counts the lungs' vertices and triangles, left first; true where they stand in that order
- * already. */
-static bool grouped(supine_lungs *lungs, const component *parts) {
-  const supine_mesh *mesh = &lungs->mesh;
-  const uint32_t *part_of = lungs->topology.component;
-  size_t left_vertices = 0;
-  size_t left_triangles = 0;
-  bool in_order = true;
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    if (part_is_left(&parts[part_of[i]], lungs->midline)) {
-      in_order = in_order && left_vertices == i;
-      ++left_vertices;
-    }
-  }
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    if (part_is_left(&parts[part_of[mesh->triangles[3 * t]]], lungs->midline)) {
-      in_order = in_order && left_triangles == t;
-      ++left_triangles;
-    }
-  }
-  const bool both = left_vertices > 0 && left_vertices < mesh->vertex_count;
-  lungs->lung_count = both ? 2 : 1;
-  lungs->side[0] = left_vertices > 0 ? 1 : -1;
-  lungs->side[1] = -1;
-  lungs->lung_begin[1] = both ? left_vertices : mesh->vertex_count;
-  lungs->lung_begin[2] = mesh->vertex_count;
-  lungs->triangle_begin[1] = both ? left_triangles : mesh->triangle_count;
-  lungs->triangle_begin[2] = mesh->triangle_count;
-  return in_order;
-}
-
-/* Sorts vertices and triangles by lung, keeping their order within each, and finds the edges anew.
- */
-static supine_status group(supine_lungs *lungs, const component *parts, supine_error *error) {
+/* Group vertices and triangles by lung, left first, keeping their order within each.
+ * @param left  [components] */
+static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_error *error) {
   supine_mesh *mesh = &lungs->mesh;
   const size_t n = mesh->vertex_count;
+  const size_t triangles = mesh->triangle_count;
   const uint32_t *part_of = lungs->topology.component;
-  supine_mesh sorted = {.vertex_count = n, .triangle_count = mesh->triangle_count};
-  uint32_t *position = calloc(n + 1, sizeof *position);
+  supine_mesh sorted = {.vertex_count = n, .triangle_count = triangles};
+  uint32_t *position = calloc(n, sizeof *position);
+  size_t next[2] = {0, 0};
+  size_t next_triangle[2] = {0, 0};
+  bool in_order = true;
   sorted.vertices = malloc(3 * n * sizeof *sorted.vertices);
-  sorted.triangles = malloc(3 * mesh->triangle_count * sizeof *sorted.triangles);
+  sorted.triangles = malloc(3 * triangles * sizeof *sorted.triangles);
   if (position == NULL || sorted.vertices == NULL || sorted.triangles == NULL) {
     free(position);
     supine_mesh_free(&sorted);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to group %zu vertices", n);
   }
-  size_t next[2] = {0, lungs->lung_begin[1]};
   for (size_t i = 0; i < n; ++i) {
-    const bool left = part_is_left(&parts[part_of[i]], lungs->midline);
-    position[i] = (uint32_t)next[left ? 0 : 1]++;
+    next[1] += left[part_of[i]];
+  }
+  for (size_t t = 0; t < triangles; ++t) {
+    next_triangle[1] += left[part_of[mesh->triangles[3 * t]]];
+  }
+  const bool both = next[1] > 0 && next[1] < n;
+  lungs->lung_count = both ? 2 : 1;
+  lungs->side[0] = next[1] > 0 ? 1 : -1;
+  lungs->side[1] = -1;
+  lungs->lung_begin[1] = both ? next[1] : n;
+  lungs->lung_begin[2] = n;
+  lungs->triangle_begin[1] = both ? next_triangle[1] : triangles;
+  lungs->triangle_begin[2] = triangles;
+  for (size_t i = 0; i < n; ++i) {
+    position[i] = (uint32_t)next[left[part_of[i]] == 0]++;
+    in_order = in_order && position[i] == i;
     memcpy(sorted.vertices + 3 * (size_t)position[i], mesh->vertices + 3 * i, 3 * sizeof(double));
   }
-  size_t next_triangle[2] = {0, lungs->triangle_begin[1]};
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+  for (size_t t = 0; t < triangles; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    const bool left = part_is_left(&parts[part_of[corner[0]]], lungs->midline);
-    uint32_t *out = sorted.triangles + 3 * next_triangle[left ? 0 : 1]++;
+    uint32_t *out = sorted.triangles + 3 * next_triangle[left[part_of[corner[0]]] == 0]++;
     for (size_t k = 0; k < 3; ++k) {
       out[k] = position[corner[k]];
     }
@@ -181,76 +158,135 @@ static supine_status group(supine_lungs *lungs, const component *parts, supine_e
   free(position);
   supine_mesh_free(mesh);
   *mesh = sorted;
+  if (in_order) {
+    return SUPINE_OK;
+  }
   supine_mesh_topology_free(&lungs->topology);
   const supine_status status = supine_mesh_topology_create(mesh, &lungs->topology);
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
-/* Over 60 lines: joining, parting, checking and measuring, each of which may end it. */
+/* Refuse surfaces of which two are one lung given twice, whatever its resolution, or one is tiny
+ * beside another. */
+static supine_status check_surfaces(const supine_mesh *meshes, size_t count, supine_error *error) {
+  for (size_t m = 1; m < count; ++m) {
+    for (size_t i = 0; i < m; ++i) {
+      double box[2][2][3];
+      double apart = 0.0;
+      const double side[2] = {supine_mesh_box(&meshes[i], box[0][0], box[0][1]),
+                              supine_mesh_box(&meshes[m], box[1][0], box[1][1])};
+      for (size_t k = 0; k < 6; ++k) {
+        apart = fmax(apart, fabs(box[0][k / 3][k % 3] - box[1][k / 3][k % 3]));
+      }
+      if (apart <= same_box_share * fmax(side[0], side[1])) {
+        return supine_error_set(error, SUPINE_ERROR_MESH,
+                                "surfaces %zu and %zu fill the same box: give each lung once",
+                                i + 1, m + 1);
+      }
+      const bool first = side[0] < side[1];
+      if (side[!first] < least_side_share * side[first]) {
+        return supine_error_set(error, SUPINE_ERROR_MESH,
+                                "surface %zu is %.3g mm long beside %.3g mm: it was not read "
+                                "whole, is in other units, or does not belong here",
+                                first ? i + 1 : m + 1, side[!first], side[first]);
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Refuse a given midline that runs through a lung, or has both lungs on one side.
+ * @param two_sided  the surfaces are two lungs */
+static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
+  if (two_sided && lungs->lung_count < 2) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "the midline x = %g mm leaves both lungs on its %s side; they are "
+                            "parted at about %g",
+                            lungs->midline, supine_lungs_name(lungs, 0),
+                            0.5 * (lungs->minimum[0] + lungs->maximum[0]));
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    double inner = INFINITY; /* distances to the lung's own side of the midline */
+    double outer = -INFINITY;
+    for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
+      const double x = lungs->side[lung] * (lungs->mesh.vertices[3 * i] - lungs->midline);
+      inner = fmin(inner, x);
+      outer = fmax(outer, x);
+    }
+    if (-inner > most_beyond_share * outer) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "the midline x = %g mm runs through the %s lung, which reaches "
+                              "%.3g mm beyond it; give one between the lungs, or none",
+                              lungs->midline, supine_lungs_name(lungs, lung), -inner);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Reverse the triangles of each closed lung whose volume is negative. */
+static void face_outwards(supine_lungs *lungs) {
+  for (size_t lung = 0; lungs->topology.closed && lung < lungs->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(lungs, lung);
+    lungs->turned[lung] = supine_mesh_volume(&part) < 0.0;
+    if (lungs->turned[lung]) {
+      supine_mesh_reverse(&part);
+    }
+  }
+}
+
+/* Find the topology, the lungs' box, their midline and sides. */
+static supine_status measure(supine_lungs *lungs, const double *midline, supine_error *error) {
+  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+  const double low = lungs->minimum[0];
+  const double high = lungs->maximum[0];
+  for (int k = 0; k < 3; ++k) {
+    if (!(lungs->maximum[k] > lungs->minimum[k])) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "the surface has no extent along %c: a lung has three dimensions",
+                              "xyz"[k]);
+    }
+  }
+  supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
+  uint8_t *left = malloc(lungs->topology.component_count + 1);
+  double overlap = NAN;
+  if (status == SUPINE_OK && left != NULL) {
+    overlap = supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, 0.5 * (low + high), left);
+  }
+  lungs->midline = midline != NULL                       ? *midline
+                   : overlap < SUPINE_LUNGS_MOST_OVERLAP ? 0.5 * (low + high)
+                   : fabs(low) < fabs(high)              ? low
+                                                         : high;
+  if (isnan(overlap) ||
+      isnan(supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, left))) {
+    status =
+        supine_error_set(error, status != SUPINE_OK ? status : SUPINE_ERROR_MEMORY,
+                         "no memory for the edges of %zu triangles", lungs->mesh.triangle_count);
+  } else {
+    status = group(lungs, left, error);
+  }
+  if (status == SUPINE_OK && midline != NULL) {
+    status = check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error);
+  }
+  free(left);
+  return status;
+}
+
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
-  component *parts = NULL;
   supine_lungs made = {0};
-  supine_status status = SUPINE_OK;
   if (midline != NULL && !isfinite(*midline)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline must be finite");
   }
-  status = supine_lungs_check_surfaces(meshes, count, error);
-  if (status == SUPINE_OK) {
-    status = join(meshes, count, &made.mesh, error);
-  }
+  supine_status status = check_surfaces(meshes, count, error);
+  status = status == SUPINE_OK ? join(meshes, count, &made.mesh, error) : status;
+  status = status == SUPINE_OK ? measure(&made, midline, error) : status;
   if (status != SUPINE_OK) {
+    supine_lungs_free(&made);
     return status;
   }
-  supine_mesh_box(&made.mesh, made.minimum, made.maximum);
-  for (int k = 0; k < 3; ++k) {
-    if (!(made.maximum[k] > made.minimum[k])) {
-      status = supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the surface has no extent along %c: a lung has three dimensions",
-                                "xyz"[k]);
-      goto cleanup;
-    }
-  }
-  status = supine_mesh_topology_create(&made.mesh, &made.topology);
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "no memory for the edges of %zu triangles",
-                           made.mesh.triangle_count);
-    goto cleanup;
-  }
-  parts = measure_components(&made.mesh, &made.topology);
-  if (parts == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu components",
-                              made.topology.component_count);
-    goto cleanup;
-  }
-  const double centre = 0.5 * (made.minimum[0] + made.maximum[0]);
-  const bool sides =
-      two_sided(parts, made.topology.component_count, made.mesh.vertex_count, centre);
-  if (midline != NULL) {
-    made.midline = *midline;
-  } else if (sides) {
-    made.midline = centre;
-  } else {
-    made.midline =
-        fabs(made.minimum[0]) < fabs(made.maximum[0]) ? made.minimum[0] : made.maximum[0];
-  }
-  if (!grouped(&made, parts)) {
-    status = group(&made, parts, error);
-    if (status != SUPINE_OK) {
-      goto cleanup;
-    }
-  }
-  status = midline == NULL ? SUPINE_OK : supine_lungs_check_midline(&made, sides, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  supine_lungs_face_outwards(&made);
+  face_outwards(&made);
   *lungs = made;
-  made = (supine_lungs){0};
-cleanup:
-  free(parts);
-  supine_lungs_free(&made);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_lungs_free(supine_lungs *lungs) {

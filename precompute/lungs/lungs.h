@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The lungs of one model: surfaces joined, told left from right, and measured once. */
+ * The lungs of one model: surfaces joined, left told from right, measured. */
 #ifndef SUPINE_LUNGS_H
 #define SUPINE_LUNGS_H
 
 #include "mesh/mesh.h"
 
 /** One or two lungs as a single surface whose vertices and triangles are grouped by lung, in the
- * order of the input within each. Where both lungs are there, the left is lung 0. */
+ * order of the input within each. Of two lungs the left is lung 0. */
 typedef struct supine_lungs {
   supine_mesh mesh;
   supine_topology topology;
@@ -15,22 +15,22 @@ typedef struct supine_lungs {
   size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
   size_t triangle_begin[3]; /**< likewise its triangles */
   int side[2];              /**< +1 left, -1 right */
-  bool turned[2];           /**< its triangles faced inwards and were turned round */
+  bool turned[2];           /**< its triangles faced inwards and were reversed */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
-  double *scanned; /**< [N, 3] vertices as scanned where `mesh` was taken from there to full
+  double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
                         inflation (reference.h); else NULL */
   double midline;  /**< x of the sagittal plane that X is measured from, mm */
 } supine_lungs;
 
-/** Joins surfaces into a model.
+/** Join surfaces into a model.
  *
  * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
  * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one. A closed lung whose triangles face inwards is
- * turned round.
+ * and the face of the box nearest x = 0 for one. The triangles of
+ * a closed lung that face inwards are reversed.
  *
- * @param meshes   [count] left as they are
+ * @param meshes   [count] not changed
  * @param midline  mm, or NULL to find it; given, it alone decides who is left and who is right
  * @param lungs    written on success; release with supine_lungs_free
  * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
@@ -41,23 +41,34 @@ typedef struct supine_lungs {
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
 
-/** Frees the arrays; a zeroed struct is legal. */
+/** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);
 
-/** "left" or "right". */
+/** Largest overlap of two lungs along an axis as a share of the narrower; that of lobes is more. */
+#define SUPINE_LUNGS_MOST_OVERLAP 0.5
+
+/** Sort connected components to the two sides of `middle` along an axis, by the mean of their
+ * vertices.
+ * @param above  [components] written: whether the mean is above `middle`
+ * @return overlap of the sides' significant components as a share of the narrower side; INFINITY if
+ *         one side has none, NAN if out of memory */
+double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
+                          double middle, uint8_t *above);
+
+/** Name a lung: "left" or "right". */
 static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lung) {
   return lungs->side[lung] > 0 ? "left" : "right";
 }
 
-/** One lung as a mesh that shares the arrays; its triangles index all vertices. */
+/** Return one lung as a mesh that shares the arrays; its triangles index all vertices. */
 static inline supine_mesh supine_lungs_part(const supine_lungs *lungs, size_t lung) {
   const size_t begin = lungs->triangle_begin[lung];
   return (supine_mesh){lungs->mesh.vertex_count, lungs->mesh.vertices,
                        lungs->triangle_begin[lung + 1] - begin, lungs->mesh.triangles + 3 * begin};
 }
 
-/** The box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the back to
- * the front, Z from the apex to the base. */
+/** Compute the box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the
+ * back to the front, Z from the apex to the base. */
 void supine_lungs_box_coordinates(const supine_lungs *lungs, size_t vertex, double box[3]);
 
 #endif

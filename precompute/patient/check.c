@@ -132,7 +132,7 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   measure(pairs, &s);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
-    if (supine_mesh_unit_check(s.side[state], 1.0, &unit) > 0.0) {
+    if (!supine_mesh_unit_is_likely(s.side[state], &unit)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "the points %s extend over %.3g: no lung in mm%s%s; landmarks are in "
                               "mm, spread over the lungs",

@@ -17,17 +17,9 @@ static int read_axes(const char *command, const char *text, void *field) {
 static int read_units(const char *command, const char *text, void *field) {
   double *millimetres = field;
   (void)command;
-  static const struct {
-    const char *name;
-    double millimetres;
-  } units[] = {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}};
-  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
-    if (strcmp(text, units[i].name) == 0) {
-      *millimetres = units[i].millimetres;
-      return SUPINE_EXIT_OK;
-    }
-  }
-  return supine_options_fits(supine_options_parse_number(text, millimetres) && *millimetres > 0.0);
+  return supine_options_fits(
+      supine_mesh_unit_find(text, millimetres) ||
+      (supine_options_parse_number(text, millimetres) && *millimetres > 0.0));
 }
 
 const supine_option supine_options_surface_frame[] = {
