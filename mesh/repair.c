@@ -1,88 +1,32 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair small defects of surfaces: duplicate, loose and reversed triangles, touching surfaces. */
+/* Repair small defects of surfaces: duplicate, loose and reversed triangles, touching surfaces,
+ * specks. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/vec3.h"
 
 #include "mesh/repair.h"
+#include "mesh/sides.h"
 
 /* Largest share of loose triangles that is dropped. */
 static const double few = 0.01;
-
-/* One side of a triangle. */
-typedef struct side {
-  uint32_t low, high;
-  uint32_t at; /* 3 * triangle + first corner */
-} side;
 
 typedef struct links {
   uint32_t *parent; /* [triangles] */
   uint8_t *turned;  /* faces against its parent */
 } links;
 
-static int compare_sides(const void *left, const void *right) {
-  const side *a = left;
-  const side *b = right;
-  return a->low != b->low ? (a->low > b->low) - (a->low < b->low)
-                          : (a->high > b->high) - (a->high < b->high);
-}
-
-/* Sort the sides by edge; NULL if out of memory. */
-static side *sort_sides(const supine_mesh *mesh) {
-  const size_t count = 3 * mesh->triangle_count;
-  uint32_t *first = calloc(mesh->vertex_count + 2, sizeof *first);
-  side *sides = malloc((count + 1) * sizeof *sides);
-  if (first == NULL || sides == NULL) {
-    free(first);
-    free(sides);
-    return NULL;
-  }
-  for (int pass = 0; pass < 2; ++pass) { /* count, then place */
-    for (size_t i = 0; i < count; ++i) {
-      const uint32_t a = mesh->triangles[i];
-      const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
-      const uint32_t low = a < b ? a : b;
-      if (pass == 0) {
-        ++first[low + 1];
-      } else {
-        sides[first[low]++] = (side){low, a < b ? b : a, (uint32_t)i};
-      }
-    }
-    for (size_t v = 0; pass == 0 && v < mesh->vertex_count; ++v) {
-      first[v + 1] += first[v];
-    }
-  }
-  for (size_t i = 0; i < count;) { /* sort each vertex's sides by the other end */
-    size_t end = i + 1;
-    while (end < count && sides[end].low == sides[i].low) {
-      ++end;
-    }
-    qsort(sides + i, end - i, sizeof *sides, compare_sides);
-    i = end;
-  }
-  free(first);
-  return sides;
-}
-
-/* Count the sides of the edge that begins at i. */
-static size_t edge_size(const side *sides, size_t i, size_t count) {
-  size_t size = 1;
-  while (i + size < count && compare_sides(&sides[i], &sides[i + size]) == 0) {
-    ++size;
-  }
-  return size;
-}
-
-static uint32_t opposite(const supine_mesh *mesh, const side *s) {
+static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
 
 /* Mark triangles with the same three corners as an earlier one. */
-static void mark_duplicates(const supine_mesh *mesh, const side *sides, uint8_t *drop) {
+static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
-  for (size_t i = 0; i < count; i += edge_size(sides, i, count)) {
-    const size_t size = edge_size(sides, i, count);
+  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
+    const size_t size = supine_mesh_sides_of_edge(sides, i, count);
     for (size_t b = 1; b < size; ++b) {
       for (size_t a = 0; a < size; ++a) {
         if (sides[i + a].at / 3 < sides[i + b].at / 3 &&
@@ -95,12 +39,12 @@ static void mark_duplicates(const supine_mesh *mesh, const side *sides, uint8_t 
 }
 
 /* Mark faces that share no edge with exactly one other face. */
-static void mark_loose(const supine_mesh *mesh, const side *sides, uint8_t *drop) {
+static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
   memset(drop, 1, mesh->triangle_count);
-  for (size_t i = 0; i < count; i += edge_size(sides, i, count)) {
-    const size_t size = edge_size(sides, i, count);
+  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
+    const size_t size = supine_mesh_sides_of_edge(sides, i, count);
     for (size_t s = 0; size == 2 && s < size; ++s) {
       loose -= drop[sides[i + s].at / 3];
       drop[sides[i + s].at / 3] = 0;
@@ -146,7 +90,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
 }
 
 /* Link triangles over edges of two; false if they form a one-sided surface. */
-static bool link_triangles(const supine_mesh *mesh, const side *sides, const links *l,
+static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
                            bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
   bool sound = true;
@@ -155,13 +99,13 @@ static bool link_triangles(const supine_mesh *mesh, const side *sides, const lin
     l->parent[t] = t;
     l->turned[t] = 0;
   }
-  for (size_t i = 0; i < count; i += edge_size(sides, i, count)) {
-    const size_t size = edge_size(sides, i, count);
+  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
+    const size_t size = supine_mesh_sides_of_edge(sides, i, count);
     *closed = *closed && size % 2 == 0;
     if (size != 2) {
       continue;
     }
-    const side *s = &sides[i];
+    const supine_mesh_side *s = &sides[i];
     const bool same =
         (mesh->triangles[s[0].at] == s[0].low) == (mesh->triangles[s[1].at] == s[1].low);
     uint8_t turned[2];
@@ -203,61 +147,43 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
 /* Give each surface its own vertices where several meet in one. */
 static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *parted) {
   const size_t corners = 3 * mesh->triangle_count;
-  uint32_t *owner = malloc((mesh->vertex_count + 1) * sizeof *owner);
-  struct {
-    uint32_t vertex, root;
-  } *copies = NULL;
-  size_t copy_count = 0;
-  size_t room = 0;
-  supine_status status = owner == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (size_t v = 0; status == SUPINE_OK && v < mesh->vertex_count; ++v) {
-    owner[v] = UINT32_MAX;
+  size_t count = mesh->vertex_count;
+  uint32_t *owner = malloc((count + corners + 1) * sizeof *owner); /* surface of each vertex */
+  uint32_t *next = calloc(count + corners + 1, sizeof *next); /* next copy of a vertex; 0: none */
+  supine_status status = owner == NULL || next == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  if (status == SUPINE_OK) {
+    memset(owner, 0xFF, (count + corners) * sizeof *owner); /* UINT32_MAX: none yet */
   }
-  for (size_t i = 0; status == SUPINE_OK && i < corners; ++i) {
-    const uint32_t v = mesh->triangles[i];
+  for (size_t i = 0; i < corners && status == SUPINE_OK; ++i) {
     uint8_t turned;
     const uint32_t root = find_root(l, (uint32_t)(i / 3), &turned);
-    owner[v] = owner[v] == UINT32_MAX ? root : owner[v];
-    if (owner[v] == root) {
-      continue;
+    uint32_t v = mesh->triangles[i];
+    while (owner[v] != UINT32_MAX && owner[v] != root) {
+      next[v] = next[v] == 0 ? (uint32_t)count++ : next[v];
+      v = next[v];
     }
-    size_t c = 0; /* few vertices are shared */
-    while (c < copy_count && (copies[c].vertex != v || copies[c].root != root)) {
-      ++c;
-    }
-    if (c == room) {
-      room = 2 * room + 16;
-      void *grown = realloc(copies, room * sizeof *copies);
-      if (grown == NULL) {
-        status = SUPINE_ERROR_MEMORY;
-        break;
-      }
-      copies = grown;
-    }
-    if (c == copy_count) {
-      copies[copy_count].vertex = v;
-      copies[copy_count++].root = root;
-    }
-    mesh->triangles[i] = (uint32_t)(mesh->vertex_count + c);
+    owner[v] = root;
+    mesh->triangles[i] = v;
   }
-  if (status == SUPINE_OK && copy_count > 0) {
-    double *grown = realloc(mesh->vertices, 3 * (mesh->vertex_count + copy_count) * sizeof *grown);
+  *parted = count - mesh->vertex_count;
+  if (status == SUPINE_OK && *parted > 0) {
+    double *grown = realloc(mesh->vertices, 3 * count * sizeof *grown);
     status = grown == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-    for (size_t c = 0; grown != NULL && c < copy_count; ++c) {
-      mesh->vertices = grown;
-      memcpy(grown + 3 * (mesh->vertex_count + c), grown + 3 * (size_t)copies[c].vertex,
-             3 * sizeof *grown);
+    mesh->vertices = grown != NULL ? grown : mesh->vertices;
+    for (size_t v = 0; v < mesh->vertex_count && status == SUPINE_OK; ++v) {
+      for (size_t c = next[v]; c != 0; c = next[c]) {
+        memcpy(grown + 3 * c, grown + 3 * v, 3 * sizeof *grown);
+      }
     }
-    mesh->vertex_count += status == SUPINE_OK ? copy_count : 0;
+    mesh->vertex_count = count;
   }
-  *parted = status == SUPINE_OK ? copy_count : 0;
   free(owner);
-  free(copies);
+  free(next);
   return status;
 }
 
 /* Reverse and separate linked triangles. */
-static supine_status mend_links(supine_mesh *mesh, const side *sides,
+static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;
   links l = {malloc((n + 1) * sizeof(uint32_t)), malloc(n + 1)};
@@ -280,11 +206,11 @@ static supine_status mend_links(supine_mesh *mesh, const side *sides,
 }
 
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report) {
-  typedef void marker(const supine_mesh *mesh, const side *sides, uint8_t *drop);
+  typedef void marker(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop);
   static marker *const markers[] = {mark_duplicates, mark_loose};
   size_t *const counts[] = {&report->duplicates, &report->loose};
   uint8_t *drop = calloc(mesh->triangle_count + 1, 1);
-  side *sides = sort_sides(mesh);
+  supine_mesh_side *sides = supine_mesh_sides_sort(mesh);
   *report = (supine_mesh_repair_report){0};
   supine_status status = drop == NULL || sides == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   for (size_t m = 0; m < 2 && status == SUPINE_OK; ++m) {
@@ -292,7 +218,7 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
     *counts[m] = drop_marked(mesh, drop);
     if (*counts[m] > 0) {
       free(sides);
-      sides = sort_sides(mesh);
+      sides = supine_mesh_sides_sort(mesh);
       status = sides == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
     }
   }
@@ -304,92 +230,81 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
   return status;
 }
 
-/* Find the absolute volume of each piece, mm^3, about its own first vertex. */
-static double *piece_volumes(const supine_mesh *mesh, const supine_topology *topology) {
-  const size_t pieces = topology->component_count;
-  double *volume = calloc(pieces + 1, sizeof *volume);
-  uint32_t *first = malloc((pieces + 1) * sizeof *first);
-  for (size_t i = mesh->vertex_count; volume != NULL && first != NULL && i-- > 0;) {
-    first[topology->component[i]] = (uint32_t)i;
+size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
+  const size_t corners = 3 * mesh->triangle_count;
+  size_t kept = 0;
+  memset(space, 0, mesh->vertex_count * sizeof *space);
+  for (size_t c = 0; c < corners; ++c) {
+    space[mesh->triangles[c]] = 1;
   }
-  for (size_t t = 0; volume != NULL && first != NULL && t < mesh->triangle_count; ++t) {
-    const uint32_t piece = topology->component[mesh->triangles[3 * t]];
-    const double *origin = mesh->vertices + 3 * (size_t)first[piece];
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    if (space[i] != 0) {
+      memmove(mesh->vertices + 3 * kept, mesh->vertices + 3 * i, 3 * sizeof *mesh->vertices);
+      space[i] = (uint32_t)kept++;
+    }
+  }
+  for (size_t c = 0; c < corners; ++c) {
+    mesh->triangles[c] = space[mesh->triangles[c]];
+  }
+  const size_t dropped = mesh->vertex_count - kept;
+  mesh->vertex_count = kept;
+  return dropped;
+}
+
+typedef struct piece {
+  double volume;  /* mm^3, about its first vertex */
+  uint32_t first; /* vertex */
+} piece;
+
+static void find_volumes(const supine_mesh *mesh, const supine_topology *topology, piece *pieces) {
+  for (size_t i = mesh->vertex_count; i-- > 0;) {
+    pieces[topology->component[i]].first = (uint32_t)i;
+  }
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    piece *of = &pieces[topology->component[mesh->triangles[3 * t]]];
+    const double *origin = mesh->vertices + 3 * (size_t)of->first;
     double corner[3][3];
     for (size_t k = 0; k < 9; ++k) {
       corner[k / 3][k % 3] =
           mesh->vertices[3 * (size_t)mesh->triangles[3 * t + k / 3] + k % 3] - origin[k % 3];
     }
-    volume[piece] += supine_triple(corner[0], corner[1], corner[2]) / 6.0;
+    of->volume += supine_triple(corner[0], corner[1], corner[2]) / 6.0;
   }
-  if (first == NULL) {
-    free(volume);
-    volume = NULL;
-  }
-  for (size_t p = 0; volume != NULL && p < pieces; ++p) {
-    volume[p] = fabs(volume[p]);
-  }
-  free(first);
-  return volume;
-}
-
-/* Keep the vertices and triangles of the pieces in `kept`, in order. */
-static supine_status keep_pieces(supine_mesh *mesh, const supine_topology *topology,
-                                 const bool *kept) {
-  uint32_t *place = malloc((mesh->vertex_count + 1) * sizeof *place);
-  size_t count = 0;
-  if (place == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    if (kept[topology->component[i]]) {
-      memmove(mesh->vertices + 3 * count, mesh->vertices + 3 * i, 3 * sizeof(double));
-      place[i] = (uint32_t)count++;
-    }
-  }
-  size_t triangles = 0;
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *corner = mesh->triangles + 3 * t;
-    if (kept[topology->component[corner[0]]]) {
-      for (size_t k = 0; k < 3; ++k) {
-        mesh->triangles[3 * triangles + k] = place[corner[k]];
-      }
-      ++triangles;
-    }
-  }
-  mesh->vertex_count = count;
-  mesh->triangle_count = triangles;
-  free(place);
-  return SUPINE_OK;
 }
 
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks) {
   supine_topology topology = {0};
   supine_status status = supine_mesh_topology_create(mesh, &topology);
-  *pieces = topology.component_count;
-  *specks = 0;
-  if (status != SUPINE_OK || topology.component_count < 2) {
-    supine_mesh_topology_free(&topology);
-    return status;
-  }
-  double *volume = piece_volumes(mesh, &topology);
-  bool *kept = calloc(topology.component_count, sizeof *kept);
+  const size_t count = topology.component_count;
+  piece *found = calloc(count + 1, sizeof *found);
+  uint8_t *drop = malloc(mesh->triangle_count + 1);
   double whole = 0.0;
-  status = volume == NULL || kept == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (size_t p = 0; status == SUPINE_OK && p < topology.component_count; ++p) {
-    whole += volume[p];
+  *pieces = count;
+  *specks = 0;
+  if (status == SUPINE_OK && (found == NULL || drop == NULL)) {
+    status = SUPINE_ERROR_MEMORY;
   }
-  for (size_t p = 0; status == SUPINE_OK && p < topology.component_count; ++p) {
-    kept[p] = volume[p] >= share * whole;
-    *specks += !kept[p];
+  if (status == SUPINE_OK && count > 1) {
+    find_volumes(mesh, &topology, found);
+    for (size_t p = 0; p < count; ++p) {
+      whole += fabs(found[p].volume);
+    }
+    for (size_t t = 0; t < mesh->triangle_count; ++t) {
+      const piece *of = &found[topology.component[mesh->triangles[3 * t]]];
+      drop[t] = fabs(of->volume) < share * whole;
+    }
+    for (size_t p = 0; p < count; ++p) {
+      *specks += fabs(found[p].volume) < share * whole;
+    }
   }
-  if (status == SUPINE_OK && *specks > 0) {
+  if (*specks > 0) {
     *pieces -= *specks;
-    status = keep_pieces(mesh, &topology, kept);
+    (void)drop_marked(mesh, drop);
+    (void)supine_mesh_drop_unreferenced(mesh, topology.component);
   }
-  free(kept);
-  free(volume);
+  free(found);
+  free(drop);
   supine_mesh_topology_free(&topology);
   return status;
 }

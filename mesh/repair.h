@@ -16,6 +16,10 @@ typedef struct supine_mesh_repair_report {
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
+/** Drop vertices in no triangle, keeping the order of the others; return how many.
+ * @param space  [vertex_count] overwritten */
+size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
+
 /** Drop connected pieces with a volume below this share of all pieces' volume.
  * @param pieces  written: number kept
  * @param specks  written: number dropped

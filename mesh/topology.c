@@ -1,104 +1,93 @@
 /* SPDX-License-Identifier: MIT */
 /* Find edges by sorting the triangles' sides, and components by joining their ends. */
 #include <stdlib.h>
-#include <string.h>
 
-#include "mesh/mesh.h"
+#include "mesh/sides.h"
 
 enum { FEW = 24 }; /* most sides that insertion sort sorts faster than qsort */
 
-/* The triangles' sides, sorted: those with lower end a are at first[a] <= s < first[a + 1], each
- * as 2 * (higher end) + (1 if the triangle runs from the higher end to the lower). */
-typedef struct side_table {
-  uint32_t *first; /* [vertex_count + 2] */
-  uint32_t *sides; /* [3 * triangle_count] */
-} side_table;
-
 static int compare_sides(const void *left, const void *right) {
-  const uint32_t a = *(const uint32_t *)left;
-  const uint32_t b = *(const uint32_t *)right;
-  return (a > b) - (a < b);
+  const supine_mesh_side *a = left;
+  const supine_mesh_side *b = right;
+  return a->high != b->high ? (a->high > b->high) - (a->high < b->high)
+                            : (a->at > b->at) - (a->at < b->at);
 }
 
-static void sort_sides(uint32_t *sides, size_t count) {
+/* Sort sides of one lower end. */
+static void sort_sides(supine_mesh_side *sides, size_t count) {
   if (count > FEW) {
     qsort(sides, count, sizeof *sides, compare_sides);
     return;
   }
-  for (size_t i = 1; i < count; ++i) {
-    const uint32_t side = sides[i];
+  for (size_t i = 1; i < count; ++i) { /* insertion; equal ends keep their order */
+    const supine_mesh_side side = sides[i];
     size_t j = i;
-    for (; j > 0 && sides[j - 1] > side; --j) {
+    for (; j > 0 && sides[j - 1].high > side.high; --j) {
       sides[j] = sides[j - 1];
     }
     sides[j] = side;
   }
 }
 
-/* Sort by the lower end with a counting sort, then each vertex's sides by the higher. */
-static void sides_fill(const supine_mesh *mesh, const side_table *table) {
-  const size_t triangles = mesh->triangle_count;
-  uint32_t *next = table->first + 1; /* next[a] moves from the beginning of a's sides to their
-                                      * end */
-  for (size_t t = 0; t < triangles; ++t) {
-    const uint32_t *v = mesh->triangles + 3 * t;
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t a = v[k];
-      const uint32_t b = v[(k + 1) % 3];
-      ++next[(size_t)(a < b ? a : b) + 1];
-    }
+supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
+  const size_t count = 3 * mesh->triangle_count;
+  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* place of a vertex's next side */
+  supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
+  if (next == NULL || sides == NULL) {
+    free(next);
+    free(sides);
+    return NULL;
   }
-  for (size_t i = 1; i <= mesh->vertex_count; ++i) {
-    next[i] += next[i - 1];
-  }
-  for (size_t t = 0; t < triangles; ++t) {
-    const uint32_t *v = mesh->triangles + 3 * t;
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t a = v[k];
-      const uint32_t b = v[(k + 1) % 3];
-      if (a < b) {
-        table->sides[next[a]++] = 2 * b;
+  for (int pass = 0; pass < 2; ++pass) { /* count, then place */
+    for (size_t i = 0; i < count; ++i) {
+      const uint32_t a = mesh->triangles[i];
+      const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
+      const uint32_t low = a < b ? a : b;
+      if (pass == 0) {
+        ++next[low + 1];
       } else {
-        table->sides[next[b]++] = 2 * a + 1;
+        sides[next[low]++] = (supine_mesh_side){low, a < b ? b : a, (uint32_t)i};
       }
     }
+    for (size_t v = 0; pass == 0 && v < mesh->vertex_count; ++v) {
+      next[v + 1] += next[v];
+    }
   }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    sort_sides(table->sides + table->first[i], table->first[i + 1] - table->first[i]);
+  for (size_t v = 0, begin = 0; v < mesh->vertex_count; begin = next[v++]) {
+    sort_sides(sides + begin, next[v] - begin);
   }
+  free(next);
+  return sides;
 }
 
-/* Count the sides from s on that belong to one edge. */
-static size_t edge_sides(const side_table *table, size_t s, size_t stop) {
-  size_t count = 1;
-  while (s + count < stop && table->sides[s + count] / 2 == table->sides[s] / 2) {
-    ++count;
+size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count) {
+  size_t size = 1;
+  while (i + size < count && sides[i + size].low == sides[i].low &&
+         sides[i + size].high == sides[i].high) {
+    ++size;
   }
-  return count;
+  return size;
 }
 
-static void edges_count(const supine_mesh *mesh, const side_table *table,
+/* Count the edges, by the number and direction of their sides. */
+static void edges_count(const supine_mesh *mesh, const supine_mesh_side *sides,
                         supine_topology *topology) {
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    const size_t stop = table->first[i + 1];
-    for (size_t s = table->first[i]; s < stop;) {
-      const size_t sides = edge_sides(table, s, stop);
-      ++topology->edge_count;
-      topology->boundary_edges += sides == 1;
-      topology->non_manifold_edges += sides > 2;
-      topology->inconsistent_edges += sides == 2 && table->sides[s] == table->sides[s + 1];
-      s += sides;
-    }
+  const size_t count = 3 * mesh->triangle_count;
+  for (size_t i = 0, size = 0; i < count; i += size) {
+    const supine_mesh_side *s = &sides[i];
+    size = supine_mesh_sides_of_edge(sides, i, count);
+    ++topology->edge_count;
+    topology->boundary_edges += size == 1;
+    topology->non_manifold_edges += size > 2;
+    topology->inconsistent_edges +=
+        size == 2 && mesh->triangles[s[0].at] == mesh->triangles[s[1].at];
   }
 }
 
-static void edges_fill(const supine_mesh *mesh, const side_table *table, uint32_t *edges) {
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    const size_t stop = table->first[i + 1];
-    for (size_t s = table->first[i]; s < stop; s += edge_sides(table, s, stop)) {
-      *edges++ = (uint32_t)i;
-      *edges++ = table->sides[s] / 2;
-    }
+static void edges_fill(const supine_mesh_side *sides, size_t count, uint32_t *edges) {
+  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
+    *edges++ = sides[i].low;
+    *edges++ = sides[i].high;
   }
 }
 
@@ -146,19 +135,17 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
   }
   supine_status status = SUPINE_ERROR_MEMORY;
   supine_topology result = {0};
-  side_table table = {.first = calloc(vertices + 2, sizeof *table.first),
-                      .sides = malloc((3 * mesh->triangle_count + 1) * sizeof *table.sides)};
-  if (table.first == NULL || table.sides == NULL) {
+  supine_mesh_side *sides = supine_mesh_sides_sort(mesh);
+  if (sides == NULL) {
     goto cleanup;
   }
-  sides_fill(mesh, &table);
-  edges_count(mesh, &table, &result);
+  edges_count(mesh, sides, &result);
   result.edges = malloc((2 * result.edge_count + 1) * sizeof *result.edges);
   result.component = malloc((vertices + 1) * sizeof *result.component);
   if (result.edges == NULL || result.component == NULL) {
     goto cleanup;
   }
-  edges_fill(mesh, &table, result.edges);
+  edges_fill(sides, 3 * mesh->triangle_count, result.edges);
   components_find(vertices, &result);
 
   result.euler_characteristic =
@@ -173,8 +160,7 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
 
 cleanup:
   supine_mesh_topology_free(&result);
-  free(table.sides);
-  free(table.first);
+  free(sides);
   return status;
 }
 

@@ -92,24 +92,24 @@ static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
   static const struct {
     const char *text, *line, *detail;
   } bad[] = {
-      {"a\n1\n-2\n3\n", ":3:", "-2 of vertex 1 must be positive"},
-      {"a\n1\n0\n3\n", ":3:", "0 of vertex 1 must be positive"},
+      {"a\n1\n-2\n3\n", ":3:", "-2 of vertex 1 is not positive"},
+      {"a\n1\n0\n3\n", ":3:", "0 of vertex 1 is not positive"},
       {"a\n1\nnan\n3\n", ":3:", "\"nan\" is not a finite number"},
       {"a\n1\n1e999\n3\n", ":3:", "\"1e999\" is not a finite number"},
       {"a\n1\n1e-320\n3\n", ":3:", "vertex 1"},
       {"a\n1\n2\n", "", "vertex 2 of 3 has no expandability"},
-      {"a\n1\n2\n3\n4\n", ":5:", "vertex 3 is none of the model's"},
+      {"a\n1\n2\n3\n4\n", ":5:", "vertex 3 is not in the model"},
       {"a\n1\ntwo\n3\n", ":3:", "\"two\" is not a finite number"},
       {"a\n1\n2 2\n3\n", ":3:", "\"2 2\" is not"},
       {"1\n2\n3\n", ":1:", "header"},
       {"", "", "empty"},
       {"vertex,a\n0,1\n2,1\n", "", "vertex 1 of 3 has no"},
-      {"vertex,a\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 is there already"},
-      {"vertex,a\n0,1\n7,1\n", ":3:", "vertex 7 is none"},
+      {"vertex,a\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 was given before"},
+      {"vertex,a\n0,1\n7,1\n", ":3:", "vertex 7 is not in"},
       {"vertex,a\n0,1\n-1,1\n", ":3:", "'-1'"},
       {"vertex,a\n0,1\n1;1\n", ":3:", "1 fields, but the header has 2"},
-      {"vertex,a\n0,1\n99999999999999999999,1\n", ":3:", "not a number"},
-      {"vertex,a\n0,1\n1,-4\n", ":3:", "-4 of vertex 1 must"},
+      {"vertex,a\n0,1\n99999999999999999999,1\n", ":3:", "not the number"},
+      {"vertex,a\n0,1\n1,-4\n", ":3:", "-4 of vertex 1 is not positive"},
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     double a[3];

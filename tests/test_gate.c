@@ -222,7 +222,7 @@ static void test_gate_duplicate_loose_reversed_triangles_mended(void **state) {
   assert_int_equal(out.status, SUPINE_OK);
   expect_said(&out, "dropped 5 duplicate triangles");
   expect_said(&out, "dropped 1 loose triangle\n");
-  expect_said(&out, "turned 7 reversed triangles");
+  expect_said(&out, "reversed 7 triangles");
   assert_int_equal(out.lungs.mesh.triangle_count, before.triangle_count);
   assert_memory_equal(out.lungs.mesh.triangles, before.triangles, 12 * before.triangle_count);
   assert_true(out.lungs.topology.closed);
@@ -246,7 +246,7 @@ static void test_gate_many_pieces_warned_of(void **state) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  expect_said(&out, "warning: 8 pieces; remove what is no lung");
+  expect_said(&out, "warning: 8 pieces; remove those that are no lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }

@@ -126,7 +126,7 @@ static void test_solve_bad_expandability_file_names_vertex(void **state) {
   (void)state;
   test_write(csv, "expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
-  assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 must be positive"));
+  assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 is not positive"));
   test_write(csv, "expandability\n1\n1\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "vertex 2 of"));

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "mesh/io/read.h"
+#include "mesh/repair.h"
 
 static const uint32_t free_slot = UINT32_MAX;
 
@@ -60,28 +61,6 @@ static size_t drop_degenerate(supine_mesh *mesh, const uint32_t *remap) {
   return kept;
 }
 
-static size_t drop_unreferenced(supine_mesh *mesh, uint32_t *remap) {
-  const size_t corners = 3 * mesh->triangle_count;
-  memset(remap, 0, mesh->vertex_count * sizeof *remap);
-  for (size_t c = 0; c < corners; ++c) {
-    remap[mesh->triangles[c]] = 1;
-  }
-  size_t kept = 0;
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    if (remap[i] != 0) {
-      memmove(mesh->vertices + 3 * kept, mesh->vertices + 3 * i, 3 * sizeof *mesh->vertices);
-      remap[i] = (uint32_t)kept;
-      ++kept;
-    }
-  }
-  if (kept < mesh->vertex_count) {
-    for (size_t c = 0; c < corners; ++c) {
-      mesh->triangles[c] = remap[mesh->triangles[c]];
-    }
-  }
-  return kept;
-}
-
 supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   size_t slot_count = 16;
   while (slot_count < 2 * mesh->vertex_count) {
@@ -101,9 +80,7 @@ supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   kept = drop_degenerate(mesh, remap);
   report->degenerate_faces += mesh->triangle_count - kept;
   mesh->triangle_count = kept;
-  kept = drop_unreferenced(mesh, remap);
-  report->unreferenced_vertices += mesh->vertex_count - kept;
-  mesh->vertex_count = kept;
+  report->unreferenced_vertices += supine_mesh_drop_unreferenced(mesh, remap);
   status = SUPINE_OK;
 
 cleanup:
