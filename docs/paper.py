@@ -99,9 +99,9 @@ lungs of {best['vertices']:,} vertices.
 | (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
 | (15)-(17), directions | `--law`, `--direction`, `supine fit` | {best['direction_constants']} | **Table I is lost**: these are fits to ten patients' 4-D CT (DIR-Lab); `supine fit` finds a person's own |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | `deep` turns only a part of the gradient with gravity |
-| Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn in software where there is no GPU |
+| Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn by the processor |
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as (5), (6) | |
-| IV, Fig. 8, a plane | the same, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement | |
+| IV, Fig. 8, a plane | the same, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, to the nine digits written | |
 | IV, Fig. 9, a ring, a third of it stiffer | the same, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} uniform, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} four times | |
 | IV-B, expandability from displacement | `supine fit --expandability` | a known law comes back (`test_inverse`, `test_patient_expand`) | regions instead of single vertices: surfaces cannot tell more |
 | IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | `tests/FIGURES.md`: larger breaths of other people | |
