@@ -5,18 +5,11 @@
 #include <string.h>
 
 #include "precompute/normals/polynomial.h"
-#include "sh/base/clones.h"
 
-enum { SIDES = SUPINE_NORMALS_FIELD_MAX + 1, PADDED = (SIDES + 7) / 8 * 8 };
+enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Two sides of a triangle, by axis: of the reference surface first, then by how much each mode
- * changes them. */
-typedef struct sides {
-  double a[3][SIDES];
-  double b[3][SIDES];
-} sides;
-
-/* Where the product of columns k and l is, of the axes a and b. Column 0 is the reference. */
+/* Find the place of the product of columns k, along axis a, and l, along axis b. Column 0 is the
+ * reference position. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
@@ -45,99 +38,101 @@ void supine_normals_monomials(size_t modes, const double *weights, const double 
   }
 }
 
-/* Reference position and displacements of a vertex along one axis. */
-static void read_vertex(const supine_normals_surface *s, size_t i, size_t axis, double *out) {
+supine_status supine_normals_fans_create(const supine_normals_surface *surface,
+                                         supine_normals_fans *fans) {
+  const size_t corners = 3 * surface->triangle_count;
+  fans->begin = calloc(surface->vertex_count + 2, sizeof *fans->begin);
+  fans->corner = malloc(corners * sizeof *fans->corner);
+  if (fans->begin == NULL || fans->corner == NULL) {
+    supine_normals_fans_free(fans);
+    return SUPINE_ERROR_MEMORY;
+  }
+  uint32_t *next = fans->begin + 1; /* next[i] moves from the beginning of i's fan to its end */
+  for (size_t s = 0; s < corners; ++s) {
+    ++next[surface->triangles[s] + 1];
+  }
+  for (size_t i = 1; i <= surface->vertex_count; ++i) {
+    next[i] += next[i - 1];
+  }
+  for (size_t s = 0; s < corners; ++s) {
+    fans->corner[next[surface->triangles[s]]++] = (uint32_t)s;
+  }
+  return SUPINE_OK;
+}
+
+void supine_normals_fans_free(supine_normals_fans *fans) {
+  free(fans->begin);
+  free(fans->corner);
+  *fans = (supine_normals_fans){0};
+}
+
+/* Read the reference position of a vertex and its displacement by each mode, [3, COLUMNS], less
+ * those of its neighbour. */
+static void read_side(const supine_normals_surface *s, size_t from, size_t to,
+                      double (*side)[COLUMNS]) {
   const size_t modes = s->mode_count;
-  const float *c = s->coefficients + (s->directions == NULL ? (3 * i + axis) * modes : i * modes);
-  const double d = s->directions == NULL ? 1.0 : (double)s->directions[3 * i + axis];
-  out[0] = (double)s->vertices[3 * i + axis];
-  for (size_t k = 0; k < modes; ++k) {
-    out[k + 1] = (double)c[k] * d;
-  }
-}
-
-static void read_sides(const supine_normals_surface *s, const uint32_t *corner, sides *out) {
-  double origin[SIDES];
   for (size_t axis = 0; axis < 3; ++axis) {
-    read_vertex(s, corner[0], axis, origin);
-    read_vertex(s, corner[1], axis, out->a[axis]);
-    read_vertex(s, corner[2], axis, out->b[axis]);
-    for (size_t k = 0; k <= s->mode_count; ++k) {
-      out->a[axis][k] -= origin[k];
-      out->b[axis][k] -= origin[k];
+    const bool vector = s->directions == NULL;
+    const float *c = s->coefficients + (vector ? (3 * to + axis) * modes : to * modes);
+    const float *o = s->coefficients + (vector ? (3 * from + axis) * modes : from * modes);
+    const double d = vector ? 1.0 : (double)s->directions[3 * to + axis];
+    const double e = vector ? 1.0 : (double)s->directions[3 * from + axis];
+    side[axis][0] = (double)s->vertices[3 * to + axis] - (double)s->vertices[3 * from + axis];
+    for (size_t k = 0; k < modes; ++k) {
+      side[axis][k + 1] = (double)c[k] * d - (double)o[k] * e;
     }
   }
 }
 
-static bool in_lung(const supine_normals_surface *s, size_t lung, uint32_t vertex) {
-  return vertex >= s->lung_begin[lung] && vertex < s->lung_begin[lung + 1];
-}
-
-/* A triangle's terms, added to those of a corner, [3, terms]. */
-static void add_terms(const sides *t, size_t modes, size_t terms, double *row) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t y = (axis + 1) % 3;
-    const size_t z = (axis + 2) % 3;
-    for (size_t k = 0; k <= modes; ++k) {
-      for (size_t l = 0; l <= modes; ++l) {
-        row[axis * terms + term_of(modes, k, l)] +=
-            t->a[y][k] * t->b[z][l] - t->b[y][k] * t->a[z][l];
+/* Sum the polynomials of the area vectors around a vertex into row [3, terms]. */
+static void find_row(const supine_normals_surface *s, const supine_normals_fans *fans,
+                     size_t vertex, size_t terms, double *row) {
+  for (size_t at = fans->begin[vertex]; at < fans->begin[vertex + 1]; ++at) {
+    uint32_t others[2];
+    double a[3][COLUMNS];
+    double b[3][COLUMNS];
+    supine_normals_fan_others(s->triangles, fans->corner[at], others);
+    read_side(s, vertex, others[0], a);
+    read_side(s, vertex, others[1], b);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const size_t y = (axis + 1) % 3;
+      const size_t z = (axis + 2) % 3;
+      for (size_t k = 0; k <= s->mode_count; ++k) {
+        for (size_t l = 0; l <= s->mode_count; ++l) {
+          row[axis * terms + term_of(s->mode_count, k, l)] += a[y][k] * b[z][l] - b[y][k] * a[z][l];
+        }
       }
     }
   }
 }
 
-/* Divides by the lengths at rest, and drops rows without. */
-static void normalise_rows(supine_normals_rows *rows, size_t terms) {
-  size_t kept = 0;
-  for (size_t r = 0; r < rows->count; ++r) {
-    const double *row = rows->terms + 3 * r * terms;
-    const double length =
-        sqrt(row[0] * row[0] + row[terms] * row[terms] + row[2 * terms] * row[2 * terms]);
-    if (length > 0.0) {
-      for (size_t j = 0; j < 3 * terms; ++j) {
-        rows->terms[3 * kept * terms + j] = row[j] / length;
-      }
-      rows->vertex[kept++] = rows->vertex[r];
-    }
-  }
-  rows->count = kept;
-}
-
-supine_status supine_normals_rows_create(const supine_normals_surface *surface, size_t lung,
+supine_status supine_normals_rows_create(const supine_normals_surface *surface,
+                                         const supine_normals_fans *fans, size_t lung,
                                          size_t offset, size_t stride, supine_normals_rows *rows) {
-  const size_t begin = surface->lung_begin[lung];
-  const size_t n = surface->lung_begin[lung + 1] - begin;
   const size_t terms = supine_normals_terms(surface->mode_count);
-  const size_t count = offset < n ? (n - offset + stride - 1) / stride : 0;
-  *rows = (supine_normals_rows){.count = count};
-  rows->vertex = malloc((count + 1) * sizeof *rows->vertex);
-  rows->terms = calloc(count * 3 * terms + 1, sizeof *rows->terms);
+  const size_t end = surface->lung_begin[lung + 1];
+  const size_t begin = surface->lung_begin[lung];
+  const size_t most = (end - begin) / stride + 1;
+  *rows = (supine_normals_rows){0};
+  rows->vertex = malloc(most * sizeof *rows->vertex);
+  rows->terms = malloc(most * 3 * terms * sizeof *rows->terms);
   if (rows->vertex == NULL || rows->terms == NULL) {
     supine_normals_rows_free(rows);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t r = 0; r < count; ++r) {
-    rows->vertex[r] = (uint32_t)(begin + offset + r * stride);
-  }
-  for (size_t t = 0; t < surface->triangle_count; ++t) {
-    const uint32_t *corner = surface->triangles + 3 * t;
-    sides both;
-    bool ready = false;
-    for (size_t v = 0; v < 3 && in_lung(surface, lung, corner[0]); ++v) {
-      const size_t at = corner[v] - begin;
-      if (at < offset || (at - offset) % stride != 0) {
-        continue;
+  for (size_t i = begin + offset; i < end; i += stride) {
+    double *row = rows->terms + 3 * rows->count * terms;
+    memset(row, 0, 3 * terms * sizeof *row);
+    find_row(surface, fans, i, terms, row);
+    const double length =
+        sqrt(row[0] * row[0] + row[terms] * row[terms] + row[2 * terms] * row[2 * terms]);
+    if (length > 0.0) {
+      for (size_t j = 0; j < 3 * terms; ++j) {
+        row[j] /= length;
       }
-      if (!ready) {
-        read_sides(surface, corner, &both);
-        ready = true;
-      }
-      add_terms(&both, surface->mode_count, terms,
-                rows->terms + 3 * ((at - offset) / stride) * terms);
+      rows->vertex[rows->count++] = (uint32_t)i;
     }
   }
-  normalise_rows(rows, terms);
   return SUPINE_OK;
 }
 
@@ -145,57 +140,4 @@ void supine_normals_rows_free(supine_normals_rows *rows) {
   free(rows->vertex);
   free(rows->terms);
   *rows = (supine_normals_rows){0};
-}
-
-/* n_x += sum over k, l of full[l][k] (a_y[k] b_z[l] - b_y[k] a_z[l]), and so on. The columns k
- * stand side by side for vector units: `columns` of them, a multiple of eight, zeros at the end. */
-SUPINE_CLONES static void add_mixed(const sides *t, size_t modes, size_t columns,
-                                    double (*full)[SIDES][PADDED], double n[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t y = (axis + 1) % 3;
-    const size_t z = (axis + 2) % 3;
-    double a[PADDED] = {0.0};
-    double b[PADDED] = {0.0};
-    for (size_t l = 0; l <= modes; ++l) {
-      const double az = t->a[z][l];
-      const double bz = t->b[z][l];
-      for (size_t k = 0; k < columns; ++k) {
-        a[k] += full[axis][l][k] * az;
-        b[k] += full[axis][l][k] * bz;
-      }
-    }
-    for (size_t k = 0; k <= modes; ++k) {
-      n[axis] += t->a[y][k] * b[k] - t->b[y][k] * a[k];
-    }
-  }
-}
-
-void supine_normals_mix(const supine_normals_surface *surface, size_t lung, const double *mix,
-                        float *plane) {
-  const size_t modes = surface->mode_count;
-  const size_t terms = supine_normals_terms(modes);
-  const size_t columns = (modes + 8) / 8 * 8;
-  double full[3][SIDES][PADDED] = {{{0.0}}};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t k = 0; k <= modes; ++k) {
-      for (size_t l = 0; l <= modes; ++l) {
-        full[axis][l][k] = mix[axis * terms + term_of(modes, k, l)];
-      }
-    }
-  }
-  for (size_t t = 0; t < surface->triangle_count; ++t) {
-    const uint32_t *corner = surface->triangles + 3 * t;
-    if (!in_lung(surface, lung, corner[0])) {
-      continue;
-    }
-    sides both;
-    double n[3] = {0, 0, 0};
-    read_sides(surface, corner, &both);
-    add_mixed(&both, modes, columns, full, n);
-    for (size_t v = 0; v < 3; ++v) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        plane[3 * (size_t)corner[v] + axis] += (float)n[axis];
-      }
-    }
-  }
 }

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The best few modes of the normals. */
+#include <cblas.h>
+#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_sort.h>
-
 #include "precompute/normals/polynomial.h"
 #include "precompute/normals/states.h"
 #include "precompute/projection/compression.h"
+#include "precompute/projection/tally.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/kernels/tiles.h"
 #include "sh/base/clones.h"
@@ -18,31 +19,38 @@
  * errors change in the second digit. */
 enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 
+/* Modes are sums of the normals in at most SNAPSHOTS states, computed LANES states at a time. */
+enum { LANES = 8, SNAPSHOTS = 6 * LANES, MOST = SUPINE_NORMALS_MOST };
+
 /* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
  * little differently. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232;
 
+/* Squared length, of 1, that the normals of another snapshot must add to those before. */
+static const double least_new = 1e-7;
+
 /* One lung's modes before they are rounded; A, n and V as in normals.h. */
 typedef struct fit {
-  double *mix;     /* [MOST, 3, terms] T, by which n_jc = T_jc . A_c */
-  double *weights; /* [MOST, 3, terms] V */
+  size_t count;                 /* of the modes, at most MOST */
+  size_t snapshots;             /* R */
+  size_t state[SNAPSHOTS];      /* [R] */
+  float share[SNAPSHOTS][MOST]; /* n_j = sum over r of share_rj N(state_r) */
+  double *weights;              /* [MOST, 3, terms] V */
+  supine_normals_rows rows;     /* held-out vertices */
+  float *modes;                 /* [rows, 3, MOST] n of these */
+  double *exact;                /* [rows, 3, HELD_OUT] their normals in the held-out states */
 } fit;
 
-/* gram [3, terms, terms] = A_c^T A_c of each component. */
-static void find_gram(const supine_normals_rows *rows, size_t terms, double *gram) {
-  memset(gram, 0, 3 * terms * terms * sizeof *gram);
-  for (size_t r = 0; r < 3 * rows->count; ++r) {
-    const double *row = rows->terms + r * terms;
-    double *to = gram + r % 3 * terms * terms;
-    for (size_t a = 0; a < terms; ++a) {
-      for (size_t b = 0; b < terms; ++b) {
-        to[a * terms + b] += row[a] * row[b];
-      }
-    }
-  }
-}
+typedef struct normals_work {
+  const supine_normals_surface *surface;
+  size_t terms;
+  supine_normals_fans fans;
+  supine_normals_states states;
+  supine_normals_states held_out;
+  fit fits[SUPINE_LUNGS_MAX];
+} normals_work;
 
 static double dot(const double *a, const double *b, size_t count) {
   double sum = 0.0;
@@ -52,67 +60,144 @@ static double dot(const double *a, const double *b, size_t count) {
   return sum;
 }
 
-/* The products P^T G P of states phi [S, 3, terms], each scaled to length 1 in G; `image`
- * [S, 3, terms] is G P. */
-static void find_products(const double *gram, size_t terms, size_t s, const double *phi,
-                          double *unit, double *image, double *product) {
-  const size_t all = 3 * terms;
-  for (size_t i = 0; i < s; ++i, phi += all) {
-    for (size_t a = 0; a < all; ++a) {
-      image[i * all + a] = dot(gram + a * terms, phi + a / terms * terms, terms);
-    }
-    const double square = dot(phi, image + i * all, all);
-    const double length = square > 0.0 ? sqrt(square) : 1.0;
-    for (size_t a = 0; a < all; ++a) {
-      unit[i * all + a] = phi[a] / length;
-      image[i * all + a] /= length;
-    }
-  }
-  for (size_t i = 0; i < s; ++i) {
-    for (size_t j = 0; j < s; ++j) {
-      product[i * s + j] = dot(unit + i * all, image + j * all, all);
-    }
+/* Compute out [count, 3, n] = in [count, 3, terms] times matrix_c^T, matrix [n, 3, terms], for
+ * each component c. */
+static void apply_rows(const double *in, size_t count, size_t terms, const double *matrix, size_t n,
+                       double *out) {
+  for (size_t c = 0; c < 3; ++c) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)count, (int)n, (int)terms, 1.0,
+                in + c * terms, (int)(3 * terms), matrix + c * terms, (int)(3 * terms), 0.0,
+                out + c * n, (int)(3 * n));
   }
 }
 
-/* The SVD of the normals in states phi [S, 3, terms] by their products: modes orthonormal over the
- * rows. */
-static supine_status find_fit(const supine_normals_rows *rows, size_t terms, size_t s,
-                              const double *phi, size_t count, fit *made) {
+/* Compute out [count, 3, terms] = in_c A_c^T A_c for each component of rows A. gram [terms, terms]
+ * is overwritten. */
+static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
+                       size_t count, double *gram, double *out) {
+  const int width = (int)terms;
+  for (size_t c = 0; c < 3; ++c) {
+    const double *a = rows->terms + c * terms;
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, width, width, (int)rows->count, 1.0, a,
+                3 * width, a, 3 * width, 0.0, gram, width);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)count, width, width, 1.0,
+                in + c * terms, 3 * width, gram, width, 0.0, out + c * terms, 3 * width);
+  }
+}
+
+/* Choose the snapshots by pivoted Cholesky factorisation of the products [S, S] of unit states, P
+ * ~ L L^T, and find the `count` best modes of their span: n_j = sum over r of coefficients_jr
+ * state_r. The products are overwritten. */
+static supine_status choose_snapshots(size_t s, double *product, fit *made,
+                                      double coefficients[MOST * SNAPSHOTS]) {
+  lapack_int pivots[STATES];
+  lapack_int rank = 0;
+  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L */
+  double values[SNAPSHOTS];
+  if (LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product, (lapack_int)s, pivots, &rank,
+                     least_new) < 0) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
+  made->snapshots = r;
+  made->count = r < MOST ? r : MOST;
+  for (size_t k = 0; k < r; ++k) {
+    made->state[k] = (size_t)pivots[k] - 1;
+    memset(product + k * s, 0, k * sizeof *product);
+  }
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, (int)r, (int)s, 1.0, product, (int)s, 0.0,
+              gram, (int)r);
+  const supine_status status =
+      supine_projection_leading_eigenpairs(r, gram, made->count, values, coefficients);
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, (int)r,
+              (int)made->count, 1.0, product, (int)s, coefficients, (int)r);
+  return status;
+}
+
+/* Find the best modes of the normals in the states: orthonormal over the rows, and every state
+ * counts alike. mix [MOST, 3, terms] takes T, by which n_jc = T_jc . A_c. */
+static supine_status find_fit(const normals_work *work, size_t lung,
+                              const supine_normals_rows *rows, double *mix, fit *made) {
+  const size_t terms = work->terms;
   const size_t all = 3 * terms;
+  const size_t s = work->states.count;
+  const double *phi = work->states.phi + lung * work->states.room * all;
+  double coefficients[MOST * SNAPSHOTS];
+  double length[STATES];
   supine_status status = SUPINE_ERROR_MEMORY;
-  double *gram = malloc(all * terms * sizeof *gram);
-  double *unit = malloc(s * all * sizeof *unit);
+  double *gram = malloc(terms * terms * sizeof *gram);
   double *image = malloc(s * all * sizeof *image);
   double *product = malloc(s * s * sizeof *product);
-  double *vectors = malloc(count * s * sizeof *vectors);
-  double values[STATES]; /* the routine wants room for all */
-  if (gram == NULL || unit == NULL || image == NULL || product == NULL || vectors == NULL) {
+  if (gram == NULL || image == NULL || product == NULL) {
     goto cleanup;
   }
-  find_gram(rows, terms, gram);
-  find_products(gram, terms, s, phi, unit, image, product);
-  status = supine_projection_leading_eigenpairs(s, product, count, values, vectors);
-  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
-    /* What rounding alone leaves is no mode. */
-    const double length = values[j] > 1e-14 * values[0] ? 1.0 / sqrt(values[j]) : 0.0;
-    for (size_t a = 0; a < all; ++a) {
-      double mix = 0.0;
-      double weight = 0.0;
-      for (size_t i = 0; i < s; ++i) {
-        mix += vectors[j * s + i] * unit[i * all + a];
-        weight += vectors[j * s + i] * image[i * all + a];
-      }
-      made->mix[j * all + a] = length * mix;
-      made->weights[j * all + a] = length * weight; /* T^T G */
+  apply_gram(rows, terms, phi, s, gram, image);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)s, (int)s, (int)all, 1.0, phi, (int)all,
+              image, (int)all, 0.0, product, (int)s);
+  for (size_t i = 0; i < s; ++i) {
+    length[i] = product[i * s + i] > 0.0 ? sqrt(product[i * s + i]) : 1.0;
+  }
+  for (size_t i = 0; i < s * s; ++i) {
+    product[i] /= length[i / s] * length[i % s];
+  }
+  status = choose_snapshots(s, product, made, coefficients);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  memset(mix, 0, MOST * all * sizeof *mix);
+  for (size_t j = 0; j < made->count; ++j) {
+    for (size_t r = 0; r < made->snapshots; ++r) {
+      const size_t state = made->state[r];
+      const double share = coefficients[j * made->snapshots + r] / length[state];
+      made->share[r][j] = (float)share;
+      cblas_daxpy((int)all, share, phi + state * all, 1, mix + j * all, 1);
     }
   }
+  apply_gram(rows, terms, mix, MOST, gram, made->weights);
 cleanup:
   free(gram);
-  free(unit);
   free(image);
   free(product);
-  free(vectors);
+  return status;
+}
+
+/* Find one lung's modes, and what they are measured on. */
+static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
+  const supine_normals_surface *s = work->surface;
+  const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
+  const size_t all = 3 * work->terms;
+  supine_normals_rows rows = {0};
+  double *mix = malloc(MOST * all * sizeof *mix);
+  double *modes = NULL;
+  made->weights = malloc(MOST * all * sizeof *made->weights);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (mix != NULL && made->weights != NULL) {
+    status = supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows);
+  }
+  status = status == SUPINE_OK ? find_fit(work, lung, &rows, mix, made) : status;
+  supine_normals_rows_free(&rows);
+  if (status == SUPINE_OK) {
+    status = supine_normals_rows_create(s, &work->fans, lung, stride / 2, stride, &made->rows);
+  }
+  const size_t count = 3 * made->rows.count;
+  if (status == SUPINE_OK) {
+    modes = malloc((count * MOST + 1) * sizeof *modes);
+    made->modes = malloc((count * MOST + 1) * sizeof *made->modes);
+    made->exact = malloc((count * HELD_OUT + 1) * sizeof *made->exact);
+    status = modes == NULL || made->modes == NULL || made->exact == NULL ? SUPINE_ERROR_MEMORY
+                                                                         : SUPINE_OK;
+  }
+  if (status == SUPINE_OK) {
+    const double *phi = work->held_out.phi + lung * work->held_out.room * all;
+    apply_rows(made->rows.terms, made->rows.count, work->terms, phi, work->held_out.count,
+               made->exact);
+    apply_rows(made->rows.terms, made->rows.count, work->terms, mix, MOST, modes);
+    for (size_t i = 0; i < count * MOST; ++i) {
+      made->modes[i] = (float)modes[i];
+    }
+  }
+  free(mix);
+  free(modes);
   return status;
 }
 
@@ -139,269 +224,309 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Exact normals of a row in every state by axis. States stand side by side in `across` [3, terms,
- * HELD_OUT], for vector units; each sum is in the order of dot. */
-SUPINE_CLONES static void find_exact(const double *row, size_t terms, const double *across,
-                                     double (*exact)[HELD_OUT]) {
-  memset(exact, 0, 3 * sizeof *exact);
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t a = 0; a < terms; ++a) {
-      for (size_t i = 0; i < HELD_OUT; ++i) {
-        exact[axis][i] += row[axis * terms + a] * across[(axis * terms + a) * HELD_OUT + i];
-      }
+/* Round modes [n, 3, stride] to 16 bits, [n, 3, count]; the unit of each goes to its weights
+ * [count, 3, terms]. */
+static void round_modes(const float *values, size_t n, size_t stride, size_t count, size_t terms,
+                        int16_t *rounded, double *weights) {
+  float top[MOST] = {0.0f};
+  float scale[MOST];
+  for (size_t i = 0; i < 3 * n; ++i) {
+    for (size_t j = 0; j < count; ++j) {
+      const float size = fabsf(values[i * stride + j]);
+      top[j] = size > top[j] ? size : top[j];
+    }
+  }
+  for (size_t j = 0; j < count; ++j) {
+    const double unit = top[j] > 0 ? (double)top[j] / INT16_MAX : 1.0;
+    scale[j] = (float)(1.0 / unit);
+    cblas_dscal((int)(3 * terms), unit, weights + 3 * j * terms, 1);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    for (size_t j = 0; j < count; ++j) {
+      rounded[i * count + j] = (int16_t)lrintf(values[i * stride + j] * scale[j]);
     }
   }
 }
 
-/* Angles off of each row of a lung in each held-out state, added at `angles`; returns how many.
- * `made` holds what the file will; `across` [3, terms, HELD_OUT] is overwritten. */
-static size_t measure(const supine_normals_rows *rows, size_t terms,
-                      const supine_normals_states *states, size_t lung,
-                      const supine_normals_modes *made, double *across, double *angles) {
-  const size_t all = 3 * terms;
-  const size_t count = made->count;
-  const double *phi = states->phi + lung * states->room * all;
-  const double *weights = made->weights + lung * count * all;
-  size_t found = 0;
-  double v[HELD_OUT][SUPINE_NORMALS_MOST];
-  memset(across, 0, all * HELD_OUT * sizeof *across);
-  for (size_t i = 0; i < states->count; ++i, phi += all) {
-    for (size_t a = 0; a < all; ++a) {
-      across[a * HELD_OUT + i] = phi[a];
-    }
-    for (size_t j = 0; j < count; ++j) {
-      v[i][j] = dot(weights + j * all, phi, all);
-    }
-  }
-  for (size_t r = 0; r < rows->count; ++r) {
-    double packed[3][SUPINE_NORMALS_MOST];
+/* Add the angles off of a lung's held-out vertices in the held-out states. modes [rows, 3, count]
+ * and weights [count, 3, terms] as the file has them. */
+static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
+                    const double *weights, supine_tally *tally, double *sum) {
+  const fit *made = &work->fits[lung];
+  const size_t all = 3 * work->terms;
+  const size_t states = work->held_out.count;
+  const double *phi = work->held_out.phi + lung * work->held_out.room * all;
+  double v[HELD_OUT * MOST];
+  double angles[HELD_OUT];
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
+              (int)all, weights, (int)all, 0.0, v, (int)count);
+  for (size_t r = 0; r < made->rows.count; ++r) {
+    const double *exact = made->exact + 3 * r * states;
+    double packed[3][MOST];
     for (size_t axis = 0; axis < 3; ++axis) {
-      pack(made->modes + (3 * (size_t)rows->vertex[r] + axis) * count, count, packed[axis]);
+      pack(modes + (3 * r + axis) * count, count, packed[axis]);
     }
-    double exact[3][HELD_OUT];
-    find_exact(rows->terms + 3 * r * terms, terms, across, exact);
-    for (size_t i = 0; i < states->count; ++i) {
+    for (size_t i = 0; i < states; ++i) {
       double normal[3];
       for (size_t axis = 0; axis < 3; ++axis) {
-        normal[axis] = dot(v[i], packed[axis], count);
+        normal[axis] = dot(v + i * count, packed[axis], count);
       }
-      angles[found++] = angle_between((double[]){exact[0][i], exact[1][i], exact[2][i]}, normal);
+      angles[i] =
+          angle_between((double[]){exact[i], exact[states + i], exact[2 * states + i]}, normal);
+      *sum += angles[i];
     }
+    supine_accuracy_tally_add(tally, states, angles);
   }
-  return found;
 }
 
-/* Planes of modes for every vertex. One thread adds up all of a lung in a plane, so that sums do
- * not depend on threads. */
+/* State the error of `count` modes: those of the file, or where it has none yet, those of the
+ * held-out vertices alone. */
+static supine_status measure_all(const normals_work *work, size_t count,
+                                 supine_normals_modes *made) {
+  const size_t all = 3 * work->terms;
+  const size_t most = 2 * ROWS + 1;
+  supine_tally *tally = calloc(1, sizeof *tally);
+  int16_t *modes = malloc(most * 3 * count * sizeof *modes);
+  double *weights = malloc(count * all * sizeof *weights);
+  double sum = 0.0;
+  const bool memory = tally != NULL && modes != NULL && weights != NULL;
+  for (size_t lung = 0; lung < work->surface->lung_count && memory; ++lung) {
+    const fit *of = &work->fits[lung];
+    memcpy(weights, made->modes != NULL ? made->weights + lung * count * all : of->weights,
+           count * all * sizeof *weights);
+    if (made->modes == NULL) {
+      round_modes(of->modes, of->rows.count, MOST, count, work->terms, modes, weights);
+    }
+    for (size_t r = 0; r < of->rows.count && made->modes != NULL; ++r) {
+      memcpy(modes + 3 * r * count, made->modes + 3 * of->rows.vertex[r] * count,
+             3 * count * sizeof *modes);
+    }
+    measure(work, lung, count, modes, weights, tally, &sum);
+  }
+  if (memory) {
+    made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
+    made->p999 = supine_accuracy_tally_percentile(tally, 0.999);
+  }
+  free(tally);
+  free(modes);
+  free(weights);
+  return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+}
+
+/* Modes of every vertex from some snapshots. */
 typedef struct planes_work {
-  const supine_normals_surface *surface;
-  const fit *fits; /* [G] */
-  size_t terms;
-  size_t first;  /* mode of the first plane */
-  float *planes; /* [., N, 3] */
+  const normals_work *work;
+  size_t count;                                       /* Q */
+  size_t first;                                       /* snapshot in the first lane */
+  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
+  float *at;                                          /* [N, 3, LANES] positions */
+  float *modes;                                       /* [N, 3, Q] sums so far */
 } planes_work;
 
-static void planes_range(void *context, size_t begin, size_t end, size_t thread) {
-  const planes_work *work = context;
-  const supine_normals_surface *s = work->surface;
+static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
+  return s->lung_count == 2 && vertex >= s->lung_begin[1];
+}
+
+SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, size_t thread) {
+  const planes_work *planes = context;
+  const supine_normals_surface *s = planes->work->surface;
+  const bool vector = s->directions == NULL;
+  (void)thread;
+  for (size_t row = begin; row < end; ++row) {
+    const float *c = s->coefficients + (vector ? row : row / 3) * s->mode_count;
+    const float d = vector ? 1.0f : s->directions[row];
+    const float(*steer)[LANES] = (const float(*)[LANES])planes->steer[lung_of(s, row / 3)][row % 3];
+    float sum[LANES] = {0.0f};
+    for (size_t k = 0; k < s->mode_count; ++k) {
+      for (size_t l = 0; l < LANES; ++l) {
+        sum[l] += c[k] * steer[k][l];
+      }
+    }
+    for (size_t l = 0; l < LANES; ++l) {
+      planes->at[row * LANES + l] = s->vertices[row] + d * sum[l];
+    }
+  }
+}
+
+SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, size_t thread) {
+  const planes_work *planes = context;
+  const supine_normals_surface *s = planes->work->surface;
+  const supine_normals_fans *fans = &planes->work->fans;
   (void)thread;
   for (size_t i = begin; i < end; ++i) {
-    const size_t j = i / s->lung_count;
-    const size_t lung = i % s->lung_count;
-    supine_normals_mix(s, lung, work->fits[lung].mix + 3 * (work->first + j) * work->terms,
-                       work->planes + 3 * s->vertex_count * j);
-  }
-}
-
-/* Round planes to 16 bits, vertices scaled to a normal of length 1 at rest, into the modes from
- * work->first on; the unit of each mode goes to the weights. `rest` [N] lengths at rest. */
-static void round_modes(const planes_work *work, const float *rest, supine_normals_modes *made) {
-  const supine_normals_surface *s = work->surface;
-  const size_t count = made->count;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    for (size_t j = work->first; j < count; ++j) {
-      const float *plane = work->planes + 3 * s->vertex_count * (j - work->first);
-      float top = 0;
-      for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
-        const float size = rest[i / 3] > 0 ? fabsf(plane[i]) / rest[i / 3] : 0;
-        top = size > top ? size : top;
+    const float *p = planes->at + 3 * i * LANES;
+    float normal[3][LANES] = {{0.0f}};
+    for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
+      uint32_t others[2];
+      supine_normals_fan_others(s->triangles, fans->corner[at], others);
+      const float *a = planes->at + 3 * (size_t)others[0] * LANES;
+      const float *b = planes->at + 3 * (size_t)others[1] * LANES;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const size_t y = (axis + 1) % 3 * LANES;
+        const size_t z = (axis + 2) % 3 * LANES;
+        for (size_t l = 0; l < LANES; ++l) {
+          normal[axis][l] += (a[y + l] - p[y + l]) * (b[z + l] - p[z + l]) -
+                             (b[y + l] - p[y + l]) * (a[z + l] - p[z + l]);
+        }
       }
-      const double unit = top > 0 ? (double)top / INT16_MAX : 1.0;
-      for (size_t i = 3 * s->lung_begin[lung]; i < 3 * s->lung_begin[lung + 1]; ++i) {
-        const double value = rest[i / 3] > 0 ? (double)plane[i] / (double)rest[i / 3] : 0.0;
-        made->modes[i * count + j] = (int16_t)lrint(value / unit);
+    }
+    const float(*share)[MOST] =
+        (const float(*)[MOST])(planes->work->fits[lung_of(s, i)].share + planes->first);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      float sum[MOST] = {0.0f};
+      for (size_t l = 0; l < LANES; ++l) {
+        for (size_t j = 0; j < MOST; ++j) {
+          sum[j] += normal[axis][l] * share[l][j];
+        }
       }
-      for (size_t a = 0; a < 3 * work->terms; ++a) {
-        made->weights[3 * (lung * count + j) * work->terms + a] *= unit;
+      float *modes = planes->modes + (3 * i + axis) * planes->count;
+      for (size_t j = 0; j < planes->count; ++j) {
+        modes[j] += sum[j];
       }
     }
   }
 }
 
-/* Lengths of the normals at rest, [N]. */
-static supine_status find_rest(const supine_normals_surface *s, size_t terms, float *rest) {
-  float *plane = calloc(3 * s->vertex_count + 1, sizeof *plane);
-  double *one = calloc(3 * terms, sizeof *one);
-  if (plane == NULL || one == NULL) {
-    free(plane);
-    free(one);
-    return SUPINE_ERROR_MEMORY;
+/* Divide by the lengths of the normals at rest; without one, a vertex has no modes. */
+static void scale_range(void *context, size_t begin, size_t end, size_t thread) {
+  const planes_work *planes = context;
+  const supine_normals_surface *s = planes->work->surface;
+  const supine_normals_fans *fans = &planes->work->fans;
+  (void)thread;
+  for (size_t i = begin; i < end; ++i) {
+    double normal[3] = {0.0, 0.0, 0.0};
+    for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
+      uint32_t others[2];
+      double a[3];
+      double b[3];
+      supine_normals_fan_others(s->triangles, fans->corner[at], others);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const double p = (double)s->vertices[3 * i + axis];
+        a[axis] = (double)s->vertices[3 * others[0] + axis] - p;
+        b[axis] = (double)s->vertices[3 * others[1] + axis] - p;
+      }
+      normal[0] += a[1] * b[2] - a[2] * b[1];
+      normal[1] += a[2] * b[0] - a[0] * b[2];
+      normal[2] += a[0] * b[1] - a[1] * b[0];
+    }
+    const double length = sqrt(dot(normal, normal, 3));
+    const float scale = length > 0.0 ? (float)(1.0 / length) : 0.0f;
+    for (size_t j = 0; j < 3 * planes->count; ++j) {
+      planes->modes[3 * i * planes->count + j] *= scale;
+    }
   }
-  one[0] = one[terms] = one[2 * terms] = 1.0;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    supine_normals_mix(s, lung, one, plane);
-  }
-  for (size_t i = 0; i < s->vertex_count; ++i) {
-    const float *n = plane + 3 * i;
-    rest[i] = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  }
-  free(plane);
-  free(one);
-  return SUPINE_OK;
 }
 
-/* Add modes up to `count` of them. */
-static supine_status add_modes(planes_work *work, size_t count, const float *rest,
-                               supine_normals_modes *made) {
-  const supine_normals_surface *s = work->surface;
-  const size_t all = 3 * work->terms;
-  const size_t old = made->count;
-  const size_t rows = 3 * s->vertex_count;
-  int16_t *modes = realloc(made->modes, rows * count * sizeof *modes);
-  made->modes = modes != NULL ? modes : made->modes;
-  double *weights = realloc(made->weights, s->lung_count * count * all * sizeof *weights);
-  made->weights = weights != NULL ? weights : made->weights;
-  work->planes = calloc(rows * (count - old), sizeof *work->planes);
-  if (modes == NULL || weights == NULL || work->planes == NULL) {
-    free(work->planes);
-    return SUPINE_ERROR_MEMORY;
-  }
-  for (size_t i = rows; i-- > 0;) { /* rows become longer, the last one first */
-    memmove(modes + i * count, modes + i * old, old * sizeof *modes);
-  }
-  for (size_t lung = s->lung_count; lung-- > 0;) {
-    double *to = weights + lung * count * all;
-    memmove(to, weights + lung * old * all, old * all * sizeof *to);
-    memcpy(to + old * all, work->fits[lung].weights + old * all, (count - old) * all * sizeof *to);
-  }
-  work->first = old;
-  made->count = count;
-  supine_parallel_for((count - old) * s->lung_count, 1, 0, planes_range, work);
-  round_modes(work, rest, made);
-  free(work->planes);
-  return SUPINE_OK;
-}
-
-static size_t stride_of(const supine_normals_surface *s, size_t lung) {
-  return 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
-}
-
-/* Errors on states and, where the lungs have more vertices than took part, vertices of their own.
+/* Set the lanes' gains times weights, which stand in the monomials: of axis a in component a + 2.
  */
-static supine_status measure_all(const supine_normals_surface *s,
-                                 const supine_normals_states *states, supine_normals_modes *made) {
-  const size_t terms = supine_normals_terms(s->mode_count);
-  supine_status status = SUPINE_OK;
-  const size_t most = s->lung_count * (2 * ROWS + 1) * (states->count + 1);
-  double *angles = malloc((most + most / 1000 + 3) * sizeof *angles); /* and the largest of them */
-  double *across = malloc(3 * terms * HELD_OUT * sizeof *across);
-  size_t found = 0;
-  if (angles == NULL || across == NULL) {
-    free(angles);
-    free(across);
-    return SUPINE_ERROR_MEMORY;
-  }
-  for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
-    supine_normals_rows rows;
-    const size_t stride = stride_of(s, lung);
-    status = supine_normals_rows_create(s, lung, stride / 2, stride, &rows);
-    if (status == SUPINE_OK) {
-      found += measure(&rows, terms, states, lung, made, across, angles + found);
-      supine_normals_rows_free(&rows);
+static void find_steer(const planes_work *planes) {
+  const normals_work *work = planes->work;
+  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t l = 0; l < LANES; ++l) {
+        const size_t state = work->fits[lung].state[planes->first + l];
+        const double *phi = work->states.phi +
+                            ((lung * work->states.room + state) * 3 + (axis + 2) % 3) * work->terms;
+        for (size_t k = 0; k < work->surface->mode_count; ++k) {
+          planes->steer[lung][axis][k][l] = (float)phi[1 + k];
+        }
+      }
     }
   }
-  if (status == SUPINE_OK && found > 0) {
-    double sum = 0.0;
-    for (size_t i = 0; i < found; ++i) {
-      sum += angles[i];
-    }
-    const size_t above = found - (size_t)(0.999 * (double)(found - 1));
-    gsl_sort_largest(angles + most, above, angles, 1, found);
-    made->mean = sum / (double)found;
-    made->p999 = angles[most + above - 1];
-  }
-  free(angles);
-  free(across);
-  return status;
 }
 
-/* Fits of every lung. */
-static supine_status find_fits(const supine_normals_surface *s, const supine_normals_states *states,
-                               size_t count, fit *fits) {
-  const size_t terms = supine_normals_terms(s->mode_count);
-  supine_status status = SUPINE_OK;
-  for (size_t lung = 0; lung < s->lung_count && status == SUPINE_OK; ++lung) {
-    supine_normals_rows rows = {0};
-    fits[lung].mix = calloc(3 * count * terms, sizeof *fits[lung].mix);
-    fits[lung].weights = calloc(3 * count * terms, sizeof *fits[lung].weights);
-    status = fits[lung].mix == NULL || fits[lung].weights == NULL
-                 ? SUPINE_ERROR_MEMORY
-                 : supine_normals_rows_create(s, lung, 0, stride_of(s, lung), &rows);
-    if (status == SUPINE_OK) {
-      status = find_fit(&rows, terms, states->count, states->phi + 3 * lung * states->room * terms,
-                        count, &fits[lung]);
-    }
-    supine_normals_rows_free(&rows);
+/* Make the first `count` modes of every vertex. */
+static supine_status make_modes(const normals_work *work, size_t count,
+                                supine_normals_modes *made) {
+  enum { GRAIN = 1024 };
+  const supine_normals_surface *s = work->surface;
+  const size_t n = s->vertex_count;
+  const size_t all = 3 * work->terms;
+  float steer[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
+  planes_work planes = {.work = work,
+                        .count = count,
+                        .steer = steer,
+                        .at = malloc(3 * n * LANES * sizeof(float)),
+                        .modes = calloc(3 * n * count, sizeof(float))};
+  made->modes = malloc(3 * n * count * sizeof *made->modes);
+  made->weights = malloc(s->lung_count * count * all * sizeof *made->weights);
+  made->count = count;
+  size_t snapshots = 0;
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    snapshots = work->fits[lung].snapshots > snapshots ? work->fits[lung].snapshots : snapshots;
   }
-  return status;
+  const bool memory =
+      planes.at != NULL && planes.modes != NULL && made->modes != NULL && made->weights != NULL;
+  for (; memory && planes.first < snapshots; planes.first += LANES) {
+    find_steer(&planes);
+    supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
+    supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
+  }
+  if (memory) {
+    supine_parallel_for(n, GRAIN, 0, scale_range, &planes);
+  }
+  for (size_t lung = 0; memory && lung < s->lung_count; ++lung) {
+    const size_t begin = s->lung_begin[lung];
+    double *weights = made->weights + lung * count * all;
+    memcpy(weights, work->fits[lung].weights, count * all * sizeof *weights);
+    round_modes(planes.modes + 3 * begin * count, s->lung_begin[lung + 1] - begin, count, count,
+                work->terms, made->modes + 3 * begin * count, weights);
+  }
+  free(planes.at);
+  free(planes.modes);
+  return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,
                                           supine_normals_modes *made, supine_error *error) {
-  fit fits[SUPINE_LUNGS_MAX] = {{0}};
-  supine_normals_states states = {0};
-  supine_normals_states held_out = {0};
-  float *rest = NULL;
+  normals_work *work = calloc(1, sizeof *work);
+  size_t most = MOST;
   *made = (supine_normals_modes){0};
+  if (work == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for normals");
+  }
   if (surface->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+    free(work);
     return SUPINE_OK;
   }
-  const size_t terms = supine_normals_terms(surface->mode_count);
-  planes_work work = {.surface = surface, .fits = fits, .terms = terms};
-  supine_status status = supine_normals_states_create(surface, STATES, 0.0, &states);
+  work->surface = surface;
+  work->terms = supine_normals_terms(surface->mode_count);
+  supine_status status = supine_normals_states_create(surface, STATES, 0.0, &work->states);
   if (status == SUPINE_OK) {
-    status = supine_normals_states_create(surface, HELD_OUT, 0.37, &held_out);
+    status = supine_normals_states_create(surface, HELD_OUT, 0.37, &work->held_out);
   }
-  if (status != SUPINE_OK || states.count == 0 || held_out.count == 0) {
+  if (status != SUPINE_OK || work->states.count == 0 || work->held_out.count == 0) {
     goto cleanup;
   }
-  size_t most = SUPINE_NORMALS_MOST < states.count ? SUPINE_NORMALS_MOST : states.count;
-  most = 3 * terms < most ? 3 * terms : most;
-  rest = malloc(surface->vertex_count * sizeof *rest);
-  status = rest == NULL ? SUPINE_ERROR_MEMORY : find_rest(surface, terms, rest);
-  if (status == SUPINE_OK) {
-    status = find_fits(surface, &states, most, fits);
+  status = supine_normals_fans_create(surface, &work->fans);
+  for (size_t lung = 0; lung < surface->lung_count && status == SUPINE_OK; ++lung) {
+    status = find_lung(work, lung, &work->fits[lung]);
+    most = work->fits[lung].count < most ? work->fits[lung].count : most;
   }
-  for (size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
-       status == SUPINE_OK && count <= most; count += STEP) {
-    status = add_modes(&work, count, rest, made);
-    if (status == SUPINE_OK) {
-      status = measure_all(surface, &held_out, made);
-    }
-    if (made->mean <= mean_wanted && made->p999 <= p999_wanted) {
+  size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
+  while (status == SUPINE_OK) {
+    status = measure_all(work, count, made);
+    if ((made->mean <= mean_wanted && made->p999 <= p999_wanted) || count + STEP > most) {
       break;
     }
+    count += STEP;
   }
-  memcpy(made->range, states.range, sizeof made->range);
+  status = status == SUPINE_OK ? make_modes(work, count, made) : status;
+  status = status == SUPINE_OK ? measure_all(work, count, made) : status;
+  memcpy(made->range, work->states.range, sizeof made->range);
 
 cleanup:
   for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-    free(fits[lung].mix);
-    free(fits[lung].weights);
+    fit *of = &work->fits[lung];
+    supine_normals_rows_free(&of->rows);
+    free(of->weights);
+    free(of->modes);
+    free(of->exact);
   }
-  supine_normals_states_free(&states);
-  supine_normals_states_free(&held_out);
-  free(rest);
+  supine_normals_fans_free(&work->fans);
+  supine_normals_states_free(&work->states);
+  supine_normals_states_free(&work->held_out);
+  free(work);
   if (status != SUPINE_OK) {
     supine_normals_modes_free(made);
     return supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,

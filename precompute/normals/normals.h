@@ -7,12 +7,12 @@
  *
  *     N_ic = A_ic . phi_c        phi_c = (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * so that over all postures and volumes it lies in a space of few dimensions. For each lung the Q
- * best are found,
+ * so that over all postures and volumes it lies in a space of few dimensions. Each lung has Q modes
+ * n_j,
  *
  *     N_i ~ |N_i(0)| sum over j of n_ij v_j        v_j = sum over c of V_jc . phi_c
  *
- * best for angles: vertices count alike whatever their area, and so do postures and volumes. */
+ * best for angles: all vertices count alike, whatever their area, and so do all states. */
 #ifndef SUPINE_NORMALS_H
 #define SUPINE_NORMALS_H
 
@@ -22,7 +22,7 @@
 
 #include <supine/runtime.h>
 
-/** What a basis file is about to hold. */
+/** The surface and the field that a basis file will hold. */
 typedef struct supine_normals_surface {
   size_t vertex_count, triangle_count, lung_count, mode_count, band;
   const size_t *lung_begin;  /**< [G + 1] */
@@ -38,24 +38,24 @@ typedef struct supine_normals_surface {
   double bend[3];            /**< see supine_volume_bend */
 } supine_normals_surface;
 
-/** Normals in few numbers. */
+/** The modes of the normals of every vertex. */
 typedef struct supine_normals_modes {
   size_t count;    /**< Q; 0: none were made */
-  int16_t *modes;  /**< [N, 3, Q] n, in units that `weights` have taken up */
+  int16_t *modes;  /**< [N, 3, Q] n, in units that `weights` contain */
   double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
-  double range[2]; /**< mL that it was made for, over postures: from their resting volume, where
-                      one is known, to that of the file's surface; scales, on an open surface */
-  double mean;     /**< degrees off, over vertices, postures and volumes that took no part */
-  double p999;     /**< the 99.9th percentile of that */
+  double range[2]; /**< least and largest volume of the states, mL beyond the file's surface; of an
+                      open surface, largest displacement, mm */
+  double mean;     /**< angle, degrees, from the exact normals, over vertices and states that the
+                      modes were not found from */
+  double p999;     /**< 99.9th percentile of that angle */
 } supine_normals_modes;
 
-/** Finds them: the fewest modes of SUPINE_NORMALS_FEW, 3 more (three share a word in an open
- * basis),
- * ... SUPINE_NORMALS_MOST that err by at most 0.08 degrees in the mean and 0.8 in the 99.9th
- * percentile, or the most. More than
- * SUPINE_NORMALS_FIELD_MAX modes of the field are too many: then none are made.
- * Cost: Q (K + 1)^2 operations a triangle. Uses all cores.
- * @retval SUPINE_ERROR_NUMERICAL  the SVD failed
+/** Find the fewest modes, SUPINE_NORMALS_FEW to SUPINE_NORMALS_MOST in steps of 3 (three share a
+ * word in an open basis), that err by at most 0.08 degrees in the mean and 0.8 in the 99.9th
+ * percentile, as judged on up to 4097 vertices of each lung; the most where none do. None are made
+ * of a field with more than SUPINE_NORMALS_FIELD_MAX modes. Cost: the surface is deformed some 50
+ * times. Uses all cores.
+ * @retval SUPINE_ERROR_NUMERICAL  an eigenvalue problem failed
  * @retval SUPINE_ERROR_MEMORY */
 enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24, SUPINE_NORMALS_FIELD_MAX = 24 };
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,

@@ -5,35 +5,50 @@
 
 #include "precompute/normals/normals.h"
 
-/* Monomials of K weights in one component of a normal, along axis c:
+/* Number of monomials of K weights in one component of a normal, along axis c:
  *
  *     1, a w_k, b w_k, a b w_k w_l (k <= l)     a, b: gains of the next two axes, cyclically */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }
 
-/* phi [3, terms]: the monomials of the components x, y and z. */
+/* Compute phi [3, terms]: the monomials of the components x, y and z. */
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
-/* Some vertices of one lung, and their polynomials. */
+/* The triangles around each vertex: those of vertex i are at begin[i] <= s < begin[i + 1], each as
+ * the index in `triangles` at which it names i. */
+typedef struct supine_normals_fans {
+  uint32_t *begin;  /* [N + 2] */
+  uint32_t *corner; /* [3 M] */
+} supine_normals_fans;
+
+/* SUPINE_ERROR_MEMORY */
+supine_status supine_normals_fans_create(const supine_normals_surface *surface,
+                                         supine_normals_fans *fans);
+void supine_normals_fans_free(supine_normals_fans *fans);
+
+/* Read the other two corners of the triangle that names a vertex at `corner`, in its order. */
+static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t corner,
+                                             uint32_t others[2]) {
+  const uint32_t v = corner % 3;
+  others[0] = triangles[corner - v + (v + 1) % 3];
+  others[1] = triangles[corner - v + (v + 2) % 3];
+}
+
+/* The polynomials of some vertices of one lung. */
 typedef struct supine_normals_rows {
   size_t count;     /* R */
   uint32_t *vertex; /* [R] */
   double *terms;    /* [R, 3, terms] A_i / |N_i(0)| */
 } supine_normals_rows;
 
-/* Every `stride`-th vertex of a lung from `begin` + `offset` on; those that have no normal at rest
- * are left out.
+/* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those that
+ * have no normal at rest.
  * SUPINE_ERROR_MEMORY */
-supine_status supine_normals_rows_create(const supine_normals_surface *surface, size_t lung,
+supine_status supine_normals_rows_create(const supine_normals_surface *surface,
+                                         const supine_normals_fans *fans, size_t lung,
                                          size_t offset, size_t stride, supine_normals_rows *rows);
 void supine_normals_rows_free(supine_normals_rows *rows);
-
-/* plane [N, 3] += sum over t of mix_ct A_i,ct, c = x, y, z, of every vertex of a lung. mix [3,
- * terms].
- */
-void supine_normals_mix(const supine_normals_surface *surface, size_t lung, const double *mix,
-                        float *plane);
 
 #endif
