@@ -390,21 +390,6 @@ static void test_volume_forms_equal_measured_volume_also_mixed(void **state) {
   free(d);
 }
 
-static void test_volume_forms_open_surface_refused(void **state) {
-  (void)state;
-  supine_mesh lump = helper_lump(4, 90.0, 3);
-  --lump.triangle_count;
-  supine_lungs lungs = {0};
-  supine_volume_forms forms = {0};
-  supine_error error;
-  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
-  assert_int_equal(supine_physics_volume_forms_create(&lungs, NULL, lungs.mesh.vertices,
-                                                      lungs.mesh.vertices, 1, &forms, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
-  assert_non_null(strstr(error.message, "3 boundary"));
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&lump);
-}
 
 int main(void) {
   const struct CMUnitTest tests[] = {
@@ -423,7 +408,6 @@ int main(void) {
       cmocka_unit_test(test_phantom_pair_is_closed_and_has_its_volume),
       cmocka_unit_test(test_phantom_keeps_its_shape),
       cmocka_unit_test(test_volume_forms_equal_measured_volume_also_mixed),
-      cmocka_unit_test(test_volume_forms_open_surface_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -192,7 +192,7 @@ static supine_status find_way(const work *w, const supine_resting *resting, doub
   double gains[2][3];
   double *ones = malloc(n * sizeof *ones);
 
-  supine_volume_forms forms = {0};
+  const bool closed = w->lungs.topology.closed && volume[0] > 0.0;
   supine_volume_form form = {{0.0}};
   supine_status status = SUPINE_OK;
   find_parts(record, part);
@@ -202,18 +202,14 @@ static supine_status find_way(const work *w, const supine_resting *resting, doub
   }
   if (ones == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  } else if (w->lungs.topology.closed && volume[0] > 0.0) {
-    status = supine_physics_volume_forms_create(&w->lungs, NULL, w->moved, ones, 1, &forms, error);
-  }
-
-  for (size_t lung = 0; lung < w->lungs.lung_count && forms.linear != NULL; ++lung) {
-    supine_volume_form part_of;
-    supine_physics_volume_forms_contract_lung(&forms, lung, ones, &part_of);
+  } else if (closed) {
+    supine_volume_form forms[2] = {{{0.0}}};
+    supine_physics_volume_of_fields(&w->lungs, NULL, w->moved, ones, 1, forms);
     for (size_t i = 0; i < sizeof form.of / sizeof *form.of; ++i) {
-      form.of[i] += part_of.of[i];
+      form.of[i] = forms[0].of[i] + forms[1].of[i];
     }
   }
-  for (int round = 0; round < ROUNDS && status == SUPINE_OK && forms.linear != NULL; ++round) {
+  for (int round = 0; round < ROUNDS && status == SUPINE_OK && closed; ++round) {
     const size_t k = (size_t)round % 2;
     const supine_volume *of = &record->state[k].volume;
 
@@ -230,7 +226,6 @@ static supine_status find_way(const work *w, const supine_resting *resting, doub
   for (size_t k = 0; k < 3; ++k) {
     way[k] = gains[1][k] - gains[0][k];
   }
-  supine_physics_volume_forms_free(&forms);
   free(ones);
   return status;
 }

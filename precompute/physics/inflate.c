@@ -109,19 +109,15 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
                                           supine_reference *reference, supine_error *error) {
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
-  const double one = 1.0;
-  supine_volume_forms forms = {0};
-  supine_status status =
-      supine_physics_volume_forms_create(scan, NULL, directions, amounts, 1, &forms, error);
+  supine_volume_form forms[2];
+  supine_status status = SUPINE_OK;
+  supine_physics_volume_of_fields(scan, NULL, directions, amounts, 1, forms);
   for (size_t lung = 0; lung < scan->lung_count && status == SUPINE_OK; ++lung) {
     const double beyond = reference->scan_volume[lung];
-    supine_volume_form form;
-    supine_physics_volume_forms_contract_lung(&forms, lung, &one, &form);
-    status = find_lung_gains(&form, bend, at_rest, -beyond,
+    status = find_lung_gains(&forms[lung], bend, at_rest, -beyond,
                              reference->scan_rest[lung] - reference->full_volume[lung] - beyond,
                              reference->scan_gains[lung], error);
   }
-  supine_physics_volume_forms_free(&forms);
   return status;
 }
 

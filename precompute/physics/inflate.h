@@ -12,12 +12,11 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
 
 /* Find the gains of the scan, for a field of the reference surface applied to the scan, that
  * match the volumes of full inflation, of rest and of the scan.
- * @param scan        lungs with the scan's vertices
+ * @param scan        closed lungs with the scan's vertices
  * @param directions  [N, 3] d, mm
  * @param amounts     [N] F along the scan's gravity
  * @param reference   its volumes; scan_gains are written
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_OPEN_SURFACE */
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
                                           const double *directions, const double *amounts,
                                           supine_reference *reference, supine_error *error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Linear, quadratic and cubic forms of the volume that closed lungs gain. */
-#include <math.h>
+#include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,10 +8,11 @@
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
-#include <supine/volume.h>
 
+/* A lung's triangles are summed in PARTS, whatever the number of threads, BLOCK at a time. */
+enum { PARTS = 16, BLOCK = 64, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double millilitres = 1e-3; /* in a cubic millimetre */
+static const double sixth_ml = 1e-3 / 6.0; /* of a cubic millimetre */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -32,225 +33,258 @@ static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_fo
   return SUPINE_OK;
 }
 
-/* Triangles are summed in so many parts, whatever the number of threads, and so are the parts. */
-enum { PARTS = 16 };
-
-typedef struct forms_work {
+/* The triangles of one lung and what moves them. */
+typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *share; /* of each lung; NULL: 1 */
-  const double *directions, *columns;
-  size_t count, first; /* columns; first triangle of this lung */
+  const double *directions; /* [N, 3]; NULL: columns are vectors */
+  const double *columns;    /* [N, K], [N, 3, K] */
+  size_t count;             /* K */
+  size_t lung;
   double centre[3];
-  size_t triangles;                   /* of this lung */
-  double *linear, *quadratic, *cubic; /* one set a part */
-} forms_work;
+  double *sums; /* [PARTS, size] */
+  size_t size;
+  double *space; /* of each thread */
+  size_t room;
+} lung_work;
 
-/* Adds a range of one lung's triangles: det(p0 + F0 d0, p1 + F1 d1, p2 + F2 d2), by powers of F and
- * by axis: linear by that of d, quadratic by that of p. */
-SUPINE_CLONES static void scalar_part(const forms_work *work, size_t begin, size_t end,
-                                      size_t part) {
-  const size_t count = work->count;
-  double *linear = work->linear + 3 * part * count;
-  double *quadratic = work->quadratic + 3 * part * count * count;
-  double *cubic = work->cubic + part * count * count * count;
-  for (size_t t = begin; t < end; ++t) {
-    const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
-    double p[3][3];
-    const double *d[3];
-    const double *c[3];
-    for (size_t v = 0; v < 3; ++v) {
-      for (size_t k = 0; k < 3; ++k) {
-        p[v][k] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + k] - work->centre[k];
-      }
-      d[v] = work->directions + 3 * (size_t)corner[v];
-      c[v] = work->columns + count * (size_t)corner[v];
-    }
-    double pp[3][3]; /* p x p of the two corners besides one */
-    double dd[3][3];
-    for (size_t v = 0; v < 3; ++v) {
-      supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], pp[v]);
-      supine_cross(d[(v + 1) % 3], d[(v + 2) % 3], dd[v]);
-    }
-    const double all = supine_dot(d[0], dd[0]);
+static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
+                            const double *columns, size_t count, size_t lung) {
+  lung_work work = {
+      .lungs = lungs, .directions = directions, .columns = columns, .count = count, .lung = lung};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    work.centre[axis] = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
+  }
+  return work;
+}
+
+/* Read a triangle's corners, mm from the centre; return their indices. */
+static const uint32_t *read_corners(const lung_work *work, size_t triangle, double p[3][3]) {
+  const uint32_t *corner = work->lungs->mesh.triangles + 3 * triangle;
+  for (size_t v = 0; v < 3; ++v) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      double *row = linear + axis * count;
-      const double q01 = dd[2][axis] * p[2][axis];
-      const double q02 = dd[1][axis] * p[1][axis];
-      const double q12 = dd[0][axis] * p[0][axis];
-      for (size_t k = 0; k < count; ++k) {
-        row[k] += d[0][axis] * pp[0][axis] * c[0][k] + d[1][axis] * pp[1][axis] * c[1][k] +
-                  d[2][axis] * pp[2][axis] * c[2][k];
-        const double first = q01 * c[0][k];
-        const double second = q02 * c[0][k] + q12 * c[1][k];
-        double *square = quadratic + (axis * count + k) * count;
-        for (size_t l = 0; l < count; ++l) {
-          square[l] += first * c[1][l] + second * c[2][l];
-        }
-      }
+      p[v][axis] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + axis] - work->centre[axis];
     }
-    for (size_t k = 0; k < count; ++k) {
-      for (size_t l = 0; l < count; ++l) {
-        const double third = all * c[0][k] * c[1][l];
-        double *row = cubic + (k * count + l) * count;
-        for (size_t m = 0; m < count; ++m) {
-          row[m] += third * c[2][m];
-        }
-      }
+  }
+  return corner;
+}
+
+/* The triangles of a part: begin to end. */
+static size_t part_begin(const lung_work *work, size_t part) {
+  const size_t *begin = work->lungs->triangle_begin + work->lung;
+  return begin[0] + (begin[1] - begin[0]) * part / PARTS;
+}
+
+/* --- forms of columns ------------------------------------------------------------------------ */
+
+/* Place of the symmetric product of columns k and l. */
+static size_t pair_of(size_t k, size_t l) {
+  return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
+}
+
+/* pairs += factor (a_k b_l + a_l b_k), k >= l. */
+static void add_pairs(size_t count, double factor, const double *a, const double *b,
+                      double *pairs) {
+  for (size_t k = 0; k < count; ++k) {
+    const double first = factor * a[k];
+    const double second = factor * b[k];
+    for (size_t l = 0; l <= k; ++l) {
+      *pairs++ += first * b[l] + second * a[l];
     }
   }
 }
 
-/* The same for columns of three components: a determinant for each choice of columns. */
-static void vector_part(const forms_work *work, size_t begin, size_t end, size_t part) {
+/* Add up to BLOCK triangles: det(p0 + u0, p1 + u1, p2 + u2) by powers of u and by axis, linear by
+ * that of u, quadratic by that of p. Rows of u, area and at are corner by corner. */
+SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
+                                    double *sums) {
   const size_t count = work->count;
-  double *linear = work->linear + 3 * part * count;
-  double *quadratic = work->quadratic + 3 * part * count * count;
-  double *cubic = work->cubic + part * count * count * count;
-  for (size_t t = begin; t < end; ++t) {
-    const uint32_t *corner = work->lungs->mesh.triangles + 3 * (work->first + t);
+  const size_t pairs = count * (count + 1) / 2;
+  const size_t plane = 3 * n * count;
+  const int k = (int)count;
+  double *w = u + 3 * plane;
+  double *x = w + plane;
+  double at[3][3 * BLOCK];
+  double area[3][3 * BLOCK];
+  for (size_t t = 0; t < n; ++t) {
     double p[3][3];
-    double c[3][SUPINE_MODES_MADE_MAX][3]; /* columns at the corners */
+    const uint32_t *corner = read_corners(work, begin + t, p);
     for (size_t v = 0; v < 3; ++v) {
-      for (size_t a = 0; a < 3; ++a) {
-        p[v][a] = work->lungs->mesh.vertices[3 * (size_t)corner[v] + a] - work->centre[a];
-        for (size_t k = 0; k < count; ++k) {
-          c[v][k][a] = work->columns[(3 * (size_t)corner[v] + a) * count + k];
+      double cross[3];
+      supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], cross);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const size_t row = v * n + t;
+        const size_t from = 3 * (size_t)corner[v] + axis;
+        const bool vector = work->directions == NULL;
+        const double *c = work->columns + (vector ? from : corner[v]) * count;
+        const double d = vector ? 1.0 : work->directions[from];
+        at[axis][row] = p[v][axis];
+        area[axis][row] = cross[axis];
+        for (size_t i = 0; i < count; ++i) {
+          u[axis * plane + row * count + i] = c[i] * d;
         }
       }
     }
-    for (size_t v = 0; v < 3; ++v) {
-      const size_t a = (v + 1) % 3;
-      const size_t b = (v + 2) % 3;
-      double pp[3];
-      supine_cross(p[a], p[b], pp);
-      for (size_t k = 0; k < count; ++k) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-          linear[axis * count + k] += c[v][k][axis] * pp[axis];
-        }
-        for (size_t l = 0; l < count; ++l) {
-          double cross[3];
-          supine_cross(c[a][k], c[b][l], cross);
-          for (size_t axis = 0; axis < 3; ++axis) {
-            quadratic[(axis * count + k) * count + l] += cross[axis] * p[v][axis];
-          }
-        }
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double *y = u + (axis + 1) % 3 * plane;
+    const double *z = u + (axis + 2) % 3 * plane;
+    cblas_dgemv(CblasRowMajor, CblasTrans, (int)(3 * n), k, 1.0, u + axis * plane, k, area[axis], 1,
+                1.0, sums + axis * count, 1);
+    for (size_t row = 0; row < 3 * n; ++row) {
+      const size_t next = (row + n) % (3 * n);
+      const size_t last = (row + 2 * n) % (3 * n);
+      for (size_t i = 0; i < count; ++i) {
+        w[row * count + i] =
+            at[axis][last] * z[next * count + i] - at[axis][next] * z[last * count + i];
       }
     }
-    for (size_t k = 0; k < count; ++k) {
-      for (size_t l = 0; l < count; ++l) {
-        double cross[3];
-        supine_cross(c[0][k], c[1][l], cross);
-        double *row = cubic + (k * count + l) * count;
-        for (size_t m = 0; m < count; ++m) {
-          row[m] += supine_dot(cross, c[2][m]);
-        }
-      }
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, k, k, (int)(3 * n), 1.0, y, k, w, k, 1.0,
+                sums + (3 + axis * count) * count, k);
+    memset(x, 0, n * pairs * sizeof *x);
+    for (size_t t = 0; t < n; ++t) {
+      add_pairs(count, 0.5, y + t * count, z + (n + t) * count, x + t * pairs);
+      add_pairs(count, -0.5, z + t * count, y + (n + t) * count, x + t * pairs);
     }
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)pairs, k, (int)n, 1.0, x, (int)pairs,
+                u + axis * plane + 2 * n * count, k, 1.0, sums + 3 * (1 + count) * count, k);
   }
 }
 
 static void forms_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const forms_work *work = context;
+  const lung_work *work = context;
   for (size_t part = begin; part < end; ++part) {
-    (work->directions != NULL ? scalar_part : vector_part)(
-        work, work->triangles * part / PARTS, work->triangles * (part + 1) / PARTS, part);
+    const size_t last = part_begin(work, part + 1);
+    double *sums = work->sums + part * work->size;
+    memset(sums, 0, work->size * sizeof *sums);
+    for (size_t t = part_begin(work, part); t < last; t += BLOCK) {
+      add_block(work, t, last - t < BLOCK ? last - t : BLOCK, work->space + thread * work->room,
+                sums);
+    }
   }
 }
 
-/* Sums the parts and makes the forms symmetric. */
-static void forms_collect(const forms_work *work, size_t lung, supine_volume_forms *forms) {
+/* Sum the parts and make the forms symmetric. */
+static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
-  const double unit = millilitres / 6.0 * (work->share == NULL ? 1.0 : work->share[lung]);
-  double *linear = forms->linear + 3 * lung * n;
-  double *quadratic = forms->quadratic + 3 * lung * n * n;
-  double *cubic = forms->cubic + lung * n * n * n;
-  for (size_t t = 0; t < PARTS; ++t) {
-    const double *l = work->linear + 3 * t * n;
-    const double *q = work->quadratic + 3 * t * n * n;
-    const double *c = work->cubic + t * n * n * n;
+  double *linear = forms->linear + 3 * work->lung * n;
+  double *quadratic = forms->quadratic + 3 * work->lung * n * n;
+  double *cubic = forms->cubic + work->lung * n * n * n;
+  for (size_t part = 0; part < PARTS; ++part) {
+    const double *l = work->sums + part * work->size;
+    const double *q = l + 3 * n;
+    const double *c = q + 3 * n * n;
     for (size_t i = 0; i < 3 * n; ++i) {
       linear[i] += unit * l[i];
-      const double *square = q + i / n * n * n;
       for (size_t j = 0; j < n; ++j) {
-        quadratic[i * n + j] += unit / 2.0 * (square[i % n * n + j] + square[j * n + i % n]);
+        quadratic[i * n + j] += unit / 2.0 * (q[i * n + j] + q[(i / n * n + j) * n + i % n]);
       }
     }
-    for (size_t i = 0; i < n; ++i) {
-      for (size_t j = 0; j < n; ++j) {
-        for (size_t k = 0; k < n; ++k) {
-          cubic[(i * n + j) * n + k] +=
-              unit / 6.0 *
-              (c[(i * n + j) * n + k] + c[(i * n + k) * n + j] + c[(j * n + i) * n + k] +
-               c[(j * n + k) * n + i] + c[(k * n + i) * n + j] + c[(k * n + j) * n + i]);
-        }
-      }
+    for (size_t i = 0; i < n * n * n; ++i) {
+      const size_t a = i / (n * n);
+      const size_t b = i / n % n;
+      const size_t m = i % n;
+      cubic[i] += unit / 3.0 *
+                  (c[pair_of(a, b) * n + m] + c[pair_of(a, m) * n + b] + c[pair_of(b, m) * n + a]);
     }
   }
-}
-
-static supine_status create(const supine_lungs *lungs, const double *share,
-                            const double *directions, const double *columns, size_t count,
-                            supine_volume_forms *forms, supine_error *error) {
-  forms_work work = {
-      .lungs = lungs, .share = share, .directions = directions, .columns = columns, .count = count};
-  supine_volume_forms made = {0};
-  supine_status status = SUPINE_OK;
-  if (count > SUPINE_MODES_MADE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "volume forms of %zu columns: at most %d",
-                            count, SUPINE_MODES_MADE_MAX);
-  }
-  if (!lungs->topology.closed) {
-    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "the surface is not closed: %zu boundary, %zu non-manifold and %zu "
-                            "inconsistently oriented edges",
-                            lungs->topology.boundary_edges, lungs->topology.non_manifold_edges,
-                            lungs->topology.inconsistent_edges);
-  }
-  status = forms_allocate(lungs->lung_count, count, &made);
-  work.linear = malloc(3 * PARTS * count * sizeof(double));
-  work.quadratic = malloc(3 * PARTS * count * count * sizeof(double));
-  work.cubic = malloc(PARTS * count * count * count * sizeof(double));
-  if (status != SUPINE_OK || work.linear == NULL || work.quadratic == NULL || work.cubic == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
-                              "no memory for volume forms of %zu columns", count);
-    goto cleanup;
-  }
-  for (size_t k = 0; k < 3; ++k) {
-    work.centre[k] = 0.5 * (lungs->minimum[k] + lungs->maximum[k]);
-  }
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    memset(work.linear, 0, 3 * PARTS * count * sizeof(double));
-    memset(work.quadratic, 0, 3 * PARTS * count * count * sizeof(double));
-    memset(work.cubic, 0, PARTS * count * count * count * sizeof(double));
-    work.first = lungs->triangle_begin[lung];
-    work.triangles = lungs->triangle_begin[lung + 1] - work.first;
-    supine_parallel_for(PARTS, 1, 0, forms_range, &work);
-    forms_collect(&work, lung, &made);
-  }
-  *forms = made;
-  made = (supine_volume_forms){0};
-cleanup:
-  supine_physics_volume_forms_free(&made);
-  free(work.linear);
-  free(work.quadratic);
-  free(work.cubic);
-  return status;
 }
 
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error) {
-  return create(lungs, share, directions, columns, count, forms, error);
+  const size_t pairs = count * (count + 1) / 2;
+  const size_t size = 3 * count + 3 * count * count + pairs * count;
+  const size_t room = BLOCK * (12 * count + pairs);
+  double *sums = malloc(PARTS * size * sizeof *sums);
+  double *space = malloc(supine_thread_count() * room * sizeof *space);
+  supine_status status = forms_allocate(lungs->lung_count, count, forms);
+  if (sums == NULL || space == NULL) {
+    supine_physics_volume_forms_free(forms);
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
+                              "no memory for volume forms of %zu columns", count);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
+    lung_work work = begin_lung(lungs, directions, columns, count, lung);
+    work.sums = sums;
+    work.size = size;
+    work.space = space;
+    work.room = room;
+    supine_parallel_for(PARTS, 1, 0, forms_range, &work);
+    forms_collect(&work, sixth_ml * (share == NULL ? 1.0 : share[lung]), forms);
+  }
+  free(sums);
+  free(space);
+  return status;
 }
 
-supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
-                                                        const double *columns, size_t count,
-                                                        supine_volume_forms *forms,
-                                                        supine_error *error) {
-  return create(lungs, NULL, NULL, columns, count, forms, error);
+/* --- forms of fields ------------------------------------------------------------------------- */
+
+SUPINE_CLONES static void fields_range(void *context, size_t begin, size_t end, size_t thread) {
+  const lung_work *work = context;
+  const size_t count = work->count;
+  (void)thread;
+  for (size_t part = begin; part < end; ++part) {
+    double sums[FORM][FIELDS] = {{0.0}};
+    for (size_t t = part_begin(work, part); t < part_begin(work, part + 1); ++t) {
+      double p[3][3];
+      const double *d[3];
+      const double *f[3];
+      double first[3][3];
+      double second[3][3];
+      const uint32_t *corner = read_corners(work, t, p);
+      for (size_t v = 0; v < 3; ++v) {
+        d[v] = work->directions + 3 * (size_t)corner[v];
+        f[v] = work->columns + count * corner[v];
+      }
+      for (size_t v = 0; v < 3; ++v) {
+        supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], first[v]);
+        supine_cross(d[(v + 1) % 3], d[(v + 2) % 3], second[v]);
+      }
+      const double third = supine_dot(d[0], second[0]);
+      for (size_t v = 0; v < 3; ++v) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+          first[v][axis] *= d[v][axis];
+          second[v][axis] *= p[v][axis];
+        }
+      }
+      for (size_t l = 0; l < count; ++l) {
+        const double a = f[0][l];
+        const double b = f[1][l];
+        const double c = f[2][l];
+        for (size_t axis = 0; axis < 3; ++axis) {
+          sums[axis][l] += first[0][axis] * a + first[1][axis] * b + first[2][axis] * c;
+          sums[3 + axis][l] +=
+              second[0][axis] * b * c + second[1][axis] * c * a + second[2][axis] * a * b;
+        }
+        sums[6][l] += third * a * b * c;
+      }
+    }
+    memcpy(work->sums + part * work->size, sums, sizeof sums);
+  }
 }
+
+void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
+                                     const double *directions, const double *fields, size_t count,
+                                     supine_volume_form *forms) {
+  double sums[PARTS * FORM * FIELDS];
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung, forms += count) {
+    lung_work work = begin_lung(lungs, directions, fields, count, lung);
+    work.sums = sums;
+    work.size = FORM * FIELDS;
+    memset(forms, 0, count * sizeof *forms);
+    supine_parallel_for(PARTS, 1, 0, fields_range, &work);
+    for (size_t i = 0; i < PARTS * FORM * count; ++i) {
+      const size_t l = i % count;
+      const size_t term = i / count % FORM;
+      const size_t part = i / count / FORM;
+      forms[l].of[term] +=
+          sixth_ml * (share == NULL ? 1.0 : share[lung]) * sums[(part * FORM + term) * FIELDS + l];
+    }
+  }
+}
+
+/* --- use of forms ---------------------------------------------------------------------------- */
 
 /* out[a, j, b] = sum over i of in[a, i, b] mix[i, j]. */
 static void mix_middle(const double *in, size_t outer, size_t n, size_t inner, const double *mix,
@@ -274,22 +308,22 @@ supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, 
   const size_t larger = n > count ? n : count;
   double *first = malloc(3 * g * larger * larger * larger * sizeof *first);
   double *second = malloc(g * larger * larger * larger * sizeof *second);
-  supine_volume_forms made = {0};
-  if (first == NULL || second == NULL || forms_allocate(g, count, &made) != SUPINE_OK) {
-    free(first);
-    free(second);
-    return SUPINE_ERROR_MEMORY;
+  supine_status status = forms_allocate(g, count, mixed);
+  if (first == NULL || second == NULL) {
+    supine_physics_volume_forms_free(mixed);
+    status = SUPINE_ERROR_MEMORY;
   }
-  mix_middle(forms->linear, 3 * g, n, 1, mix, count, made.linear);
-  mix_middle(forms->quadratic, 3 * g, n, n, mix, count, first);
-  mix_middle(first, 3 * g * count, n, 1, mix, count, made.quadratic);
-  mix_middle(forms->cubic, g, n, n * n, mix, count, first);
-  mix_middle(first, g * count, n, n, mix, count, second);
-  mix_middle(second, g * count * count, n, 1, mix, count, made.cubic);
+  if (status == SUPINE_OK) {
+    mix_middle(forms->linear, 3 * g, n, 1, mix, count, mixed->linear);
+    mix_middle(forms->quadratic, 3 * g, n, n, mix, count, first);
+    mix_middle(first, 3 * g * count, n, 1, mix, count, mixed->quadratic);
+    mix_middle(forms->cubic, g, n, n * n, mix, count, first);
+    mix_middle(first, g * count, n, n, mix, count, second);
+    mix_middle(second, g * count * count, n, 1, mix, count, mixed->cubic);
+  }
   free(first);
   free(second);
-  *mixed = made;
-  return SUPINE_OK;
+  return status;
 }
 
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
@@ -300,17 +334,21 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
                          forms->cubic + lung * n * n * n, weights, form);
 }
 
+void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]) {
+  static const double even[3] = {1.0, 1.0, 1.0};
+  double part[3];
+  supine_volume_form_along(form, even, part);
+  for (size_t i = 0; i < 3; ++i) {
+    cubic[i] += part[i];
+  }
+}
+
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]) {
-  static const double even[3] = {1.0, 1.0, 1.0};
   cubic[0] = cubic[1] = cubic[2] = 0.0;
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
     supine_volume_form form;
-    double part[3];
     supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
-    supine_volume_form_along(&form, even, part);
-    for (size_t i = 0; i < 3; ++i) {
-      cubic[i] += part[i];
-    }
+    supine_physics_volume_form_add(&form, cubic);
   }
 }

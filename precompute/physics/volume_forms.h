@@ -15,7 +15,7 @@
 /** Most functions of orientation that a basis is made with. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
-/** Forms of each lung for K columns, mL. */
+/** The forms of each lung for K columns, mL. */
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
@@ -26,37 +26,43 @@ typedef struct supine_volume_forms {
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
-/** Forms of closed lungs; a collapsed lung's are its share of its healthy ones (disease.h).
- * @param directions  [N, 3] d of the healthy shape, mm
- * @param columns     [N, count] c, at most SUPINE_MODES_MADE_MAX
- * Cost: count^3 multiplications a triangle. Uses all cores.
- * @retval SUPINE_ERROR_ARGUMENT      more columns
- * @retval SUPINE_ERROR_OPEN_SURFACE  an edge is not shared by exactly two triangles
+/** Find the forms of closed lungs.
+ * @param share       [G] of each lung's healthy volume (disease.h); NULL: 1
+ * @param directions  [N, 3] d of the healthy shape, mm; NULL: the columns are vectors,
+ *                    u_ij = A_j sum over k of w_k c_ijk
+ * @param columns     [N, count] c, or [N, 3, count]
+ * Cost: 3 count^3 / 2 multiplications a triangle. Uses all cores.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
-/** The same for vector fields, u_ij = A_j sum over k of w_k c_ikj.
- * @param columns  [N, 3, count] */
-supine_status supine_physics_volume_forms_create_vector(const supine_lungs *lungs,
-                                                        const double *columns, size_t count,
-                                                        supine_volume_forms *forms,
-                                                        supine_error *error);
+/** Most fields of supine_physics_volume_of_fields. */
+enum { SUPINE_VOLUME_FIELDS = 16 };
 
-/** Forms for the columns c' = c x mix, mix [K, count].
+/** Find the forms of closed lungs for each of some fields u_ij = A_j f_i d_ij alone.
+ * @param fields  [N, count] f
+ * @param forms   [G, count] */
+void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
+                                     const double *directions, const double *fields, size_t count,
+                                     supine_volume_form *forms);
+
+/** Find the forms for the columns c' = c x mix, mix [K, count].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
                                               size_t count, supine_volume_forms *mixed);
 
-/** The form of one lung for weights [K], mL. */
+/** Compute the form of one lung for weights [K], mL. */
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);
 
-/** Coefficients of s, s^2 and s^3 where all gains are s, summed over the lungs: into cubic [3], mL.
- */
+/** Compute the volume of all lungs as a polynomial of one gain for all axes: the coefficients, mL,
+ * of s, s^2 and s^3 into cubic [3]. */
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
+
+/** Add one lung's coefficients of that polynomial. */
+void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif

@@ -143,10 +143,7 @@ supine_status supine_projection_compression_volume_forms(
     columns[i] = (double)compression->coefficients[i];
   }
   const supine_status status =
-      directions != NULL
-          ? supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms,
-                                               error)
-          : supine_physics_volume_forms_create_vector(lungs, columns, count, forms, error);
+      supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms, error);
   free(columns);
   return status;
 }

@@ -2,12 +2,11 @@
 /* The full solve at directions that no grid used. */
 #include <cblas.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sh/base/vec3.h"
 
 #include "precompute/projection/held_out.h"
-
-enum { AT_ONCE = 16 }; /* directions whose fields are held */
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
   static const double off_the_grids = 0.3; /* rad: grids have a node at longitude 0 */
@@ -23,35 +22,33 @@ void supine_accuracy_held_out_free(supine_held_out *held_out) {
   *held_out = (supine_held_out){0};
 }
 
-/* The volume against breath scale of each direction's field. */
+/* Find the volume of each direction's field as a polynomial of the gain. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth, double *cubic,
                                  supine_error *error) {
+  enum { AT_ONCE = SUPINE_VOLUME_FIELDS };
   const size_t n = lungs->mesh.vertex_count;
   const int rank = (int)truth->rank;
+  supine_volume_form forms[2 * AT_ONCE];
   double *fields = malloc(AT_ONCE * n * sizeof *fields);
-  supine_status status =
-      fields != NULL ? SUPINE_OK
-                     : supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                        "no memory for the fields of %d directions", AT_ONCE);
-  for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
-    if (d % AT_ONCE == 0) {
-      const size_t left = truth->direction_count - d;
-      cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)(left < AT_ONCE ? left : AT_ONCE),
-                  (int)n, rank, 1.0, truth->functions + d * truth->rank, rank, truth->columns, rank,
-                  0.0, fields, (int)n);
+  if (fields == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the fields of %d directions",
+                            AT_ONCE);
+  }
+  memset(cubic, 0, 3 * truth->direction_count * sizeof *cubic);
+  for (size_t first = 0; first < truth->direction_count; first += AT_ONCE) {
+    const size_t left = truth->direction_count - first;
+    const size_t count = left < AT_ONCE ? left : AT_ONCE;
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)n, (int)count, rank, 1.0,
+                truth->columns, rank, truth->functions + first * truth->rank, rank, 0.0, fields,
+                (int)count);
+    supine_physics_volume_of_fields(lungs, share, directions, fields, count, forms);
+    for (size_t i = 0; i < lungs->lung_count * count; ++i) {
+      supine_physics_volume_form_add(&forms[i], cubic + 3 * (first + i % count));
     }
-    supine_volume_forms forms = {0};
-    const double one = 1.0;
-    status = supine_physics_volume_forms_create(lungs, share, directions, fields + d % AT_ONCE * n,
-                                                1, &forms, error);
-    if (status == SUPINE_OK) {
-      supine_physics_volume_forms_contract(&forms, &one, cubic + 3 * d);
-    }
-    supine_physics_volume_forms_free(&forms);
   }
   free(fields);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Eight parameters: the lungs and their law, what was solved, and what comes of it. */
