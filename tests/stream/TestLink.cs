@@ -4,6 +4,7 @@ using System;
 using System.Diagnostics;
 using System.Threading;
 using Supine;
+using UnityEngine;
 
 static class TestLink
 {
@@ -21,6 +22,21 @@ static class TestLink
         for (int i = 0; i < a.Length; ++i) most = Math.Max(most, Math.Abs(a[i] - b[i]));
         Expect(!float.IsNaN(most), "finite numbers");
         return most;
+    }
+
+    // Six times the enclosed volume, positive where triangles are in the order that the axes take for
+    // outward faces.
+    static double Volume(float[] p, int[] t)
+    {
+        double sum = 0;
+        for (int i = 0; i < t.Length; i += 3)
+        {
+            int a = 3 * t[i], b = 3 * t[i + 1], c = 3 * t[i + 2];
+            sum += p[a] * ((double)p[b + 1] * p[c + 2] - (double)p[b + 2] * p[c + 1])
+                 + p[a + 1] * ((double)p[b + 2] * p[c] - (double)p[b] * p[c + 2])
+                 + p[a + 2] * ((double)p[b] * p[c + 1] - (double)p[b + 1] * p[c]);
+        }
+        return sum;
     }
 
     static float[] Answer(Link link, ulong wanted)
@@ -46,6 +62,11 @@ static class TestLink
             new float[] { -1, 0, 0, 0, 0, 1, 0, 1, 0 },
             new float[] { 0, -1, 0, 0, 0, 1, -1, 0, 0 },
             new float[] { 0, 1, 0, 0, 0, 1, 1, 0, 0 } };
+        // The same as turns of an object in Unity, from standing: face up and face down about x, then on
+        // a side about z.
+        const float h = 0.70710678f;
+        Quaternion[] turns = { new Quaternion(-h, 0, 0, h), new Quaternion(h, 0, 0, h),
+                               new Quaternion(0, 0, h, h), new Quaternion(0, 0, -h, h) };
         string[] postures = { "supine", "prone", "left", "right" };
         using (Basis basis = new Basis(words[1]))
         using (Link link = new Link("127.0.0.1", int.Parse(words[0])))
@@ -55,8 +76,11 @@ static class TestLink
             float[] before = new float[rest.Length];
             for (int i = 0; i < 4; ++i)
             {
+                link.SendPose("Patient", LungBehaviour.Pose(turns[i]), (ulong)(90 + i));
+                float[] turned = Answer(link, (ulong)(90 + i));
                 link.SendPose("Patient", rotations[i], (ulong)(100 + i));
                 float[] frame = Answer(link, (ulong)(100 + i));
+                Expect(Far(turned, frame) < 1e-4f, "an object turned to a posture has its weights");
                 Expect(Far(frame, basis.Frame(postures[i] + ":rest+400")) < 1e-4f, "weights and gains of the posture");
                 basis.Deform(frame, xyz);
                 Expect(Far(xyz, rest) > 1, "the lung moves");
@@ -68,6 +92,15 @@ static class TestLink
             basis.Deform(Answer(link, 200), xyz);
             Expect(Far(xyz, rest) < 0.02f, "full, the lung is the file's, as stored");
             Expect(basis.Triangles().Length == 3 * basis.TriangleCount, "triangles");
+            Expect(Volume(rest, basis.Triangles()) > 0, "faces outwards in right-handed axes");
+            for (int i = 0; i < rest.Length; i += 3)
+            {
+                Vector3 p = LungBehaviour.ToUnity(rest[i], rest[i + 1], rest[i + 2]);
+                xyz[i] = p.x;
+                xyz[i + 1] = p.y;
+                xyz[i + 2] = p.z;
+            }
+            Expect(Volume(xyz, LungBehaviour.ToUnity(basis.Triangles())) > 0, "clockwise seen from outside in left-handed axes");
         }
         return 0;
     }

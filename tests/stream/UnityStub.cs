@@ -7,6 +7,19 @@ namespace UnityEngine
         public float x, y, z;
         public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; }
     }
+    public struct Quaternion
+    {
+        public float x, y, z, w;
+        public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        // v + 2 w (q x v) + 2 q x (q x v): the same formula in left-handed axes, where turns are clockwise.
+        public static Vector3 operator *(Quaternion q, Vector3 v)
+        {
+            Vector3 t = new Vector3(2 * (q.y * v.z - q.z * v.y), 2 * (q.z * v.x - q.x * v.z), 2 * (q.x * v.y - q.y * v.x));
+            return new Vector3(v.x + q.w * t.x + q.y * t.z - q.z * t.y, v.y + q.w * t.y + q.z * t.x - q.x * t.z,
+                               v.z + q.w * t.z + q.x * t.y - q.y * t.x);
+        }
+    }
+    public class Transform { public bool hasChanged; public Quaternion rotation; }
     public class Mesh
     {
         public Rendering.IndexFormat indexFormat;
@@ -16,6 +29,6 @@ namespace UnityEngine
         public void RecalculateNormals() {}
     }
     public class MeshFilter { public Mesh mesh; }
-    public class MonoBehaviour { public T GetComponent<T>() where T : class { return null; } }
+    public class MonoBehaviour { public Transform transform; public T GetComponent<T>() where T : class { return null; } }
 }
 namespace UnityEngine.Rendering { public enum IndexFormat { UInt16, UInt32 } }

@@ -6,7 +6,7 @@ import sys
 
 sys.path.insert(0, sys.argv[1])
 from answers import answer, faces  # noqa: E402
-from supine_link import Basis, Link, array, crc64, instruments, quaternion, string, unpack  # noqa: E402
+from supine_link import Basis, Link, array, corners, crc64, instruments, quaternion, string, unpack  # noqa: E402
 
 port, basis = int(sys.argv[2]), Basis(sys.argv[3])
 MM = 5e-3  # packed storage of the run-time library: at most this far from the file's numbers
@@ -45,12 +45,12 @@ for version in (1, 2):
     # Surfaces are what the file's own numbers make of the weights.
     link.check = False  # 650 kB a frame are too many for plain Python
     link.ask_for("points")
-    _, (points, triangles) = link.newest(10.0)  # what there is, and the triangles once
-    assert faces(triangles) == faces(basis.triangles)
+    _, (points, strips) = link.newest(10.0)  # the last frame again, with the triangles
+    assert faces(list(corners(strips))) == faces(basis.triangles)
     for stamp, pose in ((201, SUPINE), (202, LEFT)):
         kind, _, _, content = answer(link, stamp, lambda: link.send_pose(pose, stamp=stamp))
-        points, corners = unpack(kind, content)
-        assert not corners
+        points, strips = unpack(kind, content)
+        assert not strips
         assert far(points, basis.deform(frames[stamp - 100])) < MM
         assert far(points, basis.vertices) > 1.0
     link.set_volume("full")  # what the file itself shows, but for upright

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Puts the followed lung into a Unity scene: add it to an object with a MeshFilter, name the basis
-// file and the server of 'supine stream'. Unity's axes are left-handed, in metres, y up: a body that
-// stands has left, back, head at -x, -z, y seen from the front.
+// Puts the lung into a Unity scene: add it to an object with a MeshFilter, name the basis file and the
+// server of 'supine stream'. The object is the patient: its rotation is sent to the server whenever it
+// changes. Unity's axes are left-handed, in metres, y up: an object that is not turned is a standing
+// patient who faces +z, with left, back and head at -x, -z and +y.
 using UnityEngine;
 using UnityEngine.Rendering;
 
@@ -15,10 +16,39 @@ public class LungBehaviour : MonoBehaviour
     float[] xyz;
     Vector3[] positions;
     Mesh mesh;
+    ulong sent;
 
     public static Vector3 ToUnity(float left, float back, float head)
     {
         return new Vector3(-1e-3f * left, 1e-3f * head, -1e-3f * back);
+    }
+
+    /// <summary>Corners in the order that a left-handed engine takes for front faces.</summary>
+    public static int[] ToUnity(int[] corners)
+    {
+        for (int i = 0; i < corners.Length; i += 3)
+        {
+            int second = corners[i + 1];
+            corners[i + 1] = corners[i + 2];
+            corners[i + 2] = second;
+        }
+        return corners;
+    }
+
+    /// <summary>Rows of the rotation from the body (left, back, head) to a world whose z points up, of
+    /// an object's rotation.</summary>
+    public static float[] Pose(Quaternion rotation)
+    {
+        Vector3[] axes = { rotation * new Vector3(-1, 0, 0), rotation * new Vector3(0, 0, -1),
+                           rotation * new Vector3(0, 1, 0) };
+        float[] rows = new float[9];
+        for (int column = 0; column < 3; ++column)
+        {
+            rows[column] = -axes[column].x;
+            rows[3 + column] = -axes[column].z;
+            rows[6 + column] = axes[column].y;
+        }
+        return rows;
     }
 
     void Start()
@@ -31,13 +61,18 @@ public class LungBehaviour : MonoBehaviour
         mesh.indexFormat = IndexFormat.UInt32;
         mesh.MarkDynamic();
         Show();
-        mesh.triangles = basis.Triangles();
+        mesh.triangles = ToUnity(basis.Triangles());
         mesh.RecalculateNormals();
         GetComponent<MeshFilter>().mesh = mesh;
     }
 
     void Update()
     {
+        if (transform.hasChanged)
+        {
+            link.SendPose("Patient", Pose(transform.rotation), ++sent);
+            transform.hasChanged = false;
+        }
         ulong stamp;
         float[] frame = link.TakeNewest(out stamp);
         if (frame == null) return;

@@ -3,21 +3,15 @@
 
 In Slicer's Python console, with 'supine stream lungs.safetensors --send points --space ras' running:
 
-    exec(open("/path/to/slicer_lung.py").read())
+    import sys; sys.path.append("/path/to/samples")   # the folder of this file and supine_link.py
+    from slicer_lung import Follow
     follow = Follow("PatientToRoom")   # a linear transform node: how the patient lies
     follow.stop()
 
 Slicer's axes are right, front, head (RAS), the patient's and, in a room where nobody has turned yet,
 the room's. So a patient who lies on the back has the identity, and things fall along -y: start the
-server with SERVER_OPTIONS. Needs supine_link.py beside this file."""
-import os
-import sys
-
-try:
-    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-except NameError:  # exec() of this file's text
-    pass
-from supine_link import Link, unpack  # noqa: E402
+server with SERVER_OPTIONS."""
+from supine_link import Link, corners, unpack
 
 SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",
                   "--body-from-tracker", "0,0,0,1"]
@@ -30,7 +24,7 @@ def rotation_of(matrix):
 
 
 class Surface:
-    """The lung as the server sends it: the newest points, and the triangles once."""
+    """Receives the lung: the newest points, and the triangles of the first frame."""
 
     def __init__(self, host="localhost", port=18944):
         self.link = Link(host, port)
@@ -41,7 +35,7 @@ class Surface:
         self.link.send_pose(rotation_of(matrix), DEVICE)
 
     def newest(self, timeout=0.0):
-        """(stamp, points, flat) of the newest frame since the last call, or None."""
+        """Return (stamp, flat points) of the newest frame since the last call, or None."""
         last = None
         self.link.receive(timeout)
         while True:
@@ -52,8 +46,8 @@ class Surface:
                 continue
             kind, _, stamp, content = message
             if kind == "POLYDATA":
-                points, triangles = unpack(kind, content)
-                self.triangles = triangles or self.triangles
+                points, strips = unpack(kind, content)
+                self.triangles = self.triangles or list(corners(strips))
                 last = (stamp, points)
 
 
@@ -93,7 +87,7 @@ class Follow:
 
 
 def show_points(vtk, model, points, triangles):
-    """Puts points into a model: its triangles with the first frame."""
+    """Set the points of a model, and with the first frame its triangles."""
     import numpy
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 

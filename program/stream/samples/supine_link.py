@@ -5,10 +5,12 @@
     link.send_pose(rotation)               # 3 x 3, rows
     stamp, frame = link.newest(timeout=1)  # weights and gains, or points
 """
+import array as arrays
 import json
 import select
 import socket
 import struct
+import sys
 import time
 
 HEADER = struct.Struct(">H12s20sQQQ")
@@ -72,8 +74,16 @@ def string(text):
     return struct.pack(">HH", 3, len(text)) + text.encode("ascii")
 
 
-def _corners(words):
-    """Corners of the triangles of strips: of each its length, then its corners."""
+def _numbers(kind, content):
+    """Big-endian numbers as an array of this machine's."""
+    numbers = arrays.array(kind, content)
+    if sys.byteorder == "little":
+        numbers.byteswap()
+    return numbers
+
+
+def corners(words):
+    """Yield the corners of the triangles of strips: the length of each strip, then its corners."""
     begin = 0
     while begin < len(words):
         strip = words[begin + 1:begin + 1 + words[begin]]
@@ -83,8 +93,8 @@ def _corners(words):
 
 
 def unpack(kind, content):
-    """NDARRAY: a tuple of floats. POLYDATA: (points as a flat tuple of x, y, z, triangles of its
-    strips as a flat tuple of corners). STRING: text. Others: the bytes."""
+    """Decode the content of a message. NDARRAY: a tuple of floats. POLYDATA: (flat array of x, y, z,
+    array of its strips for `corners`). STRING: text. Others: the bytes."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -93,9 +103,9 @@ def unpack(kind, content):
         return struct.unpack_from(f">{count}{'f' if scalar == 10 else 'd'}", content, 2 + 2 * dimension)
     if kind == "POLYDATA":
         points, _, vertices, _, lines, _, polygons, _, size, _ = struct.unpack_from(">10I", content)
-        words = struct.unpack_from(f">{size // 4}I", content,
-                                   40 + 12 * points + vertices + lines + polygons)
-        return struct.unpack_from(f">{3 * points}f", content, 40), tuple(_corners(words))
+        strips = 40 + 12 * points + vertices + lines + polygons
+        return (_numbers("f", content[40:40 + 12 * points]),
+                _numbers("I", content[strips:strips + size]))
     if kind == "STRING":
         return content[4:].decode()
     return content
