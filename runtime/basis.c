@@ -299,26 +299,31 @@ static bool read_numbers(const char *text, size_t count, double *values) {
   return true;
 }
 
-/* mL that each lung of the reference surface encloses. */
+/* Compute the volume in mL that each lung of the reference surface encloses. */
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
-  for (size_t t = 0; t < info->triangle_count; ++t) {
-    const uint32_t *corner = info->triangles + 3 * t;
+  for (size_t t = 0; t < info->triangle_count;) {
     size_t lung = 0;
-    while (corner[0] >= info->lung_begin[lung + 1]) {
+    while (info->triangles[3 * t] >= info->lung_begin[lung + 1]) {
       ++lung;
     }
     const float *origin = info->vertices + 3 * info->lung_begin[lung];
-    double p[3][3];
-    for (size_t i = 0; i < 9; ++i) {
-      p[i / 3][i % 3] =
-          (double)info->vertices[3 * (size_t)corner[i / 3] + i % 3] - (double)origin[i % 3];
+    double volume = basis->reference_volume[lung];
+    for (; t < info->triangle_count && info->triangles[3 * t] >= info->lung_begin[lung] &&
+           info->triangles[3 * t] < info->lung_begin[lung + 1];
+         ++t) {
+      double p[3][3];
+      for (size_t i = 0; i < 9; ++i) {
+        const size_t corner = info->triangles[3 * t + i / 3];
+        p[i / 3][i % 3] = (double)info->vertices[3 * corner + i % 3] - (double)origin[i % 3];
+      }
+      for (size_t i = 0; i < 3; ++i) {
+        const size_t j = (i + 1) % 3;
+        const size_t k = (i + 2) % 3;
+        volume += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
+      }
     }
-    for (size_t i = 0; i < 3; ++i) {
-      const size_t j = (i + 1) % 3;
-      const size_t k = (i + 2) % 3;
-      basis->reference_volume[lung] += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
-    }
+    basis->reference_volume[lung] = volume;
   }
 }
 

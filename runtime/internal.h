@@ -34,8 +34,8 @@ struct supine_basis {
   supine_prefetch prefetch;
   /** Of mode k: what one unit of its packed coefficients stands for. */
   double mode_scale[SUPINE_MODES_MAX];
-  double mode_error[SUPINE_MODES_MAX]; /**< largest error by packing, mm at weight and scale 1 */
-  double mode_size[SUPINE_MODES_MAX];  /**< largest displacement, mm at weight and scale 1 */
+  /** Bounds of mode k on the error of packing and on the displacement, mm at weight and gain 1. */
+  double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< what info.reference_volume points to */
   const double *resting; /**< [G, 9] mL beyond the reference, or [9] for all lungs; or NULL */
   bool rest_by_lung;     /**< which of both; all lungs share one scale where it is [9] */
@@ -45,7 +45,7 @@ struct supine_basis {
   const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
   size_t rigid_count;
   double rest_error; /**< largest error of a rest position, mm */
-  double rest_size;  /**< largest distance of a rest position from 0, mm */
+  double rest_size;  /**< bound on the distance of a rest position from 0, mm */
 };
 
 /** Packs the tensors into tiles of that storage (not AUTO), in place of those before.
@@ -72,9 +72,6 @@ static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
-
-/** Zeroed memory for tiles, aligned to lines, in huge pages where it fills some. */
-unsigned char *supine_tiles_allocate(size_t bytes);
 
 /** Evaluates vertices begin <= i < end, all of one lung, into a target for them. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,

@@ -4,6 +4,7 @@
 
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
+#include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
 enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
@@ -19,40 +20,42 @@ uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size
   return normal_narrow(three[0], three[1], three[2]);
 }
 
-/* Word `word` of 16 vertices along one axis. */
-SUPINE_CLONES static void pack_word(const supine_basis *basis, size_t tile, size_t axis,
-                                    size_t word, unsigned char *at) {
-  const size_t last = basis->info.vertex_count - 1;
-  const size_t count = basis->info.normal_count;
-  double three[3][TILE] = {{0}};
-  uint32_t packed[TILE];
-  for (size_t j = word, which = 0; j < count; j += supine_tiles_normal_words(count), ++which) {
-    for (size_t v = 0; v < TILE; ++v) {
-      const size_t i = tile * TILE + v < last ? tile * TILE + v : last;
-      three[which][v] = basis->info.normals[(3 * i + axis) * count + j] * (1 / normal_unit());
+/* Pack the normals of 16 vertices, whose modes begin at `row`. */
+SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
+                                    unsigned char *to) {
+  const size_t words = supine_tiles_normal_words(tiles->modes);
+  for (size_t at = 0; at < 3 * words; ++at, to += TILE * sizeof(uint32_t)) {
+    const size_t word = at % words;
+    const size_t axis = at / words;
+    double three[3][TILE] = {{0}};
+    uint32_t packed[TILE];
+    for (size_t which = 0; which < 3 && word + which * words < tiles->modes; ++which) {
+      for (size_t v = 0; v < TILE; ++v) {
+        three[which][v] = row[v][axis * tiles->modes + word + which * words] * (1 / normal_unit());
+      }
     }
+    for (size_t v = 0; v < TILE; ++v) {
+      packed[v] = normal_narrow(three[0][v], three[1][v], three[2][v]);
+    }
+    memcpy(to, packed, sizeof packed);
   }
-  for (size_t v = 0; v < TILE; ++v) {
-    packed[v] = normal_narrow(three[0][v], three[1][v], three[2][v]);
-  }
-  memcpy(at, packed, sizeof packed);
 }
 
 supine_status supine_basis_pack_normals(supine_basis *basis) {
   supine_tiles *tiles = &basis->lit;
-  const size_t tile_count = (basis->info.vertex_count + TILE - 1) / TILE;
-  supine_tiles_layout_lit(tiles, basis->info.normal_count, tile_count);
-  tiles->bytes = supine_tiles_allocate(tile_count * tiles->stride);
+  const size_t last = basis->info.vertex_count - 1;
+  supine_tiles_layout_lit(tiles, basis->info.normal_count, last / TILE + 1);
+  tiles->bytes = supine_platform_allocate(tiles->count * tiles->stride);
   if (tiles->bytes == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t t = 0; t < tile_count; ++t) {
-    unsigned char *tile = tiles->bytes + t * tiles->stride;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      for (size_t j = 0; j < supine_tiles_normal_words(tiles->modes); ++j) {
-        pack_word(basis, t, axis, j, tile + axis * tiles->axis_bytes + 64 * j);
-      }
+  for (size_t t = 0; t < tiles->count; ++t) {
+    const int16_t *row[TILE];
+    for (size_t v = 0; v < TILE; ++v) {
+      const size_t i = t * TILE + v < last ? t * TILE + v : last;
+      row[v] = basis->info.normals + 3 * tiles->modes * i;
     }
+    pack_tile(tiles, row, tiles->bytes + t * tiles->stride);
   }
   return SUPINE_OK;
 }
