@@ -31,9 +31,9 @@ typedef struct request {
   double fps, seconds, step; /* 0: not given */
 } request;
 
-static int read_turn(const char *command, const char *text, void *field) {
+static supine_status read_turn(const char *text, void *field, supine_error *error) {
   request *wanted = field;
-  return supine_command_read_turn(command, text, &wanted->turn);
+  return supine_command_read_turn(text, &wanted->turn, error);
 }
 
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
@@ -83,8 +83,8 @@ static const supine_option table[] = {
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
-/* Number of frames and what was left to default; an exit code. */
-static int complete(request *wanted, size_t *count) {
+/* Compute the values that depend on several options, and the number of frames. */
+static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
   if (wanted->step > 0.0) { /* the flow is this volume per frame, in and out */
@@ -93,31 +93,31 @@ static int complete(request *wanted, size_t *count) {
     breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
   }
   if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
-    return supine_options_usage(name, "--as-scanned is for VTP files only (tensors are in LPS "
-                                      "and mm): leave it out");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--as-scanned is for VTP files only (tensors are in LPS and mm): leave "
+                            "it out");
   }
   if (wanted->turns && wanted->orientation.given) {
-    return supine_options_usage(name, "give --turn or one posture, not both");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
   }
   if (!wanted->turns) {
-    const int result =
-        supine_options_orientation_finish(&wanted->orientation, name, wanted->turn.to);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
+    const supine_status status =
+        supine_options_gravity(&wanted->orientation, wanted->turn.to, error);
+    if (status != SUPINE_OK) {
+      return status;
     }
     memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
   }
   double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;
   seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
   const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
-  if (!(frames <= FRAMES_MAX)) {
-    return supine_options_usage(name,
-                                "%g s at %g frames a second exceed %d frames: lower "
-                                "--seconds or --fps",
+  *count = (size_t)fmin(frames, FRAMES_MAX);
+  return frames <= FRAMES_MAX
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "%g s at %g frames a second exceed %d frames: lower --seconds or "
+                                "--fps",
                                 seconds, wanted->fps, FRAMES_MAX);
-  }
-  *count = (size_t)frames;
-  return SUPINE_EXIT_OK;
 }
 
 /* Print the volumes, and the time that frames took. */
@@ -275,35 +275,30 @@ static void begin(void *chosen) {
   ((request *)chosen)->breath = supine_breath_default();
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
+  supine_mesh_save_options frame = {0};
   supine_basis *basis = NULL;
-  supine_error error;
   size_t count = 1;
-  int result = complete(wanted, &count);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
+  supine_status status = complete(wanted, &count, error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
   }
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, &error);
   if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
-    status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
+    status = supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                               "%s: its surface is open and encloses no volume: close the mesh "
                               "before 'supine precompute'",
                               path);
   }
-  supine_mesh_save_options frame = {0};
   if (status == SUPINE_OK) {
-    result = supine_options_basis_frame(basis, name, wanted->as_scanned, &frame);
+    status = supine_options_basis_frame(basis, wanted->as_scanned, &frame, error);
   }
-  if (status == SUPINE_OK && result == SUPINE_EXIT_OK) {
-    status = play(basis, wanted, &frame, count, given->made_by, &error);
-  }
-  if (result == SUPINE_EXIT_OK) {
-    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    status = play(basis, wanted, &frame, count, given->made_by, error);
   }
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_breathe = {

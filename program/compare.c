@@ -12,20 +12,20 @@
 
 static const char name[] = "compare";
 
-static int write_file(const char *path, const supine_comparison *comparison, bool html) {
+static supine_status write_file(const char *path, const supine_comparison *comparison, bool html,
+                                supine_error *error) {
   supine_output output = {0};
-  supine_error error;
-  supine_status status = supine_output_open(path, &output, &error);
+  supine_status status = supine_output_open(path, &output, error);
   if (status == SUPINE_OK && html) {
-    status = supine_report_html(comparison, output.file, &error);
+    status = supine_report_html(comparison, output.file, error);
   } else if (status == SUPINE_OK) {
     supine_report_csv(comparison, output.file);
   }
   if (status == SUPINE_OK) {
-    status = supine_output_commit(&output, &error);
+    status = supine_output_commit(&output, error);
   }
   supine_output_abandon(&output);
-  return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(name, &error);
+  return status;
 }
 
 typedef struct request {
@@ -60,24 +60,25 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 /* Write the report in every form requested. */
-static int tell(const supine_comparison *comparison, const request *wanted) {
+static supine_status write_all(const supine_comparison *comparison, const request *wanted,
+                               supine_error *error) {
+  supine_status status = SUPINE_OK;
   if (!wanted->json) {
     supine_report_text(comparison, stdout);
   } else if (!supine_report_json(comparison, stdout)) {
-    supine_options_say(name, "cannot print JSON: %s", strerror(errno));
-    return SUPINE_EXIT_OUTPUT;
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot print JSON: %s", strerror(errno));
   }
-  int result = supine_options_finish(name);
-  if (result == SUPINE_EXIT_OK && wanted->csv != NULL) {
-    result = write_file(wanted->csv, comparison, false);
+  if (wanted->csv != NULL) {
+    status = write_file(wanted->csv, comparison, false, error);
   }
-  if (result == SUPINE_EXIT_OK && wanted->html != NULL) {
-    result = write_file(wanted->html, comparison, true);
+  if (status == SUPINE_OK && wanted->html != NULL) {
+    status = write_file(wanted->html, comparison, true, error);
   }
-  return result;
+  return status;
 }
 
-static int compare(const char *path, const supine_basis *basis, const request *wanted) {
+static supine_status compare(const char *path, const supine_basis *basis, const request *wanted,
+                             supine_error *error) {
   supine_comparison comparison = {.path = path,
                                   .command = name,
                                   .allow_folds = wanted->volume.allow_folds,
@@ -86,51 +87,46 @@ static int compare(const char *path, const supine_basis *basis, const request *w
                                   .rms = wanted->rms,
                                   .from = wanted->from,
                                   .breath = wanted->breath};
-  supine_error error;
   comparison.state.gravity[1] = 1.0;
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
-  int result = supine_options_posture_list_parse(name, wanted->postures, &comparison.postures);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
+  supine_status status =
+      supine_options_posture_list_parse(wanted->postures, &comparison.postures, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   if (!wanted->by_rms && !supine_basis_get_info(basis)->has_volume) {
-    supine_options_say(name,
-                       "%s: the surface is open and encloses no volume: give --rms MM, or close "
-                       "the mesh before 'supine precompute'",
-                       path);
-    return SUPINE_EXIT_INPUT;
+    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                            "%s: the surface is open and encloses no volume: give --rms MM, or "
+                            "close the mesh before 'supine precompute'",
+                            path);
   }
   if (supine_basis_metadata(basis, "content") != NULL) { /* the basis is from 'supine embed' */
-    if (wanted->html != NULL || wanted->by_rms) {
-      return supine_options_usage(name,
+    return wanted->html != NULL || wanted->by_rms
+               ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "-o and --rms are for lungs, and this basis holds structures "
-                                  "inside: give the lungs' basis, or leave them out");
-    }
-    return supine_command_compare_content(name, basis, &comparison.postures, &comparison.state,
-                                          wanted->json, wanted->csv);
+                                  "inside: give the lungs' basis, or leave them out")
+               : supine_command_compare_content(basis, &comparison.postures, &comparison.state,
+                                                wanted->json, wanted->csv, error);
   }
-  if (supine_report_find(&comparison, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
+  status = supine_report_find(&comparison, error);
+  if (status == SUPINE_OK) {
+    status = write_all(&comparison, wanted, error);
   }
-  result = tell(&comparison, wanted);
-cleanup:
   supine_report_free(&comparison);
-  return result;
+  return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   supine_basis *basis = NULL;
-  supine_error error;
-  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
-      SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  supine_status status =
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
+  if (status == SUPINE_OK) {
+    status = compare(given->operand[0], basis, chosen, error);
   }
-  const int result = compare(given->operand[0], basis, chosen);
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_compare = {

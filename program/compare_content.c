@@ -174,40 +174,39 @@ static supine_status write_all(const comparison *c, bool json, const char *csv,
   return status;
 }
 
-int supine_command_compare_content(const char *command, const supine_basis *basis,
-                                   const supine_posture_list *postures, const supine_state *volume,
-                                   bool json, const char *csv) {
+supine_status supine_command_compare_content(const supine_basis *basis,
+                                             const supine_posture_list *postures,
+                                             const supine_state *volume, bool json, const char *csv,
+                                             supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   comparison c = {.postures = postures};
-  supine_error error;
-  supine_status status = supine_command_names_open(basis, &c.names, &error);
+  supine_status status = supine_command_names_open(basis, &c.names, error);
   if (status != SUPINE_OK) {
-    return supine_options_fail(command, &error);
+    return status;
   }
   float *step = malloc(3 * n * sizeof *step);
   c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
   c.errors = calloc(postures->count * postures->count * c.names.count, sizeof *c.errors);
   if (step == NULL || c.moves == NULL || c.errors == NULL) {
-    status = supine_error_set(&error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
   }
   for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
     supine_state state = *volume;
     memcpy(state.gravity, postures->item[i].gravity, sizeof state.gravity);
-    status = find_moves(basis, &state, &c.names, step, c.moves + 3 * i * c.names.count, &error);
+    status = find_moves(basis, &state, &c.names, step, c.moves + 3 * i * c.names.count, error);
     for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
       supine_state other = *volume;
       memcpy(other.gravity, postures->item[j].gravity, sizeof other.gravity);
       status = find_errors(basis, &other, &state, &c.names,
-                           c.errors + (i * postures->count + j) * c.names.count, &error);
+                           c.errors + (i * postures->count + j) * c.names.count, error);
     }
   }
   if (status == SUPINE_OK) {
-    status = write_all(&c, json, csv, &error);
+    status = write_all(&c, json, csv, error);
   }
   free(step);
   free(c.moves);
   free(c.errors);
   supine_command_names_close(&c.names);
-  return status == SUPINE_OK ? supine_options_finish(command)
-                             : supine_options_fail(command, &error);
+  return status;
 }

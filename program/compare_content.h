@@ -9,10 +9,11 @@
 #include "program/options/state.h"
 
 /* Prints, for every two postures and every name, how far what goes by it moves and where to: the
- * mean over its vertices. As a table, or as JSON; and as CSV where `csv` is not NULL. An exit code.
+ * mean over its vertices. As a table, or as JSON; and as CSV where `csv` is not NULL.
  * @param volume  in every posture */
-int supine_command_compare_content(const char *command, const supine_basis *basis,
-                                   const supine_posture_list *postures, const supine_state *volume,
-                                   bool json, const char *csv);
+supine_status supine_command_compare_content(const supine_basis *basis,
+                                             const supine_posture_list *postures,
+                                             const supine_state *volume, bool json, const char *csv,
+                                             supine_error *error);
 
 #endif

@@ -85,31 +85,30 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
 }
 
 /* Compute the pose requested: by largest displacement from the reference surface, or by volumes. */
-static int find_pose(const supine_basis *basis, const request *wanted, const double gravity[3],
-                     supine_mesh *mesh, supine_pose *pose) {
+static supine_status find_pose(const supine_basis *basis, const request *wanted,
+                               const double gravity[3], supine_mesh *mesh, supine_pose *pose,
+                               supine_error *error) {
   if (!wanted->has_scale) {
-    return supine_options_pose(basis, name, &wanted->volume, gravity, pose);
+    return supine_options_pose(basis, name, &wanted->volume, gravity, pose, error);
   }
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   supine_mesh reference = {0};
   (void)supine_basis_weights(basis, gravity, pose->weights); /* a unit vector is legal */
   supine_pose_fill(pose, 1.0);
-  if (supine_options_basis_rest_mesh(basis, &reference) != SUPINE_OK ||
-      deformed_mesh(basis, pose, mesh, NULL) != SUPINE_OK) {
-    supine_mesh_free(&reference);
-    return supine_options_fail(name, &error);
+  supine_status status = supine_options_basis_rest_mesh(basis, &reference);
+  if (status == SUPINE_OK) {
+    status = deformed_mesh(basis, pose, mesh, NULL);
   }
-  const double largest = largest_displacement(&reference, mesh);
+  if (status == SUPINE_OK) {
+    const double largest = largest_displacement(&reference, mesh);
+    supine_pose_fill(pose, wanted->scale / largest);
+    status = largest > 0.0 ? SUPINE_OK
+                           : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                              "nothing moves in this direction of gravity, so no "
+                                              "--scale gives %g mm: give another posture",
+                                              wanted->scale);
+  }
   supine_mesh_free(&reference);
-  if (!(largest > 0.0)) {
-    supine_options_say(name,
-                       "nothing moves in this direction of gravity, so no --scale gives "
-                       "%g mm: give another posture",
-                       wanted->scale);
-    return SUPINE_EXIT_NUMERICAL;
-  }
-  supine_pose_fill(pose, wanted->scale / largest);
-  return SUPINE_EXIT_OK;
+  return status;
 }
 
 /* Print in one line the file written, the displacement and the volume. */
@@ -124,185 +123,186 @@ static void report(const char *path, const double gravity[3], const supine_mesh 
   (void)putchar('\n');
 }
 
-/* Over 60 lines: what a surface needs is made in one place and freed in one. */
-static int deform(const supine_basis *basis, const request *wanted, const double gravity[3]) {
+/* Write the surface of a pose, with its volumes, normals and expected errors. `from` and `mesh` are
+ * copies of the reference surface. */
+static supine_status write_surface(const char *path, const supine_basis *basis,
+                                   supine_deformation *moved, supine_mesh *from, supine_mesh *mesh,
+                                   supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  supine_pose pose;
-  supine_reference_pose reference;
-  supine_expected expected = {0};
-  supine_state state = wanted->volume.state;
-  supine_mesh from = {0};
-  supine_mesh mesh = {0};
-  float *normals = NULL;
-  char comment[128];
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  int result = SUPINE_EXIT_OK;
-  if (supine_options_basis_rest_mesh(basis, &from) != SUPINE_OK ||
-      supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK ||
-      supine_options_reference(basis, &wanted->from, false, &reference, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
-  }
-  result = find_pose(basis, wanted, gravity, &mesh, &pose);
-  if (result != SUPINE_EXIT_OK) {
-    goto cleanup;
-  }
-  memcpy(state.gravity, gravity, sizeof state.gravity);
-  if (!wanted->has_scale && supine_options_expected_find(basis, &state, &reference.state, &expected,
-                                                         &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
-  }
-  (void)snprintf(comment, sizeof comment, "displacement from %s", reference.name);
-  supine_mesh_save_options save = {.rest = from.vertices, .comment = comment};
-  result = supine_options_basis_frame(basis, name, wanted->as_scanned, &save);
-  if (result == SUPINE_EXIT_OK && supine_command_deform_content_wanted(&wanted->content)) {
-    result = supine_command_deform_content(&wanted->content, name, basis, &pose, &reference,
-                                           wanted->from.given, &expected, &save);
-    goto cleanup;
-  }
-  if (result != SUPINE_EXIT_OK) {
-    goto cleanup;
-  }
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
+  const double *gravity = moved->state.gravity;
+  supine_mesh_save_options *save = &moved->save;
   double volumes[SUPINE_LUNGS_MAX];
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
                                       {"volume_mL", info->lung_count, volumes}};
+  float *normals = malloc(3 * mesh->vertex_count * sizeof *normals);
+  supine_status status =
+      normals != NULL ? deformed_mesh(basis, &moved->from.pose, from, NULL) : SUPINE_ERROR_MEMORY;
+  if (status == SUPINE_OK) {
+    status = deformed_mesh(basis, &moved->pose, mesh, normals);
+  }
   if (info->has_volume) {
-    supine_basis_volumes(basis, &pose, volumes);
+    supine_basis_volumes(basis, &moved->pose, volumes);
   }
-  normals = malloc(3 * mesh.vertex_count * sizeof *normals);
-  if (normals == NULL || deformed_mesh(basis, &reference.pose, &from, NULL) != SUPINE_OK ||
-      deformed_mesh(basis, &pose, &mesh, normals) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
+  save->rest = from->vertices;
+  save->normals = mesh->triangle_count > 0 ? normals : NULL; /* points have no normals */
+  save->expected_error = moved->expected.sigma;
+  save->lung = lung == NULL ? NULL : lung->data;
+  save->fields = fields;
+  save->field_count = info->has_volume ? 2 : 1;
+  if (status == SUPINE_OK) {
+    status = supine_mesh_save(path, mesh, save, error);
   }
-  save.normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no volume */
-  save.expected_error = expected.sigma;
-  save.lung = lung == NULL ? NULL : lung->data;
-  save.fields = fields;
-  save.field_count = info->has_volume ? 2 : 1;
-  if (supine_mesh_save(wanted->content.path, &mesh, &save, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
+  if (status == SUPINE_OK) {
+    report(path, gravity, mesh, from, moved->from.name,
+           info->has_volume && supine_basis_metadata(basis, "content") == NULL);
+    supine_options_expected_print(&moved->expected, stdout);
   }
-  report(wanted->content.path, gravity, &mesh, &from, reference.name,
-         info->has_volume && supine_basis_metadata(basis, "content") == NULL);
-  supine_options_expected_print(&expected, stdout);
-  result = supine_options_finish(name);
-cleanup:
-  supine_options_expected_free(&expected);
+  free(normals);
+  return status;
+}
+
+static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
+  supine_deformation moved = {.state = wanted->volume.state, .from_given = wanted->from.given};
+  supine_mesh from = {0};
+  supine_mesh mesh = {0};
+  char comment[128];
+  supine_status status = supine_options_gravity(&wanted->orientation, moved.state.gravity, error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_rest_mesh(basis, &from);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_rest_mesh(basis, &mesh);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
+  }
+  if (status == SUPINE_OK) {
+    status = find_pose(basis, wanted, moved.state.gravity, &mesh, &moved.pose, error);
+  }
+  if (status == SUPINE_OK && !wanted->has_scale) {
+    status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
+                                          error);
+  }
+  if (status == SUPINE_OK) {
+    (void)snprintf(comment, sizeof comment, "displacement from %s", moved.from.name);
+    moved.save.comment = comment;
+    status = supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_command_deform_content_wanted(&wanted->content)
+                 ? supine_command_deform_content(&wanted->content, basis, &moved, error)
+                 : write_surface(wanted->content.path, basis, &moved, &from, &mesh, error);
+  }
+  supine_options_expected_free(&moved.expected);
   supine_mesh_free(&from);
   supine_mesh_free(&mesh);
-  free(normals);
-  return result;
+  return status;
 }
 
 /* Fill a request with the state and the output of a row of --states. */
-static int read_row(const supine_csv *csv, request *row) {
+static supine_status read_row(const supine_csv *csv, request *row, supine_error *error) {
   const char *const output = supine_csv_text(csv, 1);
   const char *const volume = supine_csv_text(csv, 2);
   supine_state *state = &row->volume.state;
-  supine_error error;
+  supine_error reason;
   state->gravity[1] = 1.0; /* supine, unless the row says otherwise */
-  supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &error);
+  supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &reason);
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
-    status = supine_state_parse_volume(volume, state, &error);
+    status = supine_state_parse_volume(volume, state, &reason);
   }
   if (status != SUPINE_OK) {
-    return supine_options_usage(name, "%s:%zu: %s", csv->path, csv->line, error.message);
+    return supine_error_set(error, status, "%s:%zu: %s", csv->path, csv->line, reason.message);
   }
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
   if (!voxels && !supine_mesh_save_supports(output) &&
       !supine_text_ends_in_any_case(output, ".csv")) {
-    return supine_options_usage(name, "%s:%zu: %s: the name must end in %s", csv->path, csv->line,
-                                output, ENDINGS);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
+                            csv->path, csv->line, output, ENDINGS);
   }
   memcpy(row->orientation.gravity, state->gravity, sizeof state->gravity);
   row->orientation.given = true;
   row->output = supine_path_beside(csv->path, output);
   *(voxels && !image ? &row->content.field : &row->content.path) = row->output;
-  return row->output == NULL
-             ? supine_options_fail(name, &(supine_error){SUPINE_ERROR_MEMORY, "out of memory"})
-             : supine_command_deform_content_check(&row->content, name);
+  return row->output == NULL ? SUPINE_ERROR_MEMORY
+                             : supine_command_deform_content_check(&row->content, error);
 }
 
 /* Check that the output of the last row is no input and no other row's output, and can be
  * written. */
-static int check_row(const char *basis, const request *rows, size_t count) {
+static supine_status check_row(const char *basis, const request *rows, size_t count,
+                               supine_error *error) {
   const request *row = &rows[count - 1];
   const char *const inputs[] = {basis, row->states, row->content.image, row->content.labels};
-  supine_error error;
-  for (size_t i = 0; i < sizeof inputs / sizeof *inputs; ++i) {
-    if (inputs[i] != NULL &&
-        supine_options_check_output(name, row->output, inputs[i]) != SUPINE_EXIT_OK) {
-      return SUPINE_EXIT_USAGE;
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < sizeof inputs / sizeof *inputs && status == SUPINE_OK; ++i) {
+    if (inputs[i] != NULL) {
+      status = supine_options_check_output(row->output, inputs[i], error);
     }
   }
-  for (size_t i = 0; i + 1 < count; ++i) {
+  for (size_t i = 0; i + 1 < count && status == SUPINE_OK; ++i) {
     if (strcmp(rows[i].output, row->output) == 0) {
-      return supine_options_usage(name, "%s: two rows write %s: give each its own file",
-                                  row->states, row->output);
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "%s: two rows write %s: give each its own file", row->states,
+                                row->output);
     }
   }
-  return supine_output_try(row->output, &error) == SUPINE_OK ? SUPINE_EXIT_OK
-                                                             : supine_options_fail(name, &error);
+  return status == SUPINE_OK ? supine_output_try(row->output, error) : status;
 }
 
-/* Requests for the rows of --states, all checked before any work. */
-static int read_rows(const char *basis, const request *wanted, request **rows, size_t *count) {
+/* Make a request for each row of --states, all checked before any work. */
+static supine_status read_rows(const char *basis, const request *wanted, request **rows,
+                               size_t *count, supine_error *error) {
   static const char *const columns[] = {"posture", "output", "volume"};
   supine_csv csv;
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
-  supine_status status = supine_csv_open(wanted->states, columns, 3, 2, &csv, &error);
   bool more = true;
-  int result = status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(name, &error);
-  if (result == SUPINE_EXIT_OK && wanted->orientation.given) {
-    result = supine_options_usage(name, "give a posture or --states, not both");
+  if (wanted->orientation.given) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a posture or --states, not both");
   }
-  while (result == SUPINE_EXIT_OK && more) {
-    request *grown = realloc(*rows, (*count + 1) * sizeof **rows);
-    *rows = grown != NULL ? grown : *rows;
-    if (grown == NULL || supine_csv_next(&csv, &more, &error) != SUPINE_OK) {
-      result = supine_options_fail(name, &error);
-    } else if (more) {
+  supine_status status = supine_csv_open(wanted->states, columns, 3, 2, &csv, error);
+  while (status == SUPINE_OK && more) {
+    status = supine_csv_next(&csv, &more, error);
+    if (status == SUPINE_OK && more) {
+      request *grown = realloc(*rows, (*count + 1) * sizeof **rows);
+      if (grown == NULL) {
+        status = SUPINE_ERROR_MEMORY;
+        break;
+      }
+      *rows = grown;
       grown[*count] = *wanted;
-      result = read_row(&csv, &grown[(*count)++]);
-      result = result == SUPINE_EXIT_OK ? check_row(basis, grown, *count) : result;
+      status = read_row(&csv, &grown[(*count)++], error);
+      status = status == SUPINE_OK ? check_row(basis, grown, *count, error) : status;
     }
   }
   supine_csv_close(&csv);
-  return result == SUPINE_EXIT_OK && *count == 0
-             ? supine_options_usage(name, "%s: no row follows the header: add at least one",
-                                    wanted->states)
-             : result;
+  return status == SUPINE_OK && *count == 0
+             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "%s: no row follows the header: add at least one", wanted->states)
+             : status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const bool many = wanted->states != NULL;
   request *rows = many ? NULL : wanted;
   size_t count = many ? 0 : 1;
   supine_basis *basis = NULL;
-  supine_error error;
   double gravity[3];
-  int result = many ? read_rows(given->operand[0], wanted, &rows, &count)
-                    : supine_command_deform_content_check(&wanted->content, name);
-  if (result == SUPINE_EXIT_OK && !many) {
-    result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
+  supine_status status = many ? read_rows(given->operand[0], wanted, &rows, &count, error)
+                              : supine_command_deform_content_check(&wanted->content, error);
+  if (status == SUPINE_OK && !many) {
+    status = supine_options_gravity(&wanted->orientation, gravity, error);
   }
-  if (result == SUPINE_EXIT_OK && supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT,
-                                                            &basis, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, error);
   }
-  if (result == SUPINE_EXIT_OK) {
-    result = supine_command_deform_content_read(&wanted->content, name);
+  if (status == SUPINE_OK) {
+    status = supine_command_deform_content_read(&wanted->content, name, error);
   }
-  for (size_t i = 0; i < count && result == SUPINE_EXIT_OK; ++i) {
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     rows[i].content.source = wanted->content.source;
-    (void)supine_options_orientation_finish(&rows[i].orientation, name, gravity); /* was given */
-    result = deform(basis, &rows[i], gravity);
+    status = deform(basis, &rows[i], error);
   }
   for (size_t i = 0; i < count; ++i) {
     free(rows[i].output);
@@ -310,7 +310,7 @@ static int run(void *chosen, const supine_arguments *given) {
   free(many ? rows : NULL);
   supine_image_free(&wanted->content.source);
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_deform = {

@@ -39,56 +39,54 @@ const supine_option supine_command_deform_content_options[] = {
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {.name = NULL}};
 
-int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command) {
+supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
+                                                  supine_error *error) {
   const bool image = wanted->image != NULL || wanted->labels != NULL;
   if (wanted->path == NULL && (image || wanted->field == NULL)) {
-    return supine_options_usage(command, "-o FILE is missing; its name must end in %s",
-                                image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "-o FILE is missing; its name must end in %s",
+                            image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
   }
   if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
-    return supine_options_usage(command,
-                                image
-                                    ? "%s: --image and --labels write .nrrd, .nii, .nii.gz or .mha"
-                                    : "%s: which image? Give --image FILE or --labels FILE",
-                                wanted->path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            image ? "%s: --image and --labels write .nrrd, .nii, .nii.gz or .mha"
+                                  : "%s: which image? Give --image FILE or --labels FILE",
+                            wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {
-    return supine_options_usage(command, "--inverse changes --field-out FILE: give that too");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--inverse changes --field-out FILE: give that too");
   }
-  if (wanted->density && wanted->image == NULL) {
-    return supine_options_usage(command, "--density changes --image FILE: give that too");
-  }
-  return SUPINE_EXIT_OK;
+  return wanted->density && wanted->image == NULL
+             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "--density changes --image FILE: give that too")
+             : SUPINE_OK;
 }
 
-int supine_command_deform_content_read(supine_deform_content *wanted, const char *command) {
-  static const double aerated =
-      -300.0; /* Hounsfield units: some voxel of any lung lies below this */
+supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
+                                                 supine_error *error) {
+  static const double aerated = -300.0; /* Hounsfield units; every lung has voxels below it */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
-  supine_error error;
-  if (path == NULL) {
-    return SUPINE_EXIT_OK;
+  const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
+  if (status != SUPINE_OK || wanted->image == NULL) {
+    return status;
   }
-  if (supine_image_read(path, image, &error) != SUPINE_OK) {
-    return supine_options_fail(command, &error);
-  }
-  double least = INFINITY;
-  for (size_t i = 0; wanted->density && i < image->size[0] * image->size[1] * image->size[2]; ++i) {
-    least = fmin(least, supine_image_get(image, i));
-  }
-  if (wanted->density && !(least < aerated)) {
-    (void)supine_error_set(&error, SUPINE_ERROR_FORMAT,
-                           "%s: no voxel is below %g, so it is not in Hounsfield units, which "
-                           "--density needs: convert it, or leave the option out",
-                           path, aerated);
-    return supine_options_fail(command, &error);
-  }
-  if (wanted->image != NULL && !wanted->density) {
+  if (!wanted->density) {
     supine_options_say(command, "densities are not scaled by the change of volume; for a CT, "
                                 "--density keeps the tissue's mass");
+    return SUPINE_OK;
   }
-  return SUPINE_EXIT_OK;
+  double least = INFINITY;
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    least = fmin(least, supine_image_get(image, i));
+  }
+  return least < aerated
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: no voxel is below %g, so it is not in Hounsfield units, which "
+                                "--density needs: convert it, or leave the option out",
+                                path, aerated);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
@@ -96,7 +94,7 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
          supine_text_ends_in_any_case(wanted->path, ".csv");
 }
 
-/* A vector, mm, LPS, in other axes and another unit. */
+/* Convert a vector, mm, LPS, to other axes and another unit. */
 static void in_frame(supine_axes axes, double unit, const double lps[3], double out[3]) {
   double matrix[3][3];
   supine_mesh_axes_matrix(axes, matrix);
@@ -105,11 +103,11 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* name, lung, x, y, z and where that is now; over 60 lines, one a column. */
+/* Write name, lung, position and displacement of each point; over 60 lines, one for each column. */
 static supine_status write_points(const char *path, const supine_basis *basis,
-                                  const supine_pose *pose, const supine_reference_pose *from,
-                                  const supine_expected *expected,
-                                  const supine_mesh_save_options *frame, supine_error *error) {
+                                  const supine_deformation *moved, supine_error *error) {
+  const supine_mesh_save_options *frame = &moved->save;
+  const float *sigma = moved->expected.sigma;
   const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
   char axes[4];
   char unit_name[24];
@@ -129,17 +127,17 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
-    supine_deform(basis, pose, xyz);
-    supine_deform(basis, &from->pose, before);
+    supine_deform(basis, &moved->pose, xyz);
+    supine_deform(basis, &moved->from.pose, before);
     supine_mesh_unit_name(unit, unit_name);
     supine_mesh_axes_letters(frame->axes, axes);
     (void)fprintf(
         output.file,
         "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: its length%s\n"
         "name,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
-        from->name, axes, unit_name,
-        expected->sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
-        expected->sigma == NULL ? "" : ",expected_error_mm");
+        moved->from.name, axes, unit_name,
+        sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
+        sigma == NULL ? "" : ",expected_error_mm");
     for (size_t i = 0; i < n; ++i) { /* in the order of the input */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
@@ -147,14 +145,14 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       const double to[3] = {(double)p[0], (double)p[1], (double)p[2]};
       const double d[3] = {to[0] - (double)q[0], to[1] - (double)q[1], to[2] - (double)q[2]};
       double there[3];
-      double moved[3];
+      double shift[3];
       in_frame(frame->axes, unit, to, there);
-      in_frame(frame->axes, unit, d, moved);
+      in_frame(frame->axes, unit, d, shift);
       (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f",
                     names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
-                    there[0], there[1], there[2], moved[0], moved[1], moved[2], supine_length(d));
-      if (expected->sigma != NULL) {
-        (void)fprintf(output.file, ",%.3f", (double)expected->sigma[at]);
+                    there[0], there[1], there[2], shift[0], shift[1], shift[2], supine_length(d));
+      if (sigma != NULL) {
+        (void)fprintf(output.file, ",%.3f", (double)sigma[at]);
       }
       (void)fputc('\n', output.file);
     }
@@ -162,7 +160,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   if (status == SUPINE_OK) {
     (void)printf("%s: %zu %s, displacement from %s\n", path, n, n == 1 ? "point" : "points",
-                 from->name);
+                 moved->from.name);
   }
   free(xyz);
   free(before);
@@ -228,8 +226,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
-/* The field from one state to another: back to the scan by the inverse of the first, and on by the
- * second. */
+/* Compute the field from one state to another: back to the scan by the inverse of the first field,
+ * and on by the second, which the result replaces. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};
@@ -268,16 +266,15 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* The field from one pose to another; a pose of the scan needs no way back. */
-static supine_status find_field(const supine_basis *basis, const supine_pose *pose,
-                                const supine_reference_pose *before, bool other,
+/* Compute the field from the state that displacements start from to the pose. */
+static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};
-  supine_status status = supine_field_create(basis, pose, fade, field, error);
-  if (status == SUPINE_OK && other) {
-    status = supine_field_create(basis, &before->pose, fade, &first, error);
+  supine_status status = supine_field_create(basis, &moved->pose, fade, field, error);
+  if (status == SUPINE_OK && moved->from_given) {
+    status = supine_field_create(basis, &moved->from.pose, fade, &first, error);
   }
-  if (status == SUPINE_OK && other) {
+  if (status == SUPINE_OK && moved->from_given) {
     status = join_fields(&first, field, error);
   }
   supine_field_free(&first);
@@ -285,17 +282,16 @@ static supine_status find_field(const supine_basis *basis, const supine_pose *po
 }
 
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
-                               const supine_pose *pose, const supine_reference_pose *before,
-                               bool other, supine_error *error) {
+                               const supine_deformation *moved, supine_error *error) {
   const bool image = wanted->source.values != NULL;
   supine_field forward = {0};
   supine_field inverse = {0};
-  supine_status status = find_field(basis, pose, before, other, &forward, error);
+  supine_status status = find_field(basis, moved, &forward, error);
   if (status == SUPINE_OK && (image || wanted->inverse)) {
     status = invert(&forward, &inverse, error);
   }
   if (status == SUPINE_OK && wanted->field != NULL) {
-    status = write_field(wanted, before->name, &forward, &inverse, error);
+    status = write_field(wanted, moved->from.name, &forward, &inverse, error);
   }
   if (status == SUPINE_OK && image) {
     status = write_image(wanted, &forward, &inverse, error);
@@ -305,24 +301,19 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return status;
 }
 
-/* Eight parameters: those of the command. */
-int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
-                                  const supine_basis *basis, const supine_pose *pose,
-                                  const supine_reference_pose *from, bool other,
-                                  const supine_expected *expected,
-                                  const supine_mesh_save_options *frame) {
-  supine_error error;
+supine_status supine_command_deform_content(const supine_deform_content *wanted,
+                                            const supine_basis *basis,
+                                            const supine_deformation *moved, supine_error *error) {
   supine_status status = SUPINE_OK;
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
-    status = move_grid(wanted, basis, pose, from, other, &error);
+    status = move_grid(wanted, basis, moved, error);
   }
   if (status == SUPINE_OK && wanted->path != NULL &&
       supine_text_ends_in_any_case(wanted->path, ".csv")) {
-    status = write_points(wanted->path, basis, pose, from, expected, frame, &error);
+    status = write_points(wanted->path, basis, moved, error);
     if (status == SUPINE_OK) {
-      supine_options_expected_print(expected, stdout);
+      supine_options_expected_print(&moved->expected, stdout);
     }
   }
-  return status == SUPINE_OK ? supine_options_finish(command)
-                             : supine_options_fail(command, &error);
+  return status;
 }

@@ -21,24 +21,30 @@ typedef struct supine_deform_content {
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* Check that the options fit each other; return an exit code. */
-int supine_command_deform_content_check(const supine_deform_content *wanted, const char *command);
+/* A state of the lungs, and where displacements start. */
+typedef struct supine_deformation {
+  supine_state state;
+  supine_pose pose;
+  supine_reference_pose from; /* also the state of images */
+  bool from_given;            /* it is not the scan */
+  supine_expected expected;
+  supine_mesh_save_options save; /* axes and unit of the output */
+} supine_deformation;
 
-/* Reads what --image or --labels names, and says whether densities are scaled; an exit code. */
-int supine_command_deform_content_read(supine_deform_content *wanted, const char *command);
+/* Check that the options fit each other (SUPINE_ERROR_ARGUMENT). */
+supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
+                                                  supine_error *error);
 
-/* Is what is wanted none of a surface's files? */
+/* Read the image of --image or --labels, and print whether densities are scaled. */
+supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
+                                                 supine_error *error);
+
+/* Return whether points, a field or an image is wanted instead of a surface. */
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 
-/* Writes what is wanted, and says what it wrote; an exit code.
- * @param from      what displacements count from, and the state that images are in
- * @param other     that is not the scan
- * @param expected  errors, for CSV
- * @param frame     axes and unit of CSV */
-int supine_command_deform_content(const supine_deform_content *wanted, const char *command,
-                                  const supine_basis *basis, const supine_pose *pose,
-                                  const supine_reference_pose *from, bool other,
-                                  const supine_expected *expected,
-                                  const supine_mesh_save_options *frame);
+/* Write the points, field or image, and print what was written. */
+supine_status supine_command_deform_content(const supine_deform_content *wanted,
+                                            const supine_basis *basis,
+                                            const supine_deformation *moved, supine_error *error);
 
 #endif

@@ -9,11 +9,12 @@
 static const char name[] = "render";
 static const double seen_through = 0.35; /* opacity of lungs with something inside */
 
-int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
-                              const supine_command_drawing *wanted, const supine_posture_item *item,
-                              supine_command_drawn *found) {
+supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
+                                        const supine_command_drawing *wanted,
+                                        const supine_posture_item *item,
+                                        supine_command_drawn *found, supine_error *error) {
   if (wanted->scale == 0.0) {
-    return supine_options_pose(basis, name, &wanted->volume, item->gravity, &found->pose);
+    return supine_options_pose(basis, name, &wanted->volume, item->gravity, &found->pose, error);
   }
   supine_distance_statistics statistics;
   (void)supine_basis_weights(basis, item->gravity, found->pose.weights); /* a unit vector */
@@ -21,12 +22,12 @@ int supine_command_drawn_find(const supine_basis *basis, const supine_compare *c
   supine_compare_distances(compare, &found->pose, NULL, found->value);
   supine_compare_statistics(compare, found->value, &statistics);
   if (!(statistics.max > 0.0)) {
-    supine_options_say(name, "nothing moves in %s, so no --scale gives %g mm: give another posture",
-                       item->name, wanted->scale);
-    return SUPINE_EXIT_NUMERICAL;
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "nothing moves in %s, so no --scale gives %g mm: give another posture",
+                            item->name, wanted->scale);
   }
   supine_pose_fill(&found->pose, wanted->scale / statistics.max);
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,

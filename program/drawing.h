@@ -39,11 +39,11 @@ typedef struct supine_command_drawn {
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* Compute the pose for a direction of gravity of that name; return an exit code. Overwrites `value`
- * [N]. */
-int supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
-                              const supine_command_drawing *wanted, const supine_posture_item *item,
-                              supine_command_drawn *found);
+/* Compute the pose for a direction of gravity of that name. Overwrites `value` [N]. */
+supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
+                                        const supine_command_drawing *wanted,
+                                        const supine_posture_item *item,
+                                        supine_command_drawn *found, supine_error *error);
 
 /* What the colours show, and the words below the posture's name; `ends`, of the colours, grow: the
  * 95th percentile, the largest. */
@@ -62,12 +62,12 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
                                         const supine_command_drawn *shown, const char *title,
                                         const double gravity[3]);
 
-/* The turn as an animation; an exit code. */
-int supine_command_drawing_turn(const supine_basis *basis, const supine_command_drawing *wanted,
-                                const supine_reference_pose *from);
+/* Draw the turn as an animation. */
+supine_status supine_command_drawing_turn(const supine_basis *basis,
+                                          const supine_command_drawing *wanted,
+                                          const supine_reference_pose *from, supine_error *error);
 
-/* "supine:left:10s" into a breath_turn, as --turn takes it; an exit code or SUPINE_OPTION_MISFIT.
- */
-int supine_command_read_turn(const char *command, const char *value, breath_turn *turn);
+/* Read "supine:left:10s", the value of --turn. Statuses as supine_option_reader. */
+supine_status supine_command_read_turn(const char *value, breath_turn *turn, supine_error *error);
 
 #endif

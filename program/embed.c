@@ -42,9 +42,9 @@ typedef struct request {
 } request;
 
 /* "all", "7", "7=nodule,8=vessels" */
-static int read_labels(const char *command, const char *text, void *field) {
+static supine_status read_labels(const char *text, void *field, supine_error *error) {
   label_list *list = field;
-  (void)command;
+  (void)error;
   list->given = true;
   list->count = 0;
   for (const char *at = text; strcmp(text, "all") != 0;) {
@@ -53,7 +53,7 @@ static int read_labels(const char *command, const char *text, void *field) {
     const bool named = digits < length && at[digits] == '=';
     if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
         length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
-      return SUPINE_OPTION_MISFIT;
+      return SUPINE_ERROR_ARGUMENT;
     }
     char *called = list->name[list->count];
     list->label[list->count] = (unsigned)strtoul(at, NULL, 10);
@@ -65,7 +65,7 @@ static int read_labels(const char *command, const char *text, void *field) {
       break;
     }
   }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 static const supine_option table[] = {
@@ -201,64 +201,60 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
   }
 }
 
-static int embed(const supine_basis *basis, const request *wanted, const supine_arguments *given) {
+static supine_status embed(const supine_basis *basis, const request *wanted,
+                           const supine_arguments *given, supine_error *error) {
+  const supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
   supine_inside_shells shells = {0};
   supine_inside_content content = {0};
   supine_inside_report report;
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
-  const supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
-  if (supine_inside_shells_create(basis, &shells, &error) != SUPINE_OK ||
-      read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, &error) !=
-          SUPINE_OK ||
-      (wanted->rigid != NULL &&
-       supine_inside_content_make_rigid(&content, wanted->rigid, &error) != SUPINE_OK) ||
-      supine_inside_embed(&shells, &content, &options, wanted->path, &report, &error) !=
-          SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
+  supine_status status = supine_inside_shells_create(basis, &shells, error);
+  if (status == SUPINE_OK) {
+    status = read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, error);
+  }
+  if (status == SUPINE_OK && wanted->rigid != NULL) {
+    status = supine_inside_content_make_rigid(&content, wanted->rigid, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_inside_embed(&shells, &content, &options, wanted->path, &report, error);
+  }
+  if (status == SUPINE_OK) {
     tell(&shells, &content, &report, wanted);
-    result = supine_options_finish(name);
   }
   supine_inside_content_free(&content);
   supine_inside_shells_free(&shells);
-  return result;
+  return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
+  const bool labels = wanted->labels.given;
   supine_basis *basis = NULL;
-  supine_error error;
   bool image = false;
   for (size_t i = 1; i < given->count; ++i) {
     image = image || supine_image_is_named(given->operand[i]);
   }
   if (given->count == 1 && !wanted->has_grid) {
-    return supine_options_usage(
-        name, "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an image, or "
-              "--grid MM");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an "
+                            "image, or --grid MM");
   }
-  if (wanted->labels.given && (!image || wanted->has_grid)) {
-    return supine_options_usage(name, image ? "--labels takes surfaces, --grid voxels: one of the "
-                                              "two"
-                                            : "--labels is of label maps: name one (.nrrd, .nii, "
-                                              ".nii.gz)");
+  if (labels && (!image || wanted->has_grid)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            image ? "--labels embeds surfaces and --grid voxels: give one of them"
+                                  : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
   }
-  if (!wanted->labels.given && image && given->count > 2) {
-    return supine_options_usage(name,
-                                "a grid, or an image, goes into a file of its own; of a label "
-                                "map, --labels takes the parts");
+  if (!labels && given->count > 1 && (image ? given->count > 2 : wanted->has_grid)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a grid, or an image, needs a file of its own; --labels embeds the "
+                            "parts of a label map beside other content");
   }
-  if (!image && given->count > 1 && wanted->has_grid) {
-    return supine_options_usage(name, "a grid, or an image, goes into a file of its own");
+  supine_status status =
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
+  if (status == SUPINE_OK) {
+    status = embed(basis, wanted, given, error);
   }
-  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
-      SUPINE_OK) {
-    return supine_options_fail(name, &error);
-  }
-  const int result = embed(basis, wanted, given);
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_embed = {

@@ -22,7 +22,7 @@ typedef struct request {
   export_glb_options glb;
 } request;
 
-static int read_profile(const char *command, const char *text, void *field) {
+static supine_status read_profile(const char *text, void *field, supine_error *error) {
   static const char *const names[] = {"raw", "8", "clamp-safe", "8,clamp-safe"};
   enum { NAMES = sizeof names / sizeof *names };
   export_glb_options *glb = field;
@@ -30,13 +30,13 @@ static int read_profile(const char *command, const char *text, void *field) {
     if (strcmp(text, names[i]) == 0) {
       glb->eight = i == 1 || i == 3;
       glb->clamp_safe = i >= 2;
-      return SUPINE_EXIT_OK;
+      return SUPINE_OK;
     }
   }
   const char *nearest = supine_options_suggest(text, names, NAMES);
-  return supine_options_usage(command, "no profile '%s'%s%s", text,
-                              nearest != NULL ? "; did you mean " : ": raw, 8 or clamp-safe",
-                              nearest != NULL ? nearest : "");
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no profile '%s'%s%s", text,
+                          nearest != NULL ? "; did you mean " : ": give raw, 8 or clamp-safe",
+                          nearest != NULL ? nearest : "");
 }
 
 static const supine_option table[] = {
@@ -84,15 +84,17 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
-static int write_glb(const export_source *source, const request *wanted) {
+static supine_status write_glb(const export_source *source, const request *wanted,
+                               supine_error *error) {
   export_glb_report report = {0};
-  supine_error error;
   if (source->resting_rows > 1) {
     supine_options_say(name, "morph targets have the same gains for both lungs: their total volume "
                              "is exact, each lung's own is not; a page (.html) has both");
   }
-  if (supine_export_glb_write(wanted->path, source, &wanted->glb, &report, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  const supine_status status =
+      supine_export_glb_write(wanted->path, source, &wanted->glb, &report, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   (void)printf("%s: %zu morph targets%s, %.1f MB\n", wanted->path, report.targets,
                wanted->glb.animate ? " and an animation" : "", 1e-6 * (double)report.bytes);
@@ -100,14 +102,15 @@ static int write_glb(const export_source *source, const request *wanted) {
     (void)printf("  of %zu modes: leaves out %.3g %% of the RMS displacement\n",
                  source->info->mode_count, report.loss_percent);
   }
-  return supine_options_finish(name);
+  return SUPINE_OK;
 }
 
-static int write_page(const export_source *source, const request *wanted, const char *basis_path) {
-  supine_error error;
+static supine_status write_page(const export_source *source, const request *wanted,
+                                const char *basis_path, supine_error *error) {
   supine_reference_pose from;
-  if (supine_options_reference(source->basis, &wanted->from, true, &from, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  supine_status status = supine_options_reference(source->basis, &wanted->from, true, &from, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   const char *slash = strrchr(basis_path, '/');
   const export_page page = {.breath = wanted->glb.breath,
@@ -118,75 +121,64 @@ static int write_page(const export_source *source, const request *wanted, const 
                                                            : basis_path,
                             .inside = wanted->glb.inside,
                             .parts = wanted->glb.parts};
-  if (supine_export_html_write(wanted->path, source, &page, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  status = supine_export_html_write(wanted->path, source, &page, error);
+  if (status == SUPINE_OK) {
+    (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
+    if (page.inside != NULL) {
+      (void)printf(" and what is inside, %zu name%s", page.parts->count,
+                   page.parts->count == 1 ? "" : "s");
+    }
+    (void)puts("; open it in any browser");
   }
-  (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
-  if (page.inside != NULL) {
-    (void)printf(" and what is inside, %zu name%s", page.parts->count,
-                 page.parts->count == 1 ? "" : "s");
-  }
-  (void)puts("; open it in any browser");
-  return supine_options_finish(name);
+  return status;
 }
 
-static int write_either(const export_source *source, const request *wanted, const char *path) {
-  return wanted->page ? write_page(source, wanted, path) : write_glb(source, wanted);
-}
-
-/* Export with embedded structures, which must be of the same basis. */
-static int write_with_inside(const export_source *source, request *wanted, const char *path) {
+/* Export the basis of the lungs, with embedded structures of the same basis where --inside names
+ * them. */
+static supine_status export_basis(const char *path, request *wanted, supine_error *error) {
+  export_source source = {0};
   export_source inside = {0};
   supine_command_names names = {0};
-  supine_error error;
-  supine_status status = supine_export_source_open(wanted->inside, &inside, &error);
+  export_parts parts;
+  supine_status status = supine_export_source_open(path, &source, error);
   if (status == SUPINE_OK) {
-    status = supine_command_names_open(inside.basis, &names, &error);
+    status = supine_export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath,
+                                      error);
   }
-  if (status == SUPINE_OK) {
-    status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, &error);
-  }
-  int result = SUPINE_EXIT_OK;
-  if (status != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
-    const export_parts parts = {names.count, names.text, names.part};
+  if (status == SUPINE_OK && wanted->inside != NULL) {
+    status = supine_export_source_open(wanted->inside, &inside, error);
+    if (status == SUPINE_OK) {
+      status = supine_command_names_open(inside.basis, &names, error);
+    }
+    if (status == SUPINE_OK) {
+      status = supine_command_inside_check(source.basis, inside.basis, wanted->inside, error);
+    }
+    parts = (export_parts){names.count, names.text, names.part};
     wanted->glb.inside = &inside;
     wanted->glb.parts = &parts;
-    result = write_either(source, wanted, path);
+  }
+  if (status == SUPINE_OK) {
+    status =
+        wanted->page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
   }
   supine_command_names_close(&names);
   supine_export_source_close(&inside);
-  return result;
-}
-
-static int export_basis(const char *path, request *wanted) {
-  export_source source = {0};
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
-  if (supine_export_source_open(path, &source, &error) != SUPINE_OK ||
-      supine_export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath,
-                               &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
-    result = wanted->inside != NULL ? write_with_inside(&source, wanted, path)
-                                    : write_either(&source, wanted, path);
-  }
   supine_export_source_close(&source);
-  return result;
+  return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form, .glb */
+  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form: .glb */
   if (wanted->page && wanted->glb_only) {
-    return supine_options_usage(name, "--profile, --quantise and --animate need an output that "
-                                      "ends in .glb");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--profile, --quantise and --animate need an output that ends in .glb");
   }
   if (!wanted->page && (wanted->title != NULL || wanted->from.given)) {
-    return supine_options_usage(name, "%s is for .html", wanted->from.given ? "--from" : "--title");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
+                            wanted->from.given ? "--from" : "--title");
   }
-  return export_basis(given->operand[0], wanted);
+  return export_basis(given->operand[0], wanted, error);
 }
 
 const supine_command supine_command_export = {

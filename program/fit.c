@@ -48,33 +48,30 @@ static void begin(void *chosen) {
 }
 
 /* "supine", "prone:rest", "supine:rest+500", "2600mL" */
-static int read_state(const char *command, const char *text, void *field) {
+static supine_status read_state(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  supine_error error;
-  if (supine_state_parse(text, state, &error) != SUPINE_OK) {
-    return supine_options_usage(command, "%s", error.message);
-  }
-  return state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0
-             ? supine_options_usage(command,
-                                    "'%s' is not a state here: give rest, full or a volume "
-                                    "of both lungs, as 2600mL",
-                                    text)
-             : SUPINE_EXIT_OK;
+  const supine_status status = supine_state_parse(text, state, error);
+  return status == SUPINE_OK && (state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0)
+             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "'%s' is not a state here: give rest, full or a volume of both "
+                                "lungs, as 2600mL",
+                                text)
+             : status;
 }
 
 /* "prone:PAIRS.csv", "prone:rest:PRONE.ply", into the whole request. */
-static int read_further(const char *command, const char *text, void *field) {
+static supine_status read_further(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   const char *colon = strrchr(text, ':');
   char state[SUPINE_PATIENT_STATE_TEXT];
   if (wanted->count == SUPINE_PATIENT_OTHERS_MAX || colon == NULL || colon[1] == '\0' ||
       (size_t)(colon - text) >= sizeof state) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   (void)snprintf(state, sizeof state, "%.*s", (int)(colon - text), text);
   wanted->further_path[wanted->count] = colon + 1;
   wanted->further[wanted->count].gravity[1] = 1.0;
-  return read_state(command, state, &wanted->further[wanted->count++]);
+  return read_state(state, &wanted->further[wanted->count++], error);
 }
 
 static bool is_landmarks(const char *path) {
@@ -680,7 +677,7 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
 }
 
 /* Choose the surfaces and landmarks that the law is fitted to, and the further states. */
-static int arrange(request *wanted, const supine_arguments *given) {
+static supine_status arrange(request *wanted, const supine_arguments *given, supine_error *error) {
   size_t next = 1;
   wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
   if (given->count > 1) {
@@ -696,52 +693,58 @@ static int arrange(request *wanted, const supine_arguments *given) {
   }
   for (; next < given->count; ++next) { /* more in the same posture */
     if (wanted->count == SUPINE_PATIENT_OTHERS_MAX) {
-      return supine_options_usage(name, "more than %d further states: give fewer --state",
-                                  SUPINE_PATIENT_OTHERS_MAX);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "more than %d further states: give fewer --state",
+                              SUPINE_PATIENT_OTHERS_MAX);
     }
     wanted->further[wanted->count] = wanted->state;
     wanted->further[wanted->count].volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0.0};
     wanted->further_path[wanted->count++] = given->operand[next];
   }
   if (wanted->landmarks.path == NULL && wanted->state_path == NULL) {
-    return supine_options_usage(name, "nothing to fit to: give --landmarks, or the surfaces of "
-                                      "both states, or all three");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "nothing to fit to: give --landmarks, or the surfaces of "
+                            "both states, or all three");
   }
   for (size_t k = 0; k < wanted->count; ++k) {
     if (!is_landmarks(wanted->further_path[k]) && wanted->rest_path == NULL) {
-      return supine_options_usage(name, "%s is a surface: name that of the first scan as well",
-                                  wanted->further_path[k]);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s is a surface: name that of the first scan as well",
+                              wanted->further_path[k]);
     }
   }
   if (wanted->state_path != NULL && wanted->rest_path == NULL) {
-    return supine_options_usage(name, "%s is a surface: name that of the first scan as well",
-                                wanted->state_path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s is a surface: name that of the first scan as well",
+                            wanted->state_path);
   }
   if (wanted->expandability && wanted->state_path == NULL) {
-    return supine_options_usage(name, "--expandability needs surfaces: give those of both "
-                                      "states");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--expandability needs surfaces: give those of both "
+                            "states");
   }
   if (wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP) {
-    return supine_options_usage(name, "--expandability uses the paper law: leave --law out");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--expandability uses the paper law: leave --law out");
   }
   if (wanted->has_gain && wanted->count > 0) {
-    return supine_options_usage(name, "give --gain or --state, not both: further states "
-                                      "determine the gain");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "give --gain or --state, not both: further states "
+                            "determine the gain");
   }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   static supine_patient_record record; /* about 40 kB each, too large for the stack */
   static supine_patient_surface_fit found;
-  supine_error error;
-  const int result = arrange(wanted, given);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
+  supine_status status = arrange(wanted, given, error);
+  if (status == SUPINE_OK) {
+    status = fit(wanted, given, &found, &record, error);
   }
-  if (fit(wanted, given, &found, &record, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  if (status != SUPINE_OK) {
+    return status;
   }
   if (wanted->json) {
     char *text = supine_patient_text(&record, &found.report, given->made_by);
@@ -758,7 +761,7 @@ static int run(void *chosen, const supine_arguments *given) {
     }
     print_gain(&record, wanted->has_gain);
   }
-  return supine_options_finish(name);
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_fit = {

@@ -16,8 +16,6 @@
 #include "program/options/basis_input.h"
 #include "program/options/expected.h"
 
-static const char name[] = "info";
-
 /* Share of the squared displacement in each band, [band + 1]; zeros where the surface has no area.
  */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
@@ -315,45 +313,30 @@ typedef struct request {
 static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)}, {.name = NULL}};
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *path = given->operand[0];
   supine_basis *basis = NULL;
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
   double *energy = NULL;
-  if (supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
+  if (status == SUPINE_OK) {
+    energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
+    status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;
   }
-  energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
-  if (energy == NULL) {
-    supine_options_say(name, "out of memory");
-    result = SUPINE_EXIT_NUMERICAL;
-    goto cleanup;
+  if (status == SUPINE_OK && wanted->json && !print_json(path, basis, energy)) {
+    status = supine_error_set(error, SUPINE_ERROR_WRITE, "cannot print JSON: %s", strerror(errno));
   }
-  if (band_energy(basis, energy, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
-  }
-  if (wanted->json && !print_json(path, basis, energy)) {
-    supine_options_say(name, "cannot print JSON: %s", strerror(errno));
-    result = SUPINE_EXIT_OUTPUT;
-    goto cleanup;
-  }
-  if (!wanted->json) {
+  if (status == SUPINE_OK && !wanted->json) {
     print_text(path, basis, energy);
     print_table(basis);
   }
-  result = supine_options_finish(name);
-cleanup:
   free(energy);
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_info = {
-    name,
+    "info",
     "say what a basis file holds and how exact it is",
     .usage = "BASIS [--json]",
     .about =

@@ -161,39 +161,35 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
   return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   supine_basis *lungs = NULL;
   supine_basis *inside = NULL;
   supine_command_names names = {0};
   supine_command_observed observed = {0};
-  supine_error error;
+  supine_status status = SUPINE_OK;
   if (wanted->orientation.given || wanted->orientation.tilt != 0.0) {
     wanted->orientation.given = true;
-    const int result =
-        supine_options_orientation_finish(&wanted->orientation, name, wanted->state.gravity);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
+    status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
   }
-  supine_status status = supine_basis_open(given->operand[0], &lungs, &error);
   if (status == SUPINE_OK) {
-    status = supine_command_inside_open(lungs, wanted->points, &inside, &names, &error);
+    status = supine_basis_open(given->operand[0], &lungs, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
   }
   if (status == SUPINE_OK) {
     status = supine_command_observed_load(given->operand[1], inside, &names, wanted->noise,
-                                          &observed, &error);
+                                          &observed, error);
   }
   if (status == SUPINE_OK) {
-    status = locate(wanted, lungs, inside, &names, &observed, &error);
+    status = locate(wanted, lungs, inside, &names, &observed, error);
   }
-  const int result =
-      status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   supine_command_observed_free(&observed);
   supine_command_names_close(&names);
   supine_basis_close(inside);
   supine_basis_close(lungs);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_locate = {

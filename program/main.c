@@ -117,8 +117,9 @@ int main(int argc, char **argv) {
     return supine_options_run(command, 2, arguments);
   }
   if (!supine_thread_count_sound()) {
-    return supine_options_usage(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",
-                                getenv("SUPINE_THREADS")); /* NOLINT(concurrency-mt-unsafe) */
+    supine_options_say(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",
+                       getenv("SUPINE_THREADS")); /* NOLINT(concurrency-mt-unsafe) */
+    return SUPINE_EXIT_USAGE;
   }
   return supine_options_run(command, argc - 1, argv + 1);
 }

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "program/model_options.h"
 #include "program/options/surface_options.h"
@@ -12,68 +11,42 @@ void supine_command_model_options_begin(supine_model_options *options) {
   options->choice = supine_precompute_choice_default();
 }
 
-/* Read the name of a law; for a removed law, name its replacement. */
-static int read_law(const char *command, const char *text, void *field) {
-  int *choice = field;
-  for (int law = 0; law < SUPINE_LAW_COUNT; ++law) {
-    if (strcasecmp(text, supine_physics_law_names[law]) == 0) {
-      *choice = law;
-      return SUPINE_EXIT_OK;
-    }
-  }
-  if (strcasecmp(text, "tidal") == 0 || strcasecmp(text, "cohort") == 0) {
-    return supine_options_usage(command,
-                                "--law %s was removed; the default law 'deep' replaces it, "
-                                "also for scans at rest. Leave --law out and name the state of "
-                                "the scan, as --scanned supine:rest",
-                                text);
-  }
-  return SUPINE_OPTION_MISFIT;
-}
-
-static int read_scan(const char *command, const char *text, void *field) {
+static supine_status read_scan(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  supine_error error;
   choice->has_scan = true;
-  return supine_reference_scan_parse(text, &choice->scan, &error) == SUPINE_OK
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(command, "--scanned: %s", error.message);
+  return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
 /* "supine=0.43,prone=2600mL"; anything without an equals sign names a file. */
-static int read_resting(const char *command, const char *text, void *field) {
+static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  supine_error error;
   char copy[256];
   (void)snprintf(copy, sizeof copy, "%s", text);
   if (strchr(text, '=') == NULL) {
-    return supine_reference_resting_load(text, &choice->resting, &error) == SUPINE_OK
-               ? SUPINE_EXIT_OK
-               : supine_options_fail(command, &error);
+    return supine_reference_resting_load(text, &choice->resting, error);
   }
-  for (char *rest = copy, *piece; (piece = strsep(&rest, ",")) != NULL;) {
+  supine_status status = SUPINE_OK;
+  for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
     char *value = strchr(piece, '=');
     if (value == NULL) {
-      return SUPINE_OPTION_MISFIT;
+      return SUPINE_ERROR_ARGUMENT;
     }
     *value = '\0';
-    if (supine_reference_resting_set(&choice->resting, piece, value + 1, &error) != SUPINE_OK) {
-      return supine_options_usage(command, "--resting: %s", error.message);
-    }
+    status = supine_reference_resting_set(&choice->resting, piece, value + 1, error);
   }
-  return SUPINE_EXIT_OK;
+  return status;
 }
 
 /* A model's name; anything with a dot or a slash is a file of vectors. */
-static int read_direction(const char *command, const char *text, void *field) {
+static supine_status read_direction(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  (void)command;
+  (void)error;
   static const char *const names[] = {"box", "normal", "radial"};
   choice->directions = NULL;
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     if (strcmp(text, names[i]) == 0) {
       choice->model.direction.model = (supine_direction_model)i;
-      return SUPINE_EXIT_OK;
+      return SUPINE_OK;
     }
   }
   choice->model.direction.model = SUPINE_DIRECTION_VECTORS;
@@ -82,13 +55,13 @@ static int read_direction(const char *command, const char *text, void *field) {
 }
 
 /* "linear:z:0.5:1.5"; anything without such a beginning names a file. */
-static int read_expandability(const char *command, const char *text, void *field) {
+static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  (void)command;
+  (void)error;
   choice->expandability = NULL;
   choice->expandability_law = (supine_expandability_law){0};
   if (strcmp(text, "uniform") == 0) {
-    return SUPINE_EXIT_OK;
+    return SUPINE_OK;
   }
   if (strncmp(text, "linear:", strlen("linear:")) == 0) {
     choice->expandability_law.shape = SUPINE_EXPANDABILITY_LINEAR;
@@ -96,18 +69,18 @@ static int read_expandability(const char *command, const char *text, void *field
     choice->expandability_law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
   } else {
     choice->expandability = text;
-    return SUPINE_EXIT_OK;
+    return SUPINE_OK;
   }
   const char *at = strchr(text, ':') + 1;
   if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   choice->expandability_law.axis = at[0] - 'x';
   char numbers[128];
   (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
   char *colon = strchr(numbers, ':');
   if (colon == NULL) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   *colon = '\0';
   return supine_options_fits(
@@ -116,32 +89,32 @@ static int read_expandability(const char *command, const char *text, void *field
       choice->expandability_law.from > 0.0 && choice->expandability_law.to > 0.0);
 }
 
-static int read_lesion(const char *command, const char *text, void *field) {
+static supine_status read_lesion(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  (void)command;
+  (void)error;
   double v[5];
   if (choice->lesion_count == SUPINE_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
       !(v[3] > 0.0) || !(v[4] > 0.0)) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   choice->lesions[choice->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 /* "left:0.3" */
-static int read_lung(const char *command, const char *text, void *field) {
+static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  (void)command;
+  (void)error;
   const char *colon = strchr(text, ':');
   const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
   const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
   double share;
   if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
       !(share > 0.0 && share <= 1.0)) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   *(left ? &choice->share[0] : &choice->share[1]) = share;
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 static const char *const sexes[] = {"unknown", "female", "male", NULL}; /* as supine_sex */
@@ -189,7 +162,7 @@ const supine_option supine_command_model_options[] = {
      FILLS(choice), .read = read_scan,
      .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
-     FILLS(choice.law), .read = read_law, .choices = supine_physics_law_names, .more = true},
+     FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST|FILE",
      "volume at rest (FRC) in each posture, where it is known for the patient: POSTURE=2600mL, "
      "gas and tissue of both lungs, as measured in a CT at rest (lung-function tests give the "
@@ -331,16 +304,16 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
   return status;
 }
 
-int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
-                              size_t count, bool keep) {
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep,
+                                        supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
-  supine_error error;
   double *stiffness = NULL;
   options->source.labels.progress = supine_options_progress_step;
   options->source.labels.progress_context = &progress;
   supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                       &options->findings, &error);
+                                                       &options->findings, error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK && source->is_map) {
     print_map(paths[0], source);
@@ -350,17 +323,17 @@ int supine_command_model_load(supine_model_options *options, const char *command
     options->choice.has_scan = true;
   }
   if (status == SUPINE_OK && options->patient != NULL) {
-    status = take_patient(options, &stiffness, &error);
+    status = take_patient(options, &stiffness, error);
   }
   if (status == SUPINE_OK) {
     status = supine_precompute_prepare(&source->lungs, &options->choice, &options->prepared,
-                                       &options->findings, &error);
+                                       &options->findings, error);
   }
   free(stiffness);
   supine_options_say_findings(command, &options->findings);
   (void)snprintf(options->assumed, sizeof options->assumed, "%s; %s", source->summary,
                  options->prepared.summary);
-  return status == SUPINE_OK ? SUPINE_EXIT_OK : supine_options_fail(command, &error);
+  return status;
 }
 
 void supine_command_model_options_free(supine_model_options *options) {

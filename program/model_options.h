@@ -29,12 +29,12 @@ typedef struct supine_model_options {
 /* The defaults, of a zeroed struct. */
 void supine_command_model_options_begin(supine_model_options *options);
 
-/* Load the files, report the findings on stderr and prepare the model; return an exit code. `keep`:
- * the surface is the reference, whatever the options say. */
-int supine_command_model_load(supine_model_options *options, const char *command, char **paths,
-                              size_t count, bool keep);
+/* Load the files, print the findings and prepare the model.
+ * @param keep  the surface is the reference, whatever the options say */
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep, supine_error *error);
 
-/* Releases what supine_command_model_load allocated. */
+/* Release what supine_command_model_load allocated. */
 void supine_command_model_options_free(supine_model_options *options);
 
 #endif

@@ -4,8 +4,6 @@
 
 #include "program/options/command.h"
 
-static const char name[] = "phantom";
-
 typedef struct request {
   const char *path;
   size_t vertices;
@@ -21,29 +19,27 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, volume), .standard = "6000", .wants = "millilitres"},
     {.name = NULL}};
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
+  const supine_mesh_save_options save = {
+      .comment = "made lungs, mm; shape after Chaste's lung test data (BSD-3-Clause, University "
+                 "of Oxford)"};
   supine_mesh mesh = {0};
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
-  const supine_mesh_save_options save = {.comment =
-                                             "made lungs, mm; shape after Chaste's lung test "
-                                             "data (BSD-3-Clause, University of Oxford)"};
   (void)given;
-  if (supine_phantom_create(wanted->vertices, wanted->volume, &mesh, &error) != SUPINE_OK ||
-      supine_mesh_save(wanted->path, &mesh, &save, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
+  supine_status status = supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error);
+  if (status == SUPINE_OK) {
+    status = supine_mesh_save(wanted->path, &mesh, &save, error);
+  }
+  if (status == SUPINE_OK) {
     (void)printf("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
                  mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
-    result = supine_options_finish(name);
   }
   supine_mesh_free(&mesh);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_phantom = {
-    name,
+    "phantom",
     "make a pair of lungs, at any resolution",
     .usage = "-o FILE [OPTIONS]",
     .about = "Makes synthetic lungs for trials without a scan: two closed, smooth surfaces of "

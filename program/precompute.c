@@ -22,12 +22,12 @@ typedef struct request {
   bool has_band;
 } request;
 
-static int read_modes(const char *command, const char *text, void *field) {
+static supine_status read_modes(const char *text, void *field, supine_error *error) {
   size_t *modes = field;
-  (void)command;
+  (void)error;
   if (strcmp(text, "harmonics") == 0) {
     *modes = 0;
-    return SUPINE_EXIT_OK;
+    return SUPINE_OK;
   }
   return supine_options_fits(supine_options_parse_count(text, modes) && *modes >= 1 &&
                              *modes <= SUPINE_MODES_MADE_MAX);
@@ -127,54 +127,47 @@ static void report_fit(const char *path, const supine_fields *fields,
 }
 
 /* Check that the output is none of the surfaces that a list of fields names. */
-static int check_fields(const char *list, const char *output) {
+static supine_status check_fields(const char *list, const char *output, supine_error *error) {
   static const char *const columns[] = {"gx", "gy", "gz", "file"};
   supine_csv csv;
   bool more = true;
-  int result = SUPINE_EXIT_OK;
+  supine_status status = SUPINE_OK;
   if (supine_csv_open(list, columns, 4, 4, &csv, NULL) != SUPINE_OK) {
-    return SUPINE_EXIT_OK; /* not a list: loading reports the fault */
+    return SUPINE_OK; /* not a list: loading reports the fault */
   }
-  while (result == SUPINE_EXIT_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
+  while (status == SUPINE_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
     char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
-    if (path == NULL) {
-      supine_options_say(name, "out of memory");
-      result = SUPINE_EXIT_NUMERICAL;
-    } else {
-      result = supine_options_check_output(name, output, path);
-    }
+    status = path != NULL ? supine_options_check_output(output, path, error) : SUPINE_ERROR_MEMORY;
     free(path);
   }
   supine_csv_close(&csv);
-  return result;
+  return status;
 }
 
-static int compress_fields(const supine_lungs *lungs, const request *wanted, const char *made_by) {
+static supine_status compress_fields(const supine_lungs *lungs, const request *wanted,
+                                     const char *made_by, supine_error *error) {
   const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
                                       .modes = wanted->basis.modes,
                                       .findings = wanted->model.findings.text,
                                       .made_by = made_by};
   supine_fields fields = {0};
   supine_fit_report report;
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
-  if (supine_fields_load(wanted->fields, lungs, &wanted->model.source.load, &fields, &error) !=
-          SUPINE_OK ||
-      supine_precompute_fields(lungs, &fields, &options, wanted->path, &report, &error) !=
-          SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
+  supine_status status =
+      supine_fields_load(wanted->fields, lungs, &wanted->model.source.load, &fields, error);
+  if (status == SUPINE_OK) {
+    status = supine_precompute_fields(lungs, &fields, &options, wanted->path, &report, error);
+  }
+  if (status == SUPINE_OK) {
     report_fit(wanted->path, &fields, &report);
-    result = supine_options_finish(name);
   }
   supine_fields_free(&fields);
-  return result;
+  return status;
 }
 
-static int compute(const supine_lungs *lungs, request *wanted, const char *made_by) {
+static supine_status compute(const supine_lungs *lungs, request *wanted, const char *made_by,
+                             supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_precompute_report report;
-  supine_error error;
   wanted->basis.model = wanted->model.prepared.model;
   wanted->basis.reference = &wanted->model.prepared.reference;
   wanted->basis.made_by = made_by;
@@ -185,13 +178,12 @@ static int compute(const supine_lungs *lungs, request *wanted, const char *made_
   wanted->basis.progress_context = &progress;
   supine_options_signals_catch(true);
   const supine_status status =
-      supine_precompute(lungs, &wanted->basis, wanted->path, &report, &error);
+      supine_precompute(lungs, &wanted->basis, wanted->path, &report, error);
   supine_options_progress_end(&progress);
-  if (status != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    report_result(wanted->path, lungs, &wanted->basis, &report);
   }
-  report_result(wanted->path, lungs, &wanted->basis, &report);
-  return supine_options_finish(name);
+  return status;
 }
 
 /* Read a patient model and the text that the basis stores of it; the caller frees the text. */
@@ -227,7 +219,7 @@ static void begin(void *chosen) {
 
 /* Refuse constants given beside a patient model. Call before loading, which sets those not
  * given. */
-static int check_patient(const request *wanted) {
+static supine_status check_patient(const request *wanted, supine_error *error) {
   const supine_model_choice *choice = &wanted->model.choice;
   const supine_model *model = &choice->model;
   const struct {
@@ -242,44 +234,45 @@ static int check_patient(const request *wanted) {
                  {!isnan(model->reach), "reach"}};
   for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
     if (brought[i].given) {
-      return supine_options_usage(
-          name, "--patient has its own law and force: leave --%s out%s", brought[i].option,
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT, "--patient has its own law and force: leave --%s out%s",
+          brought[i].option,
           strcmp(brought[i].option, "gain") == 0 || strcmp(brought[i].option, "reach") == 0
               ? ", or give it to 'supine fit'"
               : "");
     }
   }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  supine_error error;
+  const bool fields = wanted->fields != NULL;
   char *text = NULL;
   static supine_patient_record record; /* about 40 kB, too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
-    return supine_options_usage(
-        name, "%s: this name is a mesh's: give a name that ends in .safetensors", wanted->path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: this name is a mesh's: give a name that ends in .safetensors",
+                            wanted->path);
   }
-  int result = wanted->fields != NULL    ? check_fields(wanted->fields, wanted->path)
-               : wanted->patient != NULL ? check_patient(wanted)
-                                         : SUPINE_EXIT_OK;
-  if (result == SUPINE_EXIT_OK && wanted->patient != NULL &&
-      take_patient(wanted, &record, &text, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
+  supine_status status = fields ? check_fields(wanted->fields, wanted->path, error)
+                         : wanted->patient != NULL ? check_patient(wanted, error)
+                                                   : SUPINE_OK;
+  if (status == SUPINE_OK && wanted->patient != NULL) {
+    status = take_patient(wanted, &record, &text, error);
   }
-  if (result == SUPINE_EXIT_OK) {
-    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->fields != NULL);
+  if (status == SUPINE_OK) {
+    status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,
+                                       error);
   }
-  if (result == SUPINE_EXIT_OK) {
-    result = wanted->fields != NULL ? compress_fields(lungs, wanted, given->made_by)
-                                    : compute(lungs, wanted, given->made_by);
+  if (status == SUPINE_OK) {
+    status = fields ? compress_fields(lungs, wanted, given->made_by, error)
+                    : compute(lungs, wanted, given->made_by, error);
   }
   free(text);
   supine_command_model_options_free(&wanted->model);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_precompute = {

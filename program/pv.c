@@ -81,16 +81,15 @@ static void print_limb(const char *name, const supine_pv_curve *curve,
   }
 }
 
-static int run_fit(const char *path, const request *chosen) {
-  supine_error error = {0};
+static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, &error);
+  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
   if (status == SUPINE_OK && chosen->output != NULL) {
-    status = supine_breath_save(chosen->output, &pv, &error);
+    status = supine_breath_save(chosen->output, &pv, error);
   }
   if (status != SUPINE_OK) {
-    return supine_options_fail(command, &error);
+    return status;
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].rms_percent > 1.0) {
@@ -100,13 +99,13 @@ static int run_fit(const char *path, const request *chosen) {
   }
   if (chosen->json) {
     print_json(&pv, reports, chosen->confidence);
-    return supine_options_finish(command);
+    return SUPINE_OK;
   }
   (void)printf("intervals at %g %% confidence\n", 100.0 * chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     print_limb(supine_breath_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
   }
-  return supine_options_finish(command);
+  return SUPINE_OK;
 }
 
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
@@ -130,41 +129,38 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
   return SUPINE_OK;
 }
 
-static int run_show(const char *path, const request *chosen) {
+static supine_status run_show(const char *path, const request *chosen, supine_error *error) {
   enum { ROWS_MAX = 1000000 };
-  supine_error error = {0};
   supine_pv pv = *supine_breath_normal();
-  supine_status status = path != NULL ? supine_breath_load(path, &pv, &error) : SUPINE_OK;
+  supine_status status = path != NULL ? supine_breath_load(path, &pv, error) : SUPINE_OK;
   if (status != SUPINE_OK) {
-    return supine_options_fail(command, &error);
+    return status;
   }
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
   const double steps = (high - low) / chosen->step;
   if (!(steps < ROWS_MAX)) {
-    return supine_options_usage(command, "--step is too small for this range of pressures: give "
-                                         "a larger one");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--step is too small for this range of pressures: give a larger one");
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
-    status = print_row(&pv, low + (double)j * chosen->step, &error);
+    status = print_row(&pv, low + (double)j * chosen->step, error);
   }
-  if (status == SUPINE_OK) {
-    status = print_row(&pv, high, &error);
-  }
-  return status == SUPINE_OK ? supine_options_finish(command)
-                             : supine_options_fail(command, &error);
+  return status == SUPINE_OK ? print_row(&pv, high, error) : status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const char *verb = given->operand[0];
   const char *file = given->count > 1 ? given->operand[1] : NULL;
-  if (strcmp(verb, "fit") == 0) {
-    return file != NULL ? run_fit(file, chosen)
-                        : supine_options_usage(command, "fit takes one file of samples: give one");
+  if (strcmp(verb, "show") == 0) {
+    return run_show(file, chosen, error);
   }
-  return strcmp(verb, "show") == 0 ? run_show(file, chosen)
-                                   : supine_options_usage(command, "fit or show, not '%s'", verb);
+  if (strcmp(verb, "fit") == 0 && file != NULL) {
+    return run_fit(file, chosen, error);
+  }
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give 'fit FILE' or 'show [FILE]', not '%s'",
+                          verb);
 }
 
 const supine_command supine_command_pv = {

@@ -15,31 +15,27 @@ static const char name[] = "render";
 typedef supine_command_drawing request;
 typedef supine_command_drawn state;
 
-static int write_picture(const request *wanted, supine_renderer *renderer,
-                         const supine_picture *picture) {
+static supine_status write_picture(const request *wanted, supine_renderer *renderer,
+                                   const supine_picture *picture, supine_error *error) {
   supine_output output = {0};
-  supine_error error;
-  if (supine_output_open(wanted->output, &output, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
-  }
-  if (supine_render_picture_write(renderer, picture, output.file, &error) != SUPINE_OK) {
-    if (ferror(output.file) != 0) { /* the output knows why a write failed */
-      (void)supine_output_commit(&output, &error);
+  supine_status status = supine_output_open(wanted->output, &output, error);
+  if (status == SUPINE_OK) {
+    status = supine_render_picture_write(renderer, picture, output.file, error);
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* the output knows why a write failed */
+      status = supine_output_commit(&output, error);
     }
-    supine_output_abandon(&output);
-    return supine_options_fail(name, &error);
   }
-  if (supine_output_commit(&output, &error) != SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  supine_output_abandon(&output);
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %zu x %zu pixels\n", wanted->output, picture->width, picture->height);
   }
-  (void)printf("%s: %zu x %zu pixels\n", wanted->output, picture->width, picture->height);
-  return supine_options_finish(name);
+  return status;
 }
 
 /* Draw and write the states with the colours found for them. */
-static int draw(const request *wanted, supine_renderer *renderer,
-                const supine_posture_list *postures, const char *from, const state *states,
-                const double ends[2]) {
+static supine_status draw(const request *wanted, supine_renderer *renderer,
+                          const supine_posture_list *postures, const char *from,
+                          const state *states, const double ends[2], supine_error *error) {
   supine_panel panel[SUPINE_PANELS_MAX];
   char label[128];
   for (size_t i = 0; i < postures->count; ++i) {
@@ -50,7 +46,7 @@ static int draw(const request *wanted, supine_renderer *renderer,
   supine_picture picture =
       supine_command_drawing_picture(wanted, from, ends, postures->count, label);
   picture.panel = panel;
-  return write_picture(wanted, renderer, &picture);
+  return write_picture(wanted, renderer, &picture, error);
 }
 
 static supine_status find_marks(const supine_basis *basis, const char *path, state *states,
@@ -67,40 +63,36 @@ static supine_status find_marks(const supine_basis *basis, const char *path, sta
   return status;
 }
 
-static int render(const supine_basis *basis, const request *wanted,
-                  const supine_posture_list *postures, const supine_reference_pose *from) {
+static supine_status render(const supine_basis *basis, const request *wanted,
+                            const supine_posture_list *postures, const supine_reference_pose *from,
+                            supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   const size_t count = postures->count;
   supine_compare *compare = NULL;
   supine_renderer *renderer = NULL;
-  supine_error error = {SUPINE_ERROR_MEMORY, "out of memory"};
   double ends[2] = {0.0, 0.0}; /* end of the colours: the 95th percentile, and the largest value */
-  int result = SUPINE_EXIT_OK;
   state *states = calloc(count, sizeof *states);
   float *values = malloc(count * n * sizeof *values);
-  if (states == NULL || values == NULL ||
-      supine_compare_create(basis, &compare, &error) != SUPINE_OK ||
-      supine_render_create(basis, &renderer, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
+  supine_status status = states != NULL && values != NULL
+                             ? supine_compare_create(basis, &compare, error)
+                             : SUPINE_ERROR_MEMORY;
+  if (status == SUPINE_OK) {
+    status = supine_render_create(basis, &renderer, error);
   }
-  for (size_t i = 0; i < count && result == SUPINE_EXIT_OK; ++i) {
+  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     states[i].value = values + i * n;
-    result = supine_command_drawn_find(basis, compare, wanted, &postures->item[i], &states[i]);
+    status =
+        supine_command_drawn_find(basis, compare, wanted, &postures->item[i], &states[i], error);
+    if (status == SUPINE_OK) {
+      supine_command_drawn_value(basis, compare, &from->pose, &states[i], ends);
+    }
   }
-  if (result != SUPINE_EXIT_OK) {
-    goto cleanup;
+  if (status == SUPINE_OK && wanted->inside != NULL) {
+    status = find_marks(basis, wanted->inside, states, count, &from->pose, error);
   }
-  for (size_t i = 0; i < count; ++i) {
-    supine_command_drawn_value(basis, compare, &from->pose, &states[i], ends);
+  if (status == SUPINE_OK) {
+    status = draw(wanted, renderer, postures, from->name, states, ends, error);
   }
-  if (wanted->inside != NULL &&
-      find_marks(basis, wanted->inside, states, count, &from->pose, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-    goto cleanup;
-  }
-  result = draw(wanted, renderer, postures, from->name, states, ends);
-cleanup:
   supine_render_destroy(renderer);
   supine_compare_destroy(compare);
   for (size_t i = 0; states != NULL && i < count; ++i) {
@@ -108,12 +100,12 @@ cleanup:
   }
   free(states);
   free(values);
-  return result;
+  return status;
 }
 
-static int read_size(const char *command, const char *text, void *field) {
+static supine_status read_size(const char *text, void *field, supine_error *error) {
   request *wanted = field;
-  (void)command;
+  (void)error;
   char width[16];
   const size_t length = strcspn(text, "x");
   if (length < sizeof width && text[length] == 'x') {
@@ -122,13 +114,13 @@ static int read_size(const char *command, const char *text, void *field) {
     if (supine_options_parse_count(width, &wanted->width) &&
         supine_options_parse_count(text + length + 1, &wanted->height) && wanted->width > 0 &&
         wanted->height > 0 && wanted->width <= 16384 && wanted->height <= 16384) {
-      return SUPINE_EXIT_OK;
+      return SUPINE_OK;
     }
   }
-  return SUPINE_OPTION_MISFIT;
+  return SUPINE_ERROR_ARGUMENT;
 }
 
-static int read_views(const char *command, const char *text, void *field) {
+static supine_status read_views(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   wanted->view_count = 0;
   for (const char *at = text;;) {
@@ -145,24 +137,25 @@ static int read_views(const char *command, const char *text, void *field) {
     }
     if (view > SUPINE_VIEW_COUNT) {
       const char *nearest = supine_options_suggest(word, names, SUPINE_VIEW_COUNT + 1);
-      return supine_options_usage(command, "no view '%s'; did you mean '%s'?", word,
-                                  nearest != NULL ? nearest : "anterior");
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no view '%s'; did you mean '%s'?",
+                              word, nearest != NULL ? nearest : "anterior");
     }
     if (wanted->view_count == SUPINE_VIEWS_MAX) {
-      return supine_options_usage(command, "more than %d views: name fewer", SUPINE_VIEWS_MAX);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d views: name fewer",
+                              SUPINE_VIEWS_MAX);
     }
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
     if (at[length] == '\0') {
-      return SUPINE_EXIT_OK;
+      return SUPINE_OK;
     }
     at += length + 1;
   }
 }
 
-static int read_turn(const char *command, const char *text, void *field) {
+static supine_status read_turn(const char *text, void *field, supine_error *error) {
   request *wanted = field;
-  return supine_command_read_turn(command, text, &wanted->turn);
+  return supine_command_read_turn(text, &wanted->turn, error);
 }
 
 static const char *const themes[] = {"light", "dark", NULL};
@@ -209,26 +202,25 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 /* Check that the options fit each other, then read the postures. */
-static int check(const request *wanted, supine_posture_list *postures) {
+static supine_status check(const request *wanted, supine_posture_list *postures,
+                           supine_error *error) {
   const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* the other: .png */
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
-    return supine_options_usage(name, wanted->turns
-                                          ? "give --posture or --turn, not both"
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            wanted->turns ? "give --posture or --turn, not both"
                                           : "which posture? Give --posture supine, for example");
   }
   if (wanted->turns != moving) {
-    return supine_options_usage(name, "--turn makes a .webp, postures a .png");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--turn makes a .webp, postures a .png");
   }
-  const int result = wanted->turns
-                         ? SUPINE_EXIT_OK
-                         : supine_options_posture_list_parse(name, wanted->postures, postures);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
-  }
-  return postures->count <= SUPINE_PANELS_MAX
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(name, "a picture holds at most %d postures: name fewer",
-                                    SUPINE_PANELS_MAX);
+  const supine_status status =
+      wanted->turns ? SUPINE_OK
+                    : supine_options_posture_list_parse(wanted->postures, postures, error);
+  return status == SUPINE_OK && postures->count > SUPINE_PANELS_MAX
+             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "a picture holds at most %d postures: name fewer",
+                                SUPINE_PANELS_MAX)
+             : status;
 }
 
 static void begin(void *chosen) {
@@ -237,28 +229,24 @@ static void begin(void *chosen) {
   wanted->view_count = 1;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   supine_posture_list postures = {.count = 0};
   supine_reference_pose from;
   supine_basis *basis = NULL;
-  supine_error error;
-  int result = check(wanted, &postures);
-  if (result != SUPINE_EXIT_OK) {
-    return result;
+  supine_status status = check(wanted, &postures, error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
   }
-  if (supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error) !=
-      SUPINE_OK) {
-    return supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
-  if (supine_options_reference(basis, &wanted->from, true, &from, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  } else {
-    result = wanted->turns ? supine_command_drawing_turn(basis, wanted, &from)
-                           : render(basis, wanted, &postures, &from);
+  if (status == SUPINE_OK) {
+    status = wanted->turns ? supine_command_drawing_turn(basis, wanted, &from, error)
+                           : render(basis, wanted, &postures, &from, error);
   }
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_render = {

@@ -286,35 +286,33 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  supine_error error;
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  int result = SUPINE_EXIT_OK;
+  supine_status status = SUPINE_OK;
   if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
-    return supine_options_usage(name, "%s: the name must end in " SUPINE_MESH_ENDINGS,
-                                wanted->path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
   }
   if (!wanted->has_vertex) {
-    result = supine_options_orientation_finish(&wanted->orientation, name, wanted->state.gravity);
+    status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
   }
-  if (result == SUPINE_EXIT_OK) {
-    result = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->has_vertex);
+  if (status == SUPINE_OK) {
+    status = supine_command_model_load(&wanted->model, name, given->operand, given->count,
+                                       wanted->has_vertex, error);
   }
-  if (result == SUPINE_EXIT_OK && wanted->as_scanned &&
+  if (status == SUPINE_OK && wanted->as_scanned &&
       wanted->model.made_from.frame.millimetres_per_unit == 0.0) {
-    supine_options_say(name, "--as-scanned needs surfaces in the same axes and units: convert "
-                             "them, or leave it out");
-    result = SUPINE_EXIT_INPUT;
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "--as-scanned needs surfaces in the same axes and units: convert "
+                              "them, or leave it out");
   }
-  if (result == SUPINE_EXIT_OK) {
-    const supine_status status = wanted->has_vertex ? write_column(lungs, wanted, &error)
-                                                    : write_solution(lungs, wanted, &error);
-    result = status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
+  if (status == SUPINE_OK) {
+    status = wanted->has_vertex ? write_column(lungs, wanted, error)
+                                : write_solution(lungs, wanted, error);
   }
   supine_command_model_options_free(&wanted->model);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_solve = {

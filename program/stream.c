@@ -304,7 +304,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *why = NULL;
   supine_stream_options options = {.listen = wanted->listen,
@@ -325,35 +325,33 @@ static int run(void *chosen, const supine_arguments *given) {
     options.listen = "18944";
   }
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
-    return supine_options_usage(name, "give --certificate and --key together");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
   const double size = sqrt(wanted->body[0] * wanted->body[0] + wanted->body[1] * wanted->body[1] +
                            wanted->body[2] * wanted->body[2] + wanted->body[3] * wanted->body[3]);
   if (!(size > 1e-6) || supine_stream_gravity_down(&options.setup, wanted->down, options.setup.down,
                                                    &why) != SUPINE_STREAM_EXACT) {
-    return supine_options_usage(name, "--world-down or --body-from-tracker is zero: give a "
-                                      "direction and a rotation, as 0,0,-1 and 1,0,0,0");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--world-down or --body-from-tracker is zero: give a "
+                            "direction and a rotation, as 0,0,-1 and 1,0,0,0");
   }
   const double unit[4] = {wanted->body[0] / size, wanted->body[1] / size, wanted->body[2] / size,
                           wanted->body[3] / size};
   supine_stream_rotation(unit, options.setup.body);
   supine_basis *basis = NULL;
-  supine_error error;
   supine_status status =
-      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, &error);
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
   if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
-    status = supine_error_set(&error, SUPINE_ERROR_OPEN_SURFACE,
+    status = supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                               "%s: its surface is open and encloses no volume: close the mesh "
                               "before 'supine precompute'",
                               given->operand[0]);
   }
   if (status == SUPINE_OK) {
-    status = stream(basis, given->operand[0], wanted, &options, &error);
+    status = stream(basis, given->operand[0], wanted, &options, error);
   }
-  const int result =
-      status == SUPINE_OK ? supine_options_finish(name) : supine_options_fail(name, &error);
   supine_basis_close(basis);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_stream = {

@@ -27,41 +27,35 @@ typedef struct request {
 } request;
 
 /* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
-static int read_posture(const char *command, const char *text, supine_command_state *state) {
-  supine_error error;
+static supine_status read_posture(const char *text, void *field, supine_error *error) {
+  supine_command_state *state = field;
   if (text[0] == '\0' || strlen(text) >= sizeof state->posture) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   (void)snprintf(state->posture, sizeof state->posture, "%s", text);
-  return supine_state_parse(text, &state->state, &error) == SUPINE_OK
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(command, "%s", error.message);
-}
-
-static int read_from(const char *command, const char *text, void *field) {
-  return read_posture(command, text, field);
+  return supine_state_parse(text, &state->state, error);
 }
 
 /* "prone.ply", "prone:prone.ply", "prone:rest+500:prone.ply", into the whole request. */
-static int read_state(const char *command, const char *text, void *field) {
+static supine_status read_state(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   supine_command_state *state = &wanted->state[wanted->count];
   const char *colon = strrchr(text, ':');
   char posture[SUPINE_POSTURE_NAME_MAX + 32];
   if (wanted->count == SUPINE_COMMAND_STATES_MAX) {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   ++wanted->count;
   state->path = colon != NULL ? colon + 1 : text;
   if (colon == NULL) {
-    return SUPINE_EXIT_OK;
+    return SUPINE_OK;
   }
   const size_t length = (size_t)(colon - text);
   if (length >= sizeof posture || colon[1] == '\0') {
-    return SUPINE_OPTION_MISFIT;
+    return SUPINE_ERROR_ARGUMENT;
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)length, text);
-  return read_posture(command, posture, state);
+  return read_posture(posture, state, error);
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
@@ -75,7 +69,7 @@ static const supine_option table[] = {
     {"from", 0, "POSTURE[:VOLUME]",
      "the state that motion starts from, as landmarks and the maps beside the prediction have it; "
      "default: the basis's scan itself",
-     FILLS(from), .read = read_from, .wants = "a state, as supine:rest"},
+     FILLS(from), .read = read_posture, .wants = "a state, as supine:rest"},
     {.help = "The volume of states that name none (default: what the state's surface holds):"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
@@ -218,14 +212,15 @@ static void print_json(const supine_command_subject *s) {
 }
 
 /* The states, each with a posture, and a volume or scale where one was given. */
-static int set_states(const request *wanted, supine_command_subject *s) {
+static supine_status set_states(const request *wanted, supine_command_subject *s,
+                                supine_error *error) {
   double gravity[3] = {0.0, 1.0, 0.0};
   s->from = wanted->from;
   s->count = wanted->count > 0 ? wanted->count : 1;
   if (wanted->orientation.given || wanted->orientation.tilt != 0.0) {
-    const int result = supine_options_orientation_finish(&wanted->orientation, name, gravity);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
+    const supine_status status = supine_options_gravity(&wanted->orientation, gravity, error);
+    if (status != SUPINE_OK) {
+      return status;
     }
   }
   for (size_t i = 0; i < s->count; ++i) {
@@ -240,7 +235,7 @@ static int set_states(const request *wanted, supine_command_subject *s) {
       state->scale = wanted->scale;
     }
   }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 static supine_status write_errors(const request *wanted, const supine_command_subject *s,
@@ -272,46 +267,46 @@ static supine_status validate(const request *wanted, supine_command_subject *s,
   return status;
 }
 
-static int run(void *chosen, const supine_arguments *given) {
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *path = given->operand[0];
   supine_command_subject s = {0};
-  supine_error error;
-  int result = SUPINE_EXIT_OK;
+  supine_status status = SUPINE_OK;
   if (wanted->count == 0 && wanted->landmarks.path == NULL) {
-    return supine_options_usage(name, "nothing to compare with: give --state or --landmarks");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "nothing to compare with: give --state or --landmarks");
   }
   if (wanted->path != NULL && wanted->count == 0) {
-    return supine_options_usage(name, "-o draws the error against a --state: give one");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "-o draws the error against a --state: give one");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
-    result = supine_options_check_output(name, wanted->path, wanted->state[i].path);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
+    status = supine_options_check_output(wanted->path, wanted->state[i].path, error);
+    if (status != SUPINE_OK) {
+      return status;
     }
   }
   if (supine_text_ends_in(path, ".json")) {
-    return supine_options_usage(name,
-                                "%s is a patient model without a surface: make a basis from it "
-                                "first with 'supine precompute --patient'",
-                                path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s is a patient model without a surface: make a basis from it "
+                            "first with 'supine precompute --patient'",
+                            path);
   }
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
             : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                             : SUPINE_PATIENT_STILL;
-  result = supine_command_subject_open(path, &s, &error) != SUPINE_OK
-               ? supine_options_fail(name, &error)
-               : set_states(wanted, &s);
-  if (result == SUPINE_EXIT_OK) {
-    if (validate(wanted, &s, &error) != SUPINE_OK) {
-      result = supine_options_fail(name, &error);
-    } else {
-      (wanted->json ? print_json : print_text)(&s);
-      result = supine_options_finish(name);
-    }
+  status = supine_command_subject_open(path, &s, error);
+  if (status == SUPINE_OK) {
+    status = set_states(wanted, &s, error);
+  }
+  if (status == SUPINE_OK) {
+    status = validate(wanted, &s, error);
+  }
+  if (status == SUPINE_OK) {
+    (wanted->json ? print_json : print_text)(&s);
   }
   supine_command_subject_free(&s);
-  return result;
+  return status;
 }
 
 const supine_command supine_command_validate = {

@@ -51,7 +51,7 @@ static void test_export_usage_errors_are_1(void **state) {
   EXPECT(1, "above 0", basis, "-o", glb, "--breath", "-3");
   EXPECT(1, "above 0", basis, "-o", glb, "--scale", "x");
   EXPECT(1, "ends in .glb", basis, "-o", page, "--animate");
-  EXPECT(1, "is for .html", basis, "-o", glb, "--title", "x");
+  EXPECT(1, "ends in .html", basis, "-o", glb, "--title", "x");
   EXPECT(1, "did you mean '--profile'", basis, "--profle", "raw");
 }
 

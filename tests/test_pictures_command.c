@@ -259,7 +259,7 @@ static void test_compare_misuse_is_a_usage_error(void **state) {
   EXPECT(1, "not all 0", "compare lungs.safetensors --postures 0:0:0");
   EXPECT(1, "three numbers", "compare lungs.safetensors --postures 1:2");
   EXPECT(1, "three numbers", "compare lungs.safetensors --postures 1:nan:2");
-  EXPECT(1, "empty name", "compare lungs.safetensors --postures supine,,prone");
+  EXPECT(1, "no posture ''", "compare lungs.safetensors --postures supine,,prone");
   EXPECT(1, "give rest, full or scan", "compare lungs.safetensors --volume much");
   EXPECT(1, "not both", "compare lungs.safetensors --volume scan+5 --rms 5");
   EXPECT(1, ".html", "compare lungs.safetensors -o report.pdf");

@@ -120,7 +120,7 @@ static void expect_printed(const char *message) {
 static void test_command_failures_have_their_exit_codes(void **state) {
   (void)state;
   assert_int_equal(RUN(KEPT_ERR, "fit"), 1);
-  expect_printed("one file of samples");
+  expect_printed("give 'fit FILE'");
   assert_int_equal(RUN(KEPT_ERR, "fit", good, bad), 1);
   assert_int_equal(RUN(KEPT_ERR, "draw", good), 1);
   expect_printed("not 'draw'");

@@ -18,21 +18,19 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
   return supine_basis_open_with(path, &options, basis, error);
 }
 
-int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
-                               supine_mesh_save_options *save) {
+supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
+                                         supine_mesh_save_options *save, supine_error *error) {
   const char *axes = supine_basis_metadata(basis, "scan_axes");
   const char *unit = supine_basis_metadata(basis, "scan_unit_mm");
-  if (!wanted) {
-    return SUPINE_EXIT_OK;
+  if (wanted &&
+      (axes == NULL || unit == NULL ||
+       !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
+       !(save->millimetres_per_unit > 0.0) || !supine_mesh_axes_parse(axes, &save->axes))) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis does not state the axes and units of its scan: leave "
+                            "--as-scanned out, or make the basis again from the scan");
   }
-  if (axes == NULL || unit == NULL ||
-      !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
-      !(save->millimetres_per_unit > 0.0) || !supine_mesh_axes_parse(axes, &save->axes)) {
-    supine_options_say(command, "the basis does not state the axes and units of its scan: "
-                                "leave --as-scanned out, or make the basis again from the scan");
-    return SUPINE_EXIT_INPUT;
-  }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {

@@ -15,10 +15,10 @@ extern const supine_option supine_options_as_scanned[];
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
-/* Select the axes and units of the scan where requested; an exit code after a message where the
- * basis does not know them. */
-int supine_options_basis_frame(const supine_basis *basis, const char *command, bool wanted,
-                               supine_mesh_save_options *save);
+/* Select the axes and units of the scan where requested.
+ * @retval SUPINE_ERROR_FORMAT  the basis does not state them */
+supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
+                                         supine_mesh_save_options *save, supine_error *error);
 
 /* Copy the reference surface into a mesh. */
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How every command fails, reads numbers and suggests. */
+/* Report errors, read numbers and suggest names. */
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -38,31 +38,22 @@ static int exit_code(supine_status status) {
   return SUPINE_EXIT_NUMERICAL;
 }
 
-static void say(const char *command, const char *format, va_list arguments) {
-  (void)fprintf(stderr, "supine %s: ", command);
-  (void)vfprintf(stderr, format, arguments);
-  (void)fputc('\n', stderr);
-}
-
 void supine_options_say(const char *command, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  say(command, format, arguments);
+  (void)fprintf(stderr, "supine %s: ", command);
+  (void)vfprintf(stderr, format, arguments);
+  (void)fputc('\n', stderr);
   va_end(arguments);
 }
 
-int supine_options_fail(const char *command, const supine_error *error) {
-  supine_options_say(command, "%s", error->message);
-  return error->status == SUPINE_OK ? SUPINE_EXIT_NUMERICAL : exit_code(error->status);
-}
-
-int supine_options_usage(const char *command, const char *format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  say(command, format, arguments);
-  va_end(arguments);
-  (void)fprintf(stderr, "Try 'supine %s --help'.\n", command);
-  return SUPINE_EXIT_USAGE;
+int supine_options_fail(const char *command, supine_status status, const supine_error *error) {
+  supine_options_say(command, "%s",
+                     error->message[0] != '\0' ? error->message : supine_status_string(status));
+  if (status == SUPINE_ERROR_ARGUMENT) {
+    (void)fprintf(stderr, "Try 'supine %s --help'.\n", command);
+  }
+  return exit_code(status);
 }
 
 int supine_options_finish(const char *command) {

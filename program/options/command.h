@@ -30,14 +30,11 @@ extern const supine_command supine_command_phantom, supine_command_precompute, s
 /* The same, ended by NULL. */
 extern const supine_command *const supine_command_list[];
 
-/* Prints "supine COMMAND: MESSAGE" to stderr. */
+/* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Prints the error's message and returns its exit code. */
-int supine_options_fail(const char *command, const supine_error *error);
-
-/* Prints a message and "Try 'supine COMMAND --help'."; returns SUPINE_EXIT_USAGE. */
-int supine_options_usage(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+/* Print the error's message, or for an empty one that of the status, and return the exit code. */
+int supine_options_fail(const char *command, supine_status status, const supine_error *error);
 
 /* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
 int supine_options_finish(const char *command);
@@ -45,11 +42,11 @@ int supine_options_finish(const char *command);
 /* Write the command line as one line for a file's metadata; names of files lose their folders. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
-/* Reads a finite number, or a whole one, that takes up the whole text. */
+/* Read a finite number, or a whole one, that takes up the whole text. */
 bool supine_options_parse_number(const char *text, double *value);
 bool supine_options_parse_count(const char *text, size_t *value);
 
-/* Reads exactly `count` finite numbers separated by commas. */
+/* Read exactly `count` finite numbers separated by commas. */
 bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
 /* Return the candidate with the fewest edits from `text`, or NULL where all differ too much. */

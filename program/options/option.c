@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Reads a command line as the command's table says, and runs the command. */
+/* Read a command line by the command's table, and run the command. */
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,6 +25,7 @@ typedef struct reading {
   size_t count;
   row rows[ROWS_MAX];
   char standard[16]; /* "-" and the first ending of an output */
+  int help;          /* 0, 'h' or HELP_ALL */
 } reading;
 
 static void collect(void *context, const supine_option *option, size_t base) {
@@ -43,46 +44,44 @@ static bool within(const supine_option *option, double number) {
   return option->open ? number > low && number < high : number >= low && number <= high;
 }
 
-static int read_choice(const supine_option *option, const char *text, unsigned *choice) {
+static supine_status read_choice(const supine_option *option, const char *text, unsigned *choice) {
   for (unsigned i = 0; option->choices[i] != NULL; ++i) {
     if (strcasecmp(option->choices[i], text) == 0) {
       *choice = i;
-      return SUPINE_EXIT_OK;
+      return SUPINE_OK;
     }
   }
-  return SUPINE_OPTION_MISFIT;
+  return SUPINE_ERROR_ARGUMENT;
 }
 
-/* Reads by kind: SUPINE_EXIT_OK, SUPINE_OPTION_MISFIT or an exit code after a message. */
-static int read_value(const char *command, const supine_option *option, const char *text,
-                      void *field) {
-  bool good = false;
+/* Read a value by its kind. Statuses as supine_option_reader. */
+static supine_status read_value(const supine_option *option, const char *text, void *field,
+                                supine_error *error) {
   if (option->read != NULL) {
-    return option->read(command, text, field);
+    return option->read(text, field, error);
   }
   switch (option->kind) {
   case SUPINE_OPTION_FLAG:
-    *(bool *)field = good = true;
-    break;
+    *(bool *)field = true;
+    return SUPINE_OK;
   case SUPINE_OPTION_NUMBER:
-    good = supine_options_parse_number(text, field) && within(option, *(double *)field);
-    break;
+    return supine_options_fits(supine_options_parse_number(text, field) &&
+                               within(option, *(double *)field));
   case SUPINE_OPTION_NUMBERS:
-    good = supine_options_parse_numbers(text, option->size / sizeof(double), field);
-    break;
+    return supine_options_fits(
+        supine_options_parse_numbers(text, option->size / sizeof(double), field));
   case SUPINE_OPTION_COUNT:
-    good = supine_options_parse_count(text, field) && within(option, (double)*(size_t *)field);
-    break;
+    return supine_options_fits(supine_options_parse_count(text, field) &&
+                               within(option, (double)*(size_t *)field));
   case SUPINE_OPTION_TEXT:
     *(const char **)field = text;
-    good = true;
-    break;
+    return SUPINE_OK;
   case SUPINE_OPTION_CHOICE:
     return read_choice(option, text, field);
   case SUPINE_OPTION_OWN:
     break;
   }
-  return good ? SUPINE_EXIT_OK : SUPINE_OPTION_MISFIT;
+  return SUPINE_ERROR_ARGUMENT;
 }
 
 /* Describe the values that the option takes. */
@@ -106,88 +105,65 @@ static void say_wanted(const supine_option *option, char *text, size_t size) {
   }
 }
 
-static int take(const reading *r, row *taken, const char *text) {
+static supine_status take(const row *taken, const char *text, supine_error *error) {
   const supine_option *option = taken->option;
-  const int result = read_value(r->command->name, option, text, taken->begin + option->offset);
-  if (result == SUPINE_OPTION_MISFIT) {
-    char wanted[512];
+  supine_error reason = {.message = ""};
+  const supine_status status = read_value(option, text, taken->begin + option->offset, &reason);
+  if (status == SUPINE_ERROR_ARGUMENT && reason.message[0] == '\0') {
+    char wanted[384];
     say_wanted(option, wanted, sizeof wanted);
-    return supine_options_usage(r->command->name, "--%s takes %s, not '%s'", option->name, wanted,
-                                text);
+    return supine_error_set(error, status, "--%s takes %s, not '%s'", option->name, wanted, text);
   }
-  return result;
+  return status == SUPINE_ERROR_ARGUMENT
+             ? supine_error_set(error, status, "--%s: %s", option->name, reason.message)
+         : status != SUPINE_OK ? supine_error_set(error, status, "%s", reason.message)
+                               : SUPINE_OK;
 }
 
-/* "give --volume or --scale, not both", "give one of --posture, --gravity and --quaternion" */
-static int say_rivals(const reading *r, const char *rivals) {
-  size_t total = 0;
-  char text[512];
-  size_t used = 0;
-  for (size_t i = 0; i < r->count; ++i) {
-    const char *word = r->rows[i].option->rivals;
-    total += word != NULL && strcmp(word, rivals) == 0;
-  }
-  for (size_t i = 0, seen = 0; i < r->count && used < sizeof text; ++i) {
-    const char *word = r->rows[i].option->rivals;
-    if (word != NULL && strcmp(word, rivals) == 0) {
-      const char *between = seen == 0          ? ""
-                            : seen + 1 < total ? ", "
-                            : total == 2       ? " or "
-                                               : " and ";
-      used += (size_t)snprintf(text + used, sizeof text - used, "%s--%s", between,
-                               r->rows[i].option->name);
-      ++seen;
-    }
-  }
-  return supine_options_usage(r->command->name, total == 2 ? "give %s, not both" : "give one of %s",
-                              text);
-}
-
-static int take_given(reading *r, row *taken, const char *text) {
+static supine_status take_given(reading *r, row *taken, const char *text, supine_error *error) {
   const supine_option *option = taken->option;
   if (option->file == SUPINE_FILE_OUT && option->endings != NULL && strcmp(text, "-") == 0) {
     (void)snprintf(r->standard, sizeof r->standard, "-%.*s", (int)strcspn(option->endings, ", "),
                    option->endings);
     text = r->standard;
   }
-  const char *rivals = taken->option->rivals;
-  for (size_t i = 0; rivals != NULL && i < r->count; ++i) {
-    const char *word = r->rows[i].option->rivals;
-    if (r->rows[i].given && word != NULL && strcmp(word, rivals) == 0) {
-      return say_rivals(r, rivals);
+  for (size_t i = 0; option->rivals != NULL && i < r->count; ++i) {
+    const supine_option *other = r->rows[i].option;
+    if (r->rows[i].given && other->rivals != NULL && strcmp(other->rivals, option->rivals) == 0) {
+      return other == option
+                 ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s once", option->name)
+                 : supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s or --%s, not both",
+                                    other->name, option->name);
     }
   }
   taken->given = true;
   taken->value = text;
-  if (taken->option->given != 0) {
-    *(bool *)(taken->begin + taken->option->given - 1) = true;
+  if (option->given != 0) {
+    *(bool *)(taken->begin + option->given - 1) = true;
   }
-  return take(r, taken, text);
+  return take(taken, text, error);
 }
 
 /* Report an unknown option, or one without its value. */
-static int say_unknown(const reading *r, int result, const char *given) {
+static supine_status refuse_unknown(const reading *r, int got, const char *given,
+                                    supine_error *error) {
   const char *names[ROWS_MAX + 1];
   for (size_t i = 0; i < r->count; ++i) {
     names[i] = r->rows[i].option->name;
   }
   names[r->count] = "help";
-  if (result == ':') {
-    return supine_options_usage(r->command->name, "option '%s' needs a value", given);
+  if (got == ':') {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "option '%s' needs a value", given);
   }
   const char *nearest =
       strncmp(given, "--", 2) == 0 ? supine_options_suggest(given + 2, names, r->count + 1) : NULL;
-  return nearest != NULL
-             ? supine_options_usage(r->command->name, "no option '%s'; did you mean '--%s'?", given,
-                                    nearest)
-             : supine_options_usage(r->command->name, "no option '%s'", given);
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no option '%s'%s%s%s", given,
+                          nearest != NULL ? "; did you mean '--" : "",
+                          nearest != NULL ? nearest : "", nearest != NULL ? "'?" : "");
 }
 
-enum { HELP_WANTED = -2, HELP_ALL_WANTED = -3 };
-
-/* Reads argv into the request; SUPINE_EXIT_OK, HELP_WANTED, HELP_ALL_WANTED or an exit code
- * after a message. */
-static int read_options(reading *r, int argc, char **argv) {
+/* Read argv into the request, or up to --help. */
+static supine_status read_options(reading *r, int argc, char **argv, supine_error *error) {
   struct option names[2 * ROWS_MAX + 3] = {{0}};
   char letters[2 * ROWS_MAX + 4] = ":h";
   size_t n = 0;
@@ -207,23 +183,23 @@ static int read_options(reading *r, int argc, char **argv) {
   names[n] = (struct option){"help-all", no_argument, NULL, HELP_ALL};
   optind = 0; /* begin anew; options and operands in any order */
   opterr = 0;
-  for (int got; (got = getopt_long(argc, argv, letters, names, NULL)) != -1;) {
+  supine_status status = SUPINE_OK;
+  for (int got;
+       status == SUPINE_OK && (got = getopt_long(argc, argv, letters, names, NULL)) != -1;) {
     size_t i = got >= FIRST_LONG ? (size_t)(got - FIRST_LONG) : 0;
     if (got == 'h' || got == HELP_ALL) {
-      return got == 'h' ? HELP_WANTED : HELP_ALL_WANTED;
+      r->help = got;
+      return SUPINE_OK;
     }
     if (got == '?' || got == ':') {
-      return say_unknown(r, got, argv[optind - 1]);
+      return refuse_unknown(r, got, argv[optind - 1], error);
     }
     while (got < FIRST_LONG && r->rows[i].option->letter != got) {
       ++i;
     }
-    const int result = take_given(r, &r->rows[i], optarg);
-    if (result != SUPINE_EXIT_OK) {
-      return result;
-    }
+    status = take_given(r, &r->rows[i], optarg, error);
   }
-  return SUPINE_EXIT_OK;
+  return status;
 }
 
 /* Check that a name ends in one of ".ply, .obj or .stl", in any case. */
@@ -241,122 +217,124 @@ static bool has_ending(const char *path, const char *endings) {
   return false;
 }
 
-static int check_given(const reading *r, size_t operands, char **argv) {
+static supine_status check_given(const reading *r, size_t operands, char **argv,
+                                 supine_error *error) {
   const supine_command *command = r->command;
   if (operands > command->operands_most && command->operands_most == 0) {
-    return supine_options_usage(command->name, "unexpected argument '%s': remove it", argv[optind]);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
+                            argv[optind]);
   }
   if (operands < command->operands_least || operands > command->operands_most) {
-    return supine_options_usage(command->name, "%s", command->operands_missing);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
   }
   for (size_t i = 0; i < r->count; ++i) {
     const supine_option *option = r->rows[i].option;
     if (option->required && !r->rows[i].given) {
       const char letter[] = {'-', option->letter, '\0'};
-      return supine_options_usage(command->name, "%s%s %s is missing%s%s",
-                                  option->letter != 0 ? letter : "--",
-                                  option->letter != 0 ? "" : option->name, option->argument,
-                                  option->endings != NULL ? "; its name must end in " : "",
-                                  option->endings != NULL ? option->endings : "");
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s%s %s is missing%s%s",
+                              option->letter != 0 ? letter : "--",
+                              option->letter != 0 ? "" : option->name, option->argument,
+                              option->endings != NULL ? "; its name must end in " : "",
+                              option->endings != NULL ? option->endings : "");
     }
     if (option->endings != NULL && r->rows[i].given &&
         !has_ending(r->rows[i].value, option->endings)) {
-      return supine_options_usage(command->name, "%s: the name must end in %s", r->rows[i].value,
-                                  option->endings);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s",
+                              r->rows[i].value, option->endings);
     }
   }
-  return SUPINE_EXIT_OK;
+  return SUPINE_OK;
 }
 
-int supine_options_check_output(const char *command, const char *output, const char *input) {
+supine_status supine_options_check_output(const char *output, const char *input,
+                                          supine_error *error) {
   struct stat old;
   struct stat read;
   const bool same = stat(output, &old) == 0 && stat(input, &read) == 0 && S_ISREG(old.st_mode) &&
                     old.st_dev == read.st_dev && old.st_ino == read.st_ino;
-  return same ? supine_options_usage(command,
-                                     "%s: this output is also an input (%s): choose another name",
-                                     output, input)
-              : SUPINE_EXIT_OK;
+  return same ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                 "%s: this output is also an input (%s): choose another name",
+                                 output, input)
+              : SUPINE_OK;
 }
 
-/* Check that an output is neither an input nor another output and can be written. */
-static int check_output(const reading *r, const row *output, const supine_arguments *given) {
-  const char *name = r->command->name;
-  int result = SUPINE_EXIT_OK;
-  for (size_t i = 0; i < given->count && result == SUPINE_EXIT_OK; ++i) {
-    result = supine_options_check_output(name, output->value, given->operand[i]);
+/* Check that an output is neither an input nor another output, and that it can be written. */
+static supine_status check_output(const reading *r, const row *output,
+                                  const supine_arguments *given, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < given->count && status == SUPINE_OK; ++i) {
+    status = supine_options_check_output(output->value, given->operand[i], error);
   }
-  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
     const row *other = &r->rows[i];
-    if (!other->given || other->option->file == SUPINE_FILE_NONE) {
-      continue;
-    }
-    if (other->option->file == SUPINE_FILE_IN) {
-      result = supine_options_check_output(name, output->value, other->value);
-    } else if (other < output && strcmp(output->value, other->value) == 0) {
-      result =
-          supine_options_usage(name, "--%s and --%s name the same file: give them different names",
-                               other->option->name, output->option->name);
+    if (other->given && other->option->file == SUPINE_FILE_IN) {
+      status = supine_options_check_output(output->value, other->value, error);
+    } else if (other->given && other->option->file == SUPINE_FILE_OUT && other < output &&
+               strcmp(output->value, other->value) == 0) {
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "--%s and --%s name the same file: give them different names",
+                                other->option->name, output->option->name);
     }
   }
-  supine_error error;
-  if (result == SUPINE_EXIT_OK && supine_output_try(output->value, &error) != SUPINE_OK) {
-    result = supine_options_fail(name, &error);
-  }
-  return result;
+  return status == SUPINE_OK ? supine_output_try(output->value, error) : status;
 }
 
-static int check_outputs(const reading *r, const supine_arguments *given) {
-  int result = SUPINE_EXIT_OK;
-  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+static supine_status check_outputs(const reading *r, const supine_arguments *given,
+                                   supine_error *error) {
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
     if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT) {
-      result = check_output(r, &r->rows[i], given);
+      status = check_output(r, &r->rows[i], given, error);
     }
   }
-  for (size_t i = 0; i < r->count && result == SUPINE_EXIT_OK; ++i) {
+  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
     if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
         supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard()) {
-      result = supine_options_usage(r->command->name,
-                                    "standard output is closed: give a file instead of -");
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "standard output is closed: give a file instead of -");
     }
   }
-  return result;
+  return status;
+}
+
+/* Read the command line, then print the help or run the command. */
+static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
+  const supine_command *command = r->command;
+  char made_by[512];
+  supine_status status = SUPINE_OK;
+  supine_options_describe(argc, argv, made_by, sizeof made_by);
+  if (command->begin != NULL) {
+    command->begin(r->request);
+  }
+  supine_options_visit(command->options, 0, collect, r);
+  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
+    if (r->rows[i].option->standard != NULL) {
+      status = take(&r->rows[i], r->rows[i].option->standard, error);
+    }
+  }
+  if (status == SUPINE_OK) {
+    status = read_options(r, argc, argv, error);
+  }
+  if (status == SUPINE_OK && r->help != 0) {
+    supine_options_print_help(command, r->help == HELP_ALL, stdout);
+    return SUPINE_OK;
+  }
+  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
+  if (status == SUPINE_OK) {
+    status = check_given(r, given.count, argv, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_outputs(r, &given, error);
+  }
+  return status == SUPINE_OK ? command->run(r->request, &given, error) : status;
 }
 
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   reading r = {.command = command, .request = calloc(1, command->request_size)};
-  char made_by[512];
-  int result = SUPINE_EXIT_OK;
-  if (r.request == NULL) {
-    supine_options_say(command->name, "out of memory");
-    return SUPINE_EXIT_NUMERICAL;
-  }
-  supine_options_describe(argc, argv, made_by, sizeof made_by);
-  if (command->begin != NULL) {
-    command->begin(r.request);
-  }
-  supine_options_visit(command->options, 0, collect, &r);
-  for (size_t i = 0; i < r.count && result == SUPINE_EXIT_OK; ++i) {
-    if (r.rows[i].option->standard != NULL) {
-      result = take(&r, &r.rows[i], r.rows[i].option->standard);
-    }
-  }
-  if (result == SUPINE_EXIT_OK) {
-    result = read_options(&r, argc, argv);
-  }
-  if (result == HELP_WANTED || result == HELP_ALL_WANTED) {
-    supine_options_print_help(command, result == HELP_ALL_WANTED, stdout);
-    result = supine_options_finish(command->name);
-  } else if (result == SUPINE_EXIT_OK) {
-    const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
-    result = check_given(&r, given.count, argv);
-    if (result == SUPINE_EXIT_OK) {
-      result = check_outputs(&r, &given);
-    }
-    if (result == SUPINE_EXIT_OK) {
-      result = command->run(r.request, &given);
-    }
-  }
+  supine_error error = {.message = ""};
+  const supine_status status =
+      r.request != NULL ? read_and_run(&r, argc, argv, &error) : SUPINE_ERROR_MEMORY;
   free(r.request);
-  return result;
+  return status == SUPINE_OK ? supine_options_finish(command->name)
+                             : supine_options_fail(command->name, status, &error);
 }

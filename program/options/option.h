@@ -11,7 +11,7 @@
  *          .standard = "20000"},
  *         {.name = NULL}};
  *
- *     static int run(void *request_, const supine_arguments *given) { ...; an exit code }
+ *     static supine_status run(void *request_, const supine_arguments *given, supine_error *error)
  *
  *     const supine_command supine_command_phantom = {
  *         "phantom", "make a pair of lungs", .usage = "-o FILE [OPTIONS]", .about = "Makes ...",
@@ -27,6 +27,8 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+
+#include <supine/status.h>
 
 /* How a value is read; SUPINE_FILLS takes it from the type of the field. */
 typedef enum supine_option_kind {
@@ -47,13 +49,13 @@ typedef enum supine_option_file {
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Reads `text` into `field` (where the option's field is; without one, where its table's struct
- * begins). SUPINE_EXIT_OK; an exit code after a message of its own; or SUPINE_OPTION_MISFIT for
- * "--NAME takes WANTS, not 'TEXT'". */
-typedef int supine_option_reader(const char *command, const char *text, void *field);
-enum { SUPINE_OPTION_MISFIT = -1 };
-static inline int supine_options_fits(bool fits) {
-  return fits ? 0 : SUPINE_OPTION_MISFIT;
+/* Read `text` into `field`, the option's field; for an option without one, the struct that its
+ * table fills.
+ * @retval SUPINE_ERROR_ARGUMENT  without a message for "--NAME takes WANTS, not 'TEXT'"; with one
+ *                                for "--NAME: MESSAGE" */
+typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
+static inline supine_status supine_options_fits(bool fits) {
+  return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
 }
 
 /* One row: an option, words between options, or another table. The last row is all zero. */
@@ -112,7 +114,7 @@ typedef struct supine_command {
   const char *operands_missing; /* the message where there are fewer or more */
   size_t request_size;
   void (*begin)(void *request); /* sets what defaults cannot say; NULL: all zero */
-  int (*run)(void *request, const supine_arguments *given);
+  supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 
 /* For commands that read surfaces, and those that read one basis. */
@@ -123,21 +125,22 @@ typedef struct supine_command {
   .operands_least = 1, .operands_most = 1,                                                         \
   .operands_missing = "name one basis file (made by 'supine precompute')"
 
-/* Reads the options into a request and runs the command on it; an exit code. argv[0] is the
+/* Read the options into a request and run the command on it; return an exit code. argv[0] is the
  * command's name. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
-/* Refuses an output that is an input, by name, link or inode: SUPINE_EXIT_USAGE after a message.
- * For inputs that other inputs name; those of the command line are seen to. */
-int supine_options_check_output(const char *command, const char *output, const char *input);
+/* Refuse an output that is an input, also by link (SUPINE_ERROR_ARGUMENT). For inputs that other
+ * inputs name: those of the command line are checked already. */
+supine_status supine_options_check_output(const char *output, const char *input,
+                                          supine_error *error);
 
-/* Calls `each` for every row of a table and of the tables in it, in order, with where its struct
- * begins in the request. */
+/* Call `each` for every row of a table and of the tables in it, in order; `base` is the offset of
+ * the row's struct in the request. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-/* Prints the help of a command: every option for --help-all, else those without `more`. */
+/* Print the help of a command: every option for --help-all, else those without `more`. */
 void supine_options_print_help(const supine_command *command, bool all, FILE *file);
 
 #endif

@@ -21,39 +21,33 @@ static double make_unit(double g[3]) {
   return largest * sqrt(square);
 }
 
-int supine_options_posture(const char *command, const char *text, double gravity[3]) {
+supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
   supine_state state;
-  supine_error error;
-  if (supine_state_parse_posture(text, &state, &error) != SUPINE_OK) {
-    return supine_options_usage(command, "%s", error.message);
+  const supine_status status = supine_state_parse_posture(text, &state, error);
+  if (status == SUPINE_OK) {
+    memcpy(gravity, state.gravity, sizeof state.gravity);
   }
-  memcpy(gravity, state.gravity, sizeof state.gravity);
-  return SUPINE_EXIT_OK;
+  return status;
 }
 
-static int read_posture(const char *command, const char *value, void *field) {
-  return supine_options_posture(command, value, field);
+static supine_status read_posture(const char *text, void *field, supine_error *error) {
+  return supine_options_posture(text, field, error);
 }
 
-static int read_gravity(const char *command, const char *value, void *field) {
-  if (!supine_options_parse_numbers(value, 3, field)) {
-    return SUPINE_OPTION_MISFIT;
+static supine_status read_gravity(const char *text, void *field, supine_error *error) {
+  if (!supine_options_parse_numbers(text, 3, field)) {
+    return SUPINE_ERROR_ARGUMENT;
   }
-  const double length = make_unit(field);
-  if (length == 0.0) {
-    return supine_options_usage(command, "gravity 0,0,0 has no direction: give one, as 0,1,0 "
-                                         "for supine");
-  }
-  if (fabs(length - 1.0) > 1e-6) {
-    supine_options_say(command, "note: gravity has length %g; only its direction is used", length);
-  }
-  return SUPINE_EXIT_OK;
+  return make_unit(field) > 0.0 ? SUPINE_OK
+                                : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                                   "0,0,0 has no direction: give one, as 0,1,0 "
+                                                   "for supine");
 }
 
-static int read_quaternion(const char *command, const char *value, void *field) {
+static supine_status read_quaternion(const char *text, void *field, supine_error *error) {
   double q[4];
-  (void)command;
-  return supine_options_fits(supine_options_parse_numbers(value, 4, q) &&
+  (void)error;
+  return supine_options_fits(supine_options_parse_numbers(text, 4, q) &&
                              supine_posture_quaternion(q, field) == SUPINE_OK);
 }
 
@@ -83,14 +77,14 @@ const supine_option supine_options_orientation[] = {
      SUPINE_FILLS(supine_orientation, tilt), .wants = "degrees"},
     {.name = NULL}};
 
-int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
-                                      double gravity[3]) {
-  if (!orientation->given && orientation->tilt == 0.0) {
-    return supine_options_usage(command, "the direction of gravity is missing: give --posture, "
-                                         "--gravity or --quaternion");
-  }
+supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
+                                     supine_error *error) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  (void)supine_posture_tilt(orientation->given ? orientation->gravity : supine, orientation->tilt,
-                            gravity); /* both are finite */
-  return SUPINE_EXIT_OK;
+  if (!orientation->given && orientation->tilt == 0.0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the direction of gravity is missing: give --posture, --gravity or "
+                            "--quaternion");
+  }
+  return supine_posture_tilt(orientation->given ? orientation->gravity : supine, orientation->tilt,
+                             gravity);
 }

@@ -18,14 +18,13 @@ typedef struct supine_orientation {
 
 enum { SUPINE_POSTURE_NAME_MAX = 48 };
 
-/* The unit direction of gravity of a posture as people write it: "prone"; "supine+15", tilted by
- * degrees towards the head; "0.6:0:-0.8", gravity in body axes. An exit code; an unknown name is
- * answered with the nearest. */
-int supine_options_posture(const char *command, const char *text, double gravity[3]);
+/* Parse a posture into a unit direction of gravity: "prone"; "supine+15", tilted by degrees towards
+ * the head; "0.6:0:-0.8", gravity in body axes. Statuses as supine_state_parse_posture. */
+supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error);
 
-/* The unit direction of gravity, tilt included; supine where only a tilt was given. Where nothing
- * was given at all: a usage error. */
-int supine_options_orientation_finish(const supine_orientation *orientation, const char *command,
-                                      double gravity[3]);
+/* Compute the unit direction of gravity, tilt included; supine where only a tilt was given.
+ * @retval SUPINE_ERROR_ARGUMENT  nothing was given */
+supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
+                                     supine_error *error);
 
 #endif

@@ -24,9 +24,10 @@ typedef struct supine_posture_list {
   "position), a name with a tilt towards the head in degrees (supine+15: Trendelenburg), "         \
   "or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
 
-/* Reads "supine,prone,supine+15,0.6:0:-0.8"; an exit code. */
-int supine_options_posture_list_parse(const char *command, const char *text,
-                                      supine_posture_list *list);
+/* Parse "supine,prone,supine+15,0.6:0:-0.8".
+ * @retval SUPINE_ERROR_ARGUMENT */
+supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
+                                                supine_error *error);
 
 /* Return a posture's name in words: "left side" for "left"; other names unchanged. */
 const char *supine_options_posture_label(const char *name);

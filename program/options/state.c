@@ -12,20 +12,14 @@ static const double most_of_full = 1.2;
 static const double folded_limit =
     0.01; /* share of turned-over triangles above which the surface is implausible */
 
-int supine_options_read_volume(const char *command, const char *text, void *field) {
-  supine_error error;
-  return supine_state_parse_volume(text, field, &error) == SUPINE_OK
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(command, "--volume: %s", error.message);
+supine_status supine_options_read_volume(const char *text, void *field, supine_error *error) {
+  return supine_state_parse_volume(text, field, error);
 }
 
-static int read_from(const char *command, const char *text, void *field) {
+static supine_status read_from(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  supine_error error;
   *state = (supine_state){.gravity = {0.0}}; /* no posture: supine_options_reference chooses it */
-  return supine_state_parse(text, state, &error) == SUPINE_OK
-             ? SUPINE_EXIT_OK
-             : supine_options_usage(command, "--from: %s", error.message);
+  return supine_state_parse(text, state, error);
 }
 
 const supine_option supine_options_folds[] = {
@@ -150,15 +144,13 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
   return status != SUPINE_OK ? status : check_folds(basis, command, strict, pose, error);
 }
 
-int supine_options_pose(const supine_basis *basis, const char *command,
-                        const supine_volume_options *wanted, const double gravity[3],
-                        supine_pose *pose) {
+supine_status supine_options_pose(const supine_basis *basis, const char *command,
+                                  const supine_volume_options *wanted, const double gravity[3],
+                                  supine_pose *pose, supine_error *error) {
   supine_state state = wanted->state;
-  supine_error error;
   memcpy(state.gravity, gravity, sizeof state.gravity);
-  supine_status status = supine_basis_pose(basis, &state, pose, &error);
-  if (status == SUPINE_OK && supine_basis_get_info(basis)->has_volume) {
-    status = supine_options_pose_check(basis, command, wanted->allow_folds, pose, &error);
-  }
-  return status != SUPINE_OK ? supine_options_fail(command, &error) : SUPINE_EXIT_OK;
+  const supine_status status = supine_basis_pose(basis, &state, pose, error);
+  return status == SUPINE_OK && supine_basis_get_info(basis)->has_volume
+             ? supine_options_pose_check(basis, command, wanted->allow_folds, pose, error)
+             : status;
 }

@@ -10,8 +10,8 @@
 /* A table of options that fills a supine_volume_options: --volume and --allow-folds. */
 extern const supine_option supine_options_volume[];
 
-/* The reader of --volume, into a supine_state. */
-int supine_options_read_volume(const char *command, const char *text, void *field);
+/* Read the value of --volume into a supine_state. */
+supine_status supine_options_read_volume(const char *text, void *field, supine_error *error);
 
 /* --allow-folds alone, into a bool. */
 extern const supine_option supine_options_folds[];
@@ -55,9 +55,10 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);
 
-/* The pose of a posture at the volume asked for, checked; an exit code after a message. */
-int supine_options_pose(const supine_basis *basis, const char *command,
-                        const supine_volume_options *wanted, const double gravity[3],
-                        supine_pose *pose);
+/* Compute the pose of a posture at the requested volume, and check it. Statuses as
+ * supine_basis_pose and supine_options_pose_check. */
+supine_status supine_options_pose(const supine_basis *basis, const char *command,
+                                  const supine_volume_options *wanted, const double gravity[3],
+                                  supine_pose *pose, supine_error *error);
 
 #endif

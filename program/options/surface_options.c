@@ -5,18 +5,18 @@
 
 #include "program/options/surface_options.h"
 
-static int read_axes(const char *command, const char *text, void *field) {
+static supine_status read_axes(const char *text, void *field, supine_error *error) {
   char letters[4] = "";
-  (void)command;
+  (void)error;
   for (size_t k = 0; k < 3 && strlen(text) == 3; ++k) {
     letters[k] = (char)toupper((unsigned char)text[k]);
   }
   return supine_options_fits(supine_mesh_axes_parse(letters, field));
 }
 
-static int read_units(const char *command, const char *text, void *field) {
+static supine_status read_units(const char *text, void *field, supine_error *error) {
   double *millimetres = field;
-  (void)command;
+  (void)error;
   return supine_options_fits(
       supine_mesh_unit_find(text, millimetres) ||
       (supine_options_parse_number(text, millimetres) && *millimetres > 0.0));
