@@ -3,17 +3,18 @@
  * a result as if nothing had happened; nothing half done, nothing lost (a sanitizer's leak check).
  */
 #include <errno.h>
+#include <sys/mman.h>
 
 #include "mesh_samples.h"
 
 /* Allocations that are still to succeed, negative: all; the linker sends ours here. */
 static int allocations_left = -1;
-static int allocations_failed = 0;
+static int *allocations_failed; /* shared with the process that assimp runs in */
 
 static int allocation_fails(void) {
   const int fails = allocations_left >= 0 && allocations_left-- == 0;
   if (fails) {
-    ++allocations_failed;
+    ++*allocations_failed;
     errno = ENOMEM;
   }
   return fails;
@@ -47,10 +48,10 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
   for (int nth = 0;; ++nth) {
     supine_error error = {0};
     allocations_left = nth;
-    allocations_failed = 0;
+    *allocations_failed = 0;
     const supine_status status = work(path, &error);
     allocations_left = -1;
-    const bool was_last = allocations_failed == 0;
+    const bool was_last = *allocations_failed == 0;
     if (was_last) {
       assert_int_equal(status, SUPINE_OK);
       if (nth < least) {
@@ -173,5 +174,9 @@ int main(void) {
       cmocka_unit_test(test_save_each_allocation_failing_memory),
       cmocka_unit_test(test_series_each_allocation_failing_memory),
   };
-  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
+  allocations_failed = mmap(NULL, sizeof *allocations_failed, PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  return allocations_failed == MAP_FAILED
+             ? 1
+             : cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
 }

@@ -13,7 +13,6 @@
 
 #include <assimp/cimport.h>
 #include <assimp/config.h>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include "mesh/io/read.h"
@@ -35,22 +34,20 @@ typedef struct assimp {
 /* Limits of an importer, far above what it needs for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Result of the child process, in memory shared with it. */
+/* Result of the child process, followed by the vertices and triangles. */
 typedef struct outcome {
   supine_error error;
-  size_t dropped;
+  size_t dropped, vertex_count, triangle_count;
 } outcome;
 
-/* Output of the child: the scene's surface, node by node. */
-typedef struct sink {
+/* The scene's surface, gathered node by node. */
+typedef struct gathering {
   assimp ai;
-  const char *path;
-  FILE *vertices;
-  FILE *triangles;
-  size_t vertex_count;
-  size_t face_count;
-  outcome *outcome;
-} sink;
+  const struct aiScene *scene;
+  supine_mesh mesh;
+  mesh_faces faces;
+  supine_error *error;
+} gathering;
 
 static supine_status import_fail(const char *path, const char *words, supine_error *error) {
   char line[256];
@@ -66,72 +63,69 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* Import the bytes that a guard has checked, or a path if there is no guard. */
-static const struct aiScene *import(const assimp *ai, const mesh_file *file) {
-  const unsigned steps = aiProcess_Triangulate;
+/* Import the bytes of an OBJ file, or a file by its path. */
+static const struct aiScene *import(const assimp *ai, const mesh_file *file, bool obj) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Otherwise importers make up a surface for files that hold only bones. */
   ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
   const struct aiScene *scene =
-      file->format == MESH_FORMAT_OTHER
-          ? ai->ImportFileExWithProperties(file->path, steps, NULL, properties)
-          : ai->ImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
-                                                   steps, "obj", properties);
+      obj ? ai->ImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
+                                                   0, "obj", properties)
+          : ai->ImportFileExWithProperties(file->path, 0, NULL, properties);
   ai->ReleasePropertyStore(properties);
   return scene;
 }
 
-static void put_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *to, FILE *out) {
+static bool take_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *to, gathering *out) {
+  supine_mesh *mesh = &out->mesh;
+  const size_t count = mesh->vertex_count + part->mNumVertices;
+  double *grown =
+      count > MESH_VERTICES_MAX ? NULL : realloc(mesh->vertices, (3 * count + 1) * sizeof *grown);
+  if (grown == NULL) {
+    (void)supine_error_set(out->error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu vertices",
+                           out->faces.path, count);
+    return false;
+  }
+  mesh->vertices = grown;
   for (unsigned i = 0; i < part->mNumVertices; ++i) {
     const double x = (double)part->mVertices[i].x;
     const double y = (double)part->mVertices[i].y;
     const double z = (double)part->mVertices[i].z;
-    const double row[3] = {
-        (double)to->a1 * x + (double)to->a2 * y + (double)to->a3 * z + (double)to->a4,
-        (double)to->b1 * x + (double)to->b2 * y + (double)to->b3 * z + (double)to->b4,
-        (double)to->c1 * x + (double)to->c2 * y + (double)to->c3 * z + (double)to->c4};
-    (void)fwrite(row, sizeof row, 1, out);
-  }
-}
-
-/* Check every index, as importers do not. */
-static bool put_triangles(const struct aiMesh *part, bool mirrored, sink *out) {
-  for (unsigned f = 0; f < part->mNumFaces; ++f, ++out->face_count) {
-    const struct aiFace *face = &part->mFaces[f];
-    uint32_t corner[3];
-    for (unsigned k = 0; k < face->mNumIndices; ++k) {
-      if (face->mIndices[k] >= part->mNumVertices) {
-        (void)supine_error_set(&out->outcome->error, SUPINE_ERROR_FORMAT,
-                               "%s: face %zu names vertex %u, but there are %u", out->path,
-                               out->face_count, face->mIndices[k], part->mNumVertices);
-        return false;
-      }
-      corner[k < 3 ? k : 0] = (uint32_t)out->vertex_count + face->mIndices[k];
-    }
-    if (face->mNumIndices != 3) {
-      ++out->outcome->dropped;
-      continue;
-    }
-    const uint32_t row[3] = {corner[0], corner[mirrored ? 2 : 1], corner[mirrored ? 1 : 2]};
-    (void)fwrite(row, sizeof row, 1, out->triangles);
+    double *row = grown + 3 * mesh->vertex_count++;
+    row[0] = (double)to->a1 * x + (double)to->a2 * y + (double)to->a3 * z + (double)to->a4;
+    row[1] = (double)to->b1 * x + (double)to->b2 * y + (double)to->b3 * z + (double)to->b4;
+    row[2] = (double)to->c1 * x + (double)to->c2 * y + (double)to->c3 * z + (double)to->c4;
   }
   return true;
 }
 
-static bool put_node(const struct aiScene *scene, const struct aiNode *node,
-                     const struct aiMatrix4x4 *above, sink *out) {
+/* Add the faces of a part whose vertices are the mesh's last. */
+static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out) {
+  const size_t first = out->mesh.vertex_count - part->mNumVertices;
+  bool good = true;
+  for (unsigned f = 0; good && f < part->mNumFaces; ++f) {
+    const struct aiFace *face = &part->mFaces[f];
+    const unsigned count = face->mNumIndices;
+    double corner[MESH_CORNERS_MAX];
+    for (unsigned k = 0; k < count && k < MESH_CORNERS_MAX; ++k) {
+      corner[k] = (double)first + (double)face->mIndices[mirrored ? count - 1 - k : k];
+    }
+    good = supine_mesh_faces_add(&out->faces, corner, count, out->error) == SUPINE_OK;
+  }
+  return good;
+}
+
+static bool take_node(const struct aiNode *node, const struct aiMatrix4x4 *above, gathering *out) {
   struct aiMatrix4x4 to = *above;
   out->ai.MultiplyMatrix4(&to, &node->mTransformation);
   const bool mirrored = out->ai.Matrix4Determinant(&to) < 0.0F;
   bool good = true;
   for (unsigned m = 0; good && m < node->mNumMeshes; ++m) {
-    const struct aiMesh *part = scene->mMeshes[node->mMeshes[m]];
-    put_vertices(part, &to, out->vertices);
-    good = put_triangles(part, mirrored, out);
-    out->vertex_count += part->mNumVertices;
+    const struct aiMesh *part = out->scene->mMeshes[node->mMeshes[m]];
+    good = take_vertices(part, &to, out) && take_faces(part, mirrored, out);
   }
   for (unsigned c = 0; good && c < node->mNumChildren; ++c) {
-    good = put_node(scene, node->mChildren[c], &to, out);
+    good = take_node(node->mChildren[c], &to, out);
   }
   return good;
 }
@@ -154,92 +148,111 @@ static void confine(size_t bytes) {
   (void)freopen("/dev/null", "w", stderr);
 }
 
-static _Noreturn void be_child(const mesh_file *file, const int streams[2], size_t bytes,
-                               outcome *left) {
+static _Noreturn void be_child(const mesh_file *file, bool obj, size_t bytes, FILE *stream) {
+  outcome result = {.error = {SUPINE_OK, ""}};
+  gathering out = {.error = &result.error};
+  out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(bytes);
-  sink out = {.path = file->path,
-              .vertices = fdopen(streams[0], "wb"),
-              .triangles = fdopen(streams[1], "wb"),
-              .outcome = left};
-  if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &left->error) != SUPINE_OK) {
-    _exit(0);
+  if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
+    out.scene = import(&out.ai, file, obj);
+    struct aiMatrix4x4 identity;
+    out.ai.IdentityMatrix4(&identity);
+    if (out.scene == NULL) {
+      (void)import_fail(file->path, out.ai.GetErrorString(), &result.error);
+    } else if (out.scene->mRootNode != NULL) {
+      (void)take_node(out.scene->mRootNode, &identity, &out);
+    }
   }
-  const struct aiScene *scene = import(&out.ai, file);
-  if (scene == NULL) {
-    (void)import_fail(file->path, out.ai.GetErrorString(), &left->error);
-    _exit(0);
-  }
-  struct aiMatrix4x4 identity;
-  out.ai.IdentityMatrix4(&identity);
-  if (out.vertices != NULL && out.triangles != NULL &&
-      (scene->mRootNode == NULL || put_node(scene, scene->mRootNode, &identity, &out)) &&
-      fclose(out.vertices) == 0 && fclose(out.triangles) == 0) {
-    left->error.status = SUPINE_OK;
-  }
+  result.dropped = out.faces.dropped;
+  result.vertex_count = out.mesh.vertex_count;
+  result.triangle_count = out.mesh.triangle_count;
+  (void)fwrite(&result, sizeof result, 1, stream);
+  (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
+  (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
+  (void)fflush(stream);
   _exit(0); /* also frees the scene */
 }
 
-/* Read all that the child wrote, in items of `size` bytes; false if out of memory. */
-static bool collect(int stream, size_t size, void **items, size_t *count) {
-  const off_t end = lseek(stream, 0, SEEK_END);
-  *count = end < 0 ? 0 : (size_t)end / size;
-  *items = malloc(*count * size + 1);
-  size_t done = 0;
-  while (*items != NULL && done < *count * size) {
-    const ssize_t got = pread(stream, (char *)*items + done, *count * size - done, (off_t)done);
-    if (got <= 0) {
-      return false;
+/* Read the child's outcome. */
+static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *mesh,
+                                  size_t *dropped, supine_error *error) {
+  outcome result;
+  rewind(stream);
+  if (fread(&result, sizeof result, 1, stream) == 1) {
+    if (result.error.status != SUPINE_OK) {
+      return supine_error_set(error, result.error.status, "%s", result.error.message);
     }
-    done += (size_t)got;
+    *dropped = result.dropped;
+    mesh->vertices = malloc((3 * result.vertex_count + 1) * sizeof *mesh->vertices);
+    mesh->triangles = malloc((3 * result.triangle_count + 1) * sizeof *mesh->triangles);
+    if (mesh->vertices == NULL || mesh->triangles == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    }
+    mesh->vertex_count = fread(mesh->vertices, 3 * sizeof(double), result.vertex_count, stream);
+    mesh->triangle_count =
+        fread(mesh->triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
+    if (mesh->vertex_count == result.vertex_count &&
+        mesh->triangle_count == result.triangle_count) {
+      return SUPINE_OK;
+    }
   }
-  return *items != NULL;
+  return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                          "%s: malformed: the importer crashed or exceeded its time or memory; "
+                          "save the mesh as PLY or STL",
+                          path);
+}
+
+static supine_status import_file(const mesh_file *file, bool obj, supine_mesh *mesh,
+                                 size_t *dropped, supine_error *error) {
+  struct stat about = {0};
+  const int descriptor = memfd_create("mesh", MFD_CLOEXEC);
+  FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "w+b");
+  if (stream == NULL) {
+    if (descriptor >= 0) {
+      (void)close(descriptor);
+    }
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
+  }
+  (void)stat(file->path, &about);
+  const pid_t child = fork();
+  if (child == 0) {
+    be_child(file, obj, (size_t)about.st_size, stream);
+  }
+  while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
+  }
+  const supine_status status = take_outcome(file->path, stream, mesh, dropped, error);
+  (void)fclose(stream);
+  return status;
 }
 
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error) {
-  struct stat about = {0};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  const int streams[2] = {memfd_create("vertices", MFD_CLOEXEC),
-                          memfd_create("triangles", MFD_CLOEXEC)};
-  outcome *left =
-      mmap(NULL, sizeof *left, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (streams[0] < 0 || streams[1] < 0 || left == MAP_FAILED) {
-    (void)supine_error_set(error, status, "%s: out of memory", file->path);
-    goto cleanup;
-  }
-  (void)stat(file->path, &about);
-  (void)supine_error_set(&left->error, SUPINE_ERROR_FORMAT,
-                         "%s: malformed: the importer crashed or exceeded its time or memory; save "
-                         "the mesh as PLY or STL",
-                         file->path);
-  const pid_t child = fork();
-  if (child == 0) {
-    be_child(file, streams, (size_t)about.st_size, left);
-  }
-  while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
-  }
-  status = left->error.status;
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "%s", left->error.message);
-  } else if (!collect(streams[0], 3 * sizeof(double), (void **)&mesh->vertices,
-                      &mesh->vertex_count) ||
-             !collect(streams[1], 3 * sizeof(uint32_t), (void **)&mesh->triangles,
-                      &mesh->triangle_count) ||
-             mesh->vertex_count > MESH_VERTICES_MAX) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
-  }
-  *dropped = left->dropped;
+  return import_file(file, false, mesh, dropped, error);
+}
 
-cleanup:
-  if (left != MAP_FAILED) {
-    (void)munmap(left, sizeof *left);
+/* Check that coordinates are numbers, and turn lines that name a file of materials into comments:
+ * a surface needs no colours. */
+supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text line;
+  mesh_text word;
+  if (!supine_mesh_guard_text(file, error)) {
+    return SUPINE_ERROR_FORMAT;
   }
-  for (int i = 0; i < 2; ++i) {
-    if (streams[i] >= 0) {
-      (void)close(streams[i]);
+  for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
+    double position[3];
+    if (!supine_mesh_text_word(&line, &word)) {
+      continue;
+    }
+    if (supine_mesh_text_is(word, "mtllib")) {
+      file->bytes[word.at - file->bytes] = '#';
+    } else if (supine_mesh_text_is(word, "v") && !supine_mesh_text_position(&line, position)) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: line %zu: a vertex needs three numbers", file->path, number);
     }
   }
-  return status;
+  return import_file(file, true, mesh, dropped, error);
 }
 
 bool supine_mesh_import_knows(const char *ending) {

@@ -1,28 +1,114 @@
 /* SPDX-License-Identifier: MIT */
 /* Load a file into a welded surface in millimetres, LPS. */
+#include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
 
 #include "mesh/io/read.h"
 
-static supine_status read_surface(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                  supine_error *error) {
-  switch (file->format) {
-  case MESH_FORMAT_PLY:
-    return supine_mesh_read_ply(file, mesh, dropped, error);
-  case MESH_FORMAT_VTP:
-    return supine_mesh_read_vtp(file, mesh, dropped, error);
-  case MESH_FORMAT_STL:
-    return supine_mesh_read_stl(file, mesh, error);
-  case MESH_FORMAT_OBJ:
-    if (supine_mesh_guard_obj(file, error) != SUPINE_OK) {
-      return SUPINE_ERROR_FORMAT;
+enum { HEAD_SIZE = 4096 };
+
+static supine_status cannot_read(const char *path, supine_error *error) {
+  const int code = errno == 0 ? EIO : errno;
+  return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
+}
+
+/* Find the reader by the name's ending, or else by the first word; NULL: none. */
+static mesh_reader *find_reader(const mesh_file *file) {
+  static const struct {
+    const char *ending;
+    const char *word; /* that files begin with, if only they do */
+    mesh_reader *read;
+  } known[] = {{".ply", "ply", supine_mesh_read_ply},
+               {".vtp", NULL, supine_mesh_read_vtp},
+               {".stl", "solid", supine_mesh_read_stl},
+               {".obj", NULL, supine_mesh_read_obj}};
+  enum { KNOWN = sizeof known / sizeof *known };
+  const char *slash = strrchr(file->path, '/');
+  const char *ending = strrchr(slash == NULL ? file->path : slash, '.');
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text word;
+  for (size_t i = 0; i < KNOWN && ending != NULL; ++i) {
+    if (strcasecmp(ending, known[i].ending) == 0) {
+      return known[i].read;
     }
-    break;
-  case MESH_FORMAT_OTHER:
-    break;
   }
-  return supine_mesh_import(file, mesh, dropped, error);
+  if (ending != NULL && supine_mesh_import_knows(ending)) {
+    return supine_mesh_import;
+  }
+  const bool any = supine_mesh_text_word(&text, &word);
+  for (size_t i = 0; i < KNOWN && any; ++i) {
+    if (known[i].word != NULL && supine_mesh_text_is(word, known[i].word)) {
+      return known[i].read;
+    }
+  }
+  return NULL;
+}
+
+static supine_status read_bytes(FILE *stream, size_t size, mesh_file *file, supine_error *error) {
+  unsigned char *bytes = realloc(file->bytes, size + 1);
+  if (bytes == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu bytes",
+                            file->path, size);
+  }
+  file->bytes = bytes;
+  errno = 0;
+  file->size += fread(bytes + file->size, 1, size - file->size, stream);
+  bytes[file->size] = '\0';
+  return ferror(stream) != 0 ? cannot_read(file->path, error) : SUPINE_OK;
+}
+
+static supine_status open_regular(const char *path, FILE **stream, size_t *size,
+                                  supine_error *error) {
+  struct stat about;
+  errno = 0;
+  if (stat(path, &about) != 0) {
+    return cannot_read(path, error);
+  }
+  if (S_ISDIR(about.st_mode)) {
+    return supine_error_set(error, SUPINE_ERROR_READ,
+                            "%s: is a folder; give the mesh file inside it", path);
+  }
+  if (!S_ISREG(about.st_mode)) {
+    return supine_error_set(error, SUPINE_ERROR_READ,
+                            "%s: is not a regular file; save the mesh to one first", path);
+  }
+  *stream = fopen(path, "rb");
+  if (*stream == NULL) {
+    return cannot_read(path, error);
+  }
+  *size = (size_t)about.st_size;
+  return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: the file is empty", path)
+                    : SUPINE_OK;
+}
+
+/* Open and read the file, and find its reader. */
+static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_error *error) {
+  FILE *stream = NULL;
+  size_t size = 0;
+  supine_status status = open_regular(file->path, &stream, &size, error);
+  if (status == SUPINE_OK) {
+    status = read_bytes(stream, size < HEAD_SIZE ? size : HEAD_SIZE, file, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_mesh_space_note(file, file->size);
+    *reader = find_reader(file);
+    status = *reader == NULL
+                 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                    "%s: no importer for this ending; give the mesh as PLY, OBJ, "
+                                    "STL or VTP",
+                                    file->path)
+             : *reader == supine_mesh_import ? SUPINE_OK
+                                             : read_bytes(stream, size, file, error);
+  }
+  if (stream != NULL) {
+    (void)fclose(stream);
+  }
+  return status;
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
@@ -84,12 +170,11 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   }
   supine_mesh loaded = {0};
   supine_mesh_report found = {0};
-  mesh_file file;
-  supine_status status = supine_mesh_file_read(path, &file, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  if ((status = read_surface(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
+  mesh_file file = {.path = path};
+  mesh_reader *reader = NULL;
+  supine_status status = SUPINE_OK;
+  if ((status = read_file(&file, &reader, error)) != SUPINE_OK ||
+      (status = reader(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
       (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
       (status = convert(path, scale, found.axes, &loaded, error)) != SUPINE_OK) {
     goto cleanup;
@@ -116,6 +201,6 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
 
 cleanup:
   supine_mesh_free(&loaded);
-  supine_mesh_file_free(&file);
+  free(file.bytes);
   return status;
 }

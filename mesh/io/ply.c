@@ -1,59 +1,186 @@
 /* SPDX-License-Identifier: MIT */
-/* Read vertices and faces of a PLY body, which may be shorter than its header says. */
+/* Read the vertices and faces of a PLY file, which may be shorter than its header says. */
 #include <stdlib.h>
 
-#include "mesh/io/ply.h"
+#include "mesh/io/read.h"
 
-typedef struct ply_reader {
+enum { ELEMENTS_MAX = 32, PROPERTIES_MAX = 256 };
+
+typedef enum encoding { ASCII, LITTLE, BIG, ENCODINGS } encoding;
+typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
+/* Use of a property: a coordinate, the corners of a face, or none. */
+typedef enum role { X, Y, Z, CORNERS, NONE } role;
+
+typedef struct property {
+  const mesh_type *count; /* NULL: not a list */
+  const mesh_type *type;
+  role role;
+} property;
+
+typedef struct element {
+  kind kind;
+  uint64_t count;
+  size_t first_property;
+  size_t property_count;
+} element;
+
+typedef struct ply {
   const mesh_file *file;
-  ply_header header;
-  mesh_text text; /* text not yet read; in ASCII, `line` is the unread part of the line */
-  mesh_text line;
-  size_t row_count;
-  double *rows; /* [row_count, 3] x, y, z */
-  mesh_faces faces;
   supine_error *error;
-} ply_reader;
+  encoding encoding;
+  mesh_text text; /* not yet read; in ASCII, `line` is the rest of the line */
+  mesh_text line;
+  unsigned present; /* a bit for each role in an element with items */
+  size_t element_count;
+  size_t property_count;
+  element elements[ELEMENTS_MAX];
+  property properties[PROPERTIES_MAX];
+  mesh_faces faces;
+} ply;
 
-/* Decode a number of this type, least significant byte first. */
-static double decode(const unsigned char bytes[8], const ply_type *type) {
-  union {
-    uint64_t bits;
-    double real;
-  } as64 = {0};
-  for (unsigned k = type->size; k-- > 0;) {
-    as64.bits = as64.bits << 8 | bytes[k];
+/* Find the index of a word in a NULL-terminated list, or of the NULL if it is not there. */
+static int find_name(mesh_text word, const char *const *names) {
+  int index = 0;
+  while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
+    ++index;
   }
-  if (type->is_real && type->size == 8) {
-    return as64.real;
-  }
-  const union {
-    uint32_t bits;
-    float real;
-  } as32 = {(uint32_t)as64.bits};
-  if (type->is_real) {
-    return (double)as32.real;
-  }
-  const uint64_t sign = UINT64_C(1) << (8 * type->size - 1);
-  return type->is_signed && (as64.bits & sign) != 0 ? (double)as64.bits - 2.0 * (double)sign
-                                                    : (double)as64.bits;
+  return index;
 }
 
-static bool take_binary(ply_reader *in, const ply_type *type, double *value) {
-  if ((size_t)(in->text.end - in->text.at) < type->size) {
+static bool add_element(ply *in, mesh_text name, mesh_text count) {
+  static const char *const kinds[] = {"vertex", "face", "tristrips", NULL};
+  if (in->element_count == ELEMENTS_MAX) {
     return false;
   }
-  unsigned char bytes[8];
-  for (unsigned k = 0; k < type->size; ++k) {
-    bytes[k] = in->text.at[in->header.encoding == PLY_LITTLE ? k : type->size - 1 - k];
+  element *added = &in->elements[in->element_count];
+  *added = (element){.kind = (kind)find_name(name, kinds), .first_property = in->property_count};
+  for (size_t e = 0; added->kind != OTHER && e < in->element_count; ++e) {
+    if (in->elements[e].kind == added->kind) { /* a second one would be ambiguous */
+      return false;
+    }
   }
-  in->text.at += type->size;
-  *value = decode(bytes, type);
-  return true;
+  ++in->element_count;
+  return supine_mesh_text_count(count, &added->count);
 }
 
-static bool take_ascii(ply_reader *in, const ply_type *type, double *value) {
-  mesh_text word = in->line;
+/* Add a property by the words after "property". */
+static bool add_property(ply *in, const mesh_text *word, size_t words) {
+  static const char *const columns[] = {"x", "y", "z", NULL};
+  static const char *const corners[] = {"vertex_indices", "vertex_index", NULL};
+  const bool list = words > 0 && supine_mesh_text_is(word[0], "list");
+  if (in->property_count == PROPERTIES_MAX || in->element_count == 0 || words < (list ? 4 : 2)) {
+    return false;
+  }
+  element *of = &in->elements[in->element_count - 1];
+  property *added = &in->properties[in->property_count++];
+  const mesh_text name = word[list ? 3 : 1];
+  *added = (property){.count = list ? supine_mesh_type_find(word[1]) : NULL,
+                      .type = supine_mesh_type_find(word[list ? 2 : 0]),
+                      .role = NONE};
+  if (of->kind == VERTICES && !list) {
+    const int column = find_name(name, columns);
+    added->role = columns[column] != NULL ? (role)column : NONE;
+  } else if (of->kind == FACES && list && corners[find_name(name, corners)] != NULL) {
+    added->role = CORNERS;
+  }
+  ++of->property_count;
+  in->present |= of->count > 0 ? 1U << added->role : 0U;
+  return added->type != NULL && (!list || (added->count != NULL && !added->count->is_real));
+}
+
+/* Read one line of the header; skip comments and unknown keywords. */
+static bool read_line(ply *in, mesh_text line, bool *has_format) {
+  static const char *const encodings[] = {"ascii", "binary_little_endian", "binary_big_endian",
+                                          NULL};
+  mesh_text word[5];
+  size_t words = 0;
+  for (const unsigned char *at = line.at; at < line.end; ++at) {
+    if (*at < ' ' && *at != '\t') {
+      return false;
+    }
+  }
+  while (words < 5 && supine_mesh_text_word(&line, &word[words])) {
+    ++words;
+  }
+  if (words > 0 && supine_mesh_text_is(word[0], "format")) {
+    in->encoding = words > 1 ? (encoding)find_name(word[1], encodings) : ENCODINGS;
+    *has_format = in->encoding < ENCODINGS;
+    return *has_format;
+  }
+  return words > 0 && supine_mesh_text_is(word[0], "element")
+             ? words > 2 && add_element(in, word[1], word[2])
+         : words > 0 && supine_mesh_text_is(word[0], "property")
+             ? add_property(in, word + 1, words - 1)
+             : true;
+}
+
+static supine_status read_header(ply *in) {
+  const char *path = in->file->path;
+  mesh_text line;
+  bool has_format = false;
+  if (!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply")) {
+    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                            "%s: does not begin with \"ply\"; give a PLY file", path);
+  }
+  for (size_t number = 2; supine_mesh_text_line(&in->text, &line); ++number) {
+    mesh_text rest = line;
+    mesh_text word;
+    if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
+      return has_format ? SUPINE_OK
+                        : supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                                           "%s: the PLY header has no format line; save the mesh "
+                                           "again",
+                                           path);
+    }
+    if (!read_line(in, line, &has_format)) {
+      return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                              "%s: line %zu of the PLY header is malformed; save the mesh again",
+                              path, number);
+    }
+  }
+  return supine_error_set(
+      in->error, SUPINE_ERROR_FORMAT,
+      "%s: the PLY header has no end_header: the file is truncated; save it again", path);
+}
+
+/* Check that the header promises a surface that can be read. */
+static supine_status check_header(const ply *in) {
+  static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
+  const char *path = in->file->path;
+  for (size_t e = 0; e < in->element_count; ++e) {
+    if (in->elements[e].property_count == 0) { /* items without bytes, of any count */
+      return supine_error_set(
+          in->error, SUPINE_ERROR_FORMAT,
+          "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
+    }
+    if (in->elements[e].kind == STRIPS && in->elements[e].count > 0) {
+      return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                              "%s: strips of triangles (tristrips) are not read; save triangles",
+                              path);
+    }
+  }
+  if (in->encoding == ASCII && !supine_mesh_guard_text(in->file, in->error)) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  return (in->present & needed) == needed
+             ? SUPINE_OK
+             : supine_error_set(in->error, SUPINE_ERROR_MESH,
+                                "%s: no triangles: the PLY header has no faces with "
+                                "vertex_indices, or no vertices with x, y and z",
+                                path);
+}
+
+/* Read the next number; false if it is missing or malformed. */
+static bool take(ply *in, const mesh_type *type, double *value) {
+  if (in->encoding != ASCII) {
+    if ((size_t)(in->text.end - in->text.at) < type->size) {
+      return false;
+    }
+    *value = supine_mesh_type_decode(type, in->text.at, in->encoding == BIG);
+    in->text.at += type->size;
+    return true;
+  }
+  mesh_text word;
   uint64_t count = 0;
   if (type->is_real) {
     return supine_mesh_text_number(&in->line, value);
@@ -68,183 +195,110 @@ static bool take_ascii(ply_reader *in, const ply_type *type, double *value) {
   return good;
 }
 
-static bool take(ply_reader *in, const ply_type *type, double *value) {
-  return in->header.encoding == PLY_ASCII ? take_ascii(in, type, value)
-                                          : take_binary(in, type, value);
-}
-
-static supine_status cut_short(const ply_reader *in, const ply_element *element, uint64_t item) {
+static supine_status cut_short(const ply *in, const element *of, uint64_t item) {
   static const char *const names[] = {"vertex", "face", "tristrips", "item"};
   return supine_error_set(
       in->error, SUPINE_ERROR_FORMAT,
       "%s: truncated or malformed at %s %llu of the %llu in the PLY header; save the mesh again",
-      in->file->path, names[element->kind], (unsigned long long)item,
-      (unsigned long long)element->count);
+      in->file->path, names[of->kind], (unsigned long long)item, (unsigned long long)of->count);
 }
 
-static supine_status take_list(ply_reader *in, const ply_element *element, uint64_t item,
-                               const ply_property *property) {
+static supine_status take_list(ply *in, const element *of, uint64_t item, const property *list,
+                               bool add) {
   double corners[MESH_CORNERS_MAX];
   double length = 0.0;
-  if (!take(in, property->count, &length)) {
-    return cut_short(in, element, item);
+  if (!take(in, list->count, &length)) {
+    return cut_short(in, of, item);
   }
   if (length < 0.0) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                             "%s: the length of a list is %.0f; save the mesh again", in->file->path,
                             length);
   }
-  const uint64_t count = (uint64_t)length; /* below 2^63: the file ends first */
+  const uint64_t count = (uint64_t)length; /* below 2^64: the file ends first */
   for (uint64_t k = 0; k < count; ++k) {
     double value = 0.0;
-    if (!take(in, property->type, &value)) {
-      return cut_short(in, element, item);
+    if (!take(in, list->type, &value)) {
+      return cut_short(in, of, item);
     }
     if (k < MESH_CORNERS_MAX) {
       corners[k] = value;
     }
   }
-  return property->role == PLY_CORNERS && element->kind == PLY_FACES
+  return add && list->role == CORNERS
              ? supine_mesh_faces_add(&in->faces, corners, (size_t)count, in->error)
              : SUPINE_OK;
 }
 
-static supine_status take_item(ply_reader *in, const ply_element *element, uint64_t item) {
-  if (in->header.encoding == PLY_ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
-    return cut_short(in, element, item); /* an item takes one line */
-  }
-  for (size_t p = 0; p < element->property_count; ++p) {
-    const ply_property *property = &in->header.properties[element->first_property + p];
-    double value = 0.0;
-    if (property->count != NULL) {
-      const supine_status status = take_list(in, element, item, property);
-      if (status != SUPINE_OK) {
-        return status;
-      }
-    } else if (!take(in, property->type, &value)) {
-      return cut_short(in, element, item);
-    } else if (element->kind == PLY_VERTICES && property->role <= PLY_Z) {
-      in->rows[3 * item + property->role] = (double)(float)value;
-    }
-  }
-  return SUPINE_OK;
-}
-
-static supine_status take_items(ply_reader *in, const ply_element *element) {
+/* Read the items of an element.
+ * @param add  add its faces; otherwise they are only skipped */
+static supine_status take_items(ply *in, const element *of, bool add) {
+  double *vertices = in->faces.mesh->vertices;
   supine_status status = SUPINE_OK;
-  for (uint64_t i = 0; status == SUPINE_OK && i < element->count; ++i) {
-    status = take_item(in, element, i);
+  for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
+    if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
+      return cut_short(in, of, i); /* an item takes one line */
+    }
+    for (size_t p = 0; p < of->property_count && status == SUPINE_OK; ++p) {
+      const property *item = &in->properties[of->first_property + p];
+      double value = 0.0;
+      if (item->count != NULL) {
+        status = take_list(in, of, i, item, add);
+      } else if (!take(in, item->type, &value)) {
+        return cut_short(in, of, i);
+      } else if (item->role <= Z) {
+        vertices[3 * i + item->role] = (double)(float)value;
+      }
+    }
   }
   return status;
 }
 
-/* Allocate the rows that the header announces, at most as many as the file can hold. */
-static supine_status take_vertices(ply_reader *in, const ply_element *element) {
+/* Allocate the vertices that the header announces, at most as many as the file can hold. */
+static supine_status make_room(const ply *in, const element *of, supine_mesh *mesh) {
   uint64_t least = 0; /* bytes per item */
-  for (size_t p = 0; p < element->property_count; ++p) {
-    const ply_property *property = &in->header.properties[element->first_property + p];
-    least += in->header.encoding == PLY_ASCII ? 2 /* a digit and a blank */
-             : property->count != NULL        ? property->count->size
-                                              : property->type->size;
+  for (size_t p = 0; p < of->property_count; ++p) {
+    const property *item = &in->properties[of->first_property + p];
+    least += in->encoding == ASCII ? 2 /* a digit and a blank */
+             : item->count != NULL ? item->count->size
+                                   : item->type->size;
   }
   const uint64_t room = (uint64_t)(in->text.end - in->text.at) / least + 1;
-  const uint64_t count = element->count < room ? element->count : room;
+  const uint64_t count = of->count < room ? of->count : room;
   if (count > MESH_VERTICES_MAX) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                             "%s: more than %d vertices; give a coarser mesh", in->file->path,
                             MESH_VERTICES_MAX);
   }
-  in->row_count = (size_t)count;
-  in->rows = malloc((size_t)count * 3 * sizeof *in->rows);
-  return in->rows == NULL
+  mesh->vertex_count = (size_t)count;
+  mesh->vertices = malloc((size_t)count * 3 * sizeof *mesh->vertices);
+  return mesh->vertices == NULL
              ? supine_error_set(in->error, SUPINE_ERROR_MEMORY, "%s: out of memory", in->file->path)
-             : take_items(in, element);
-}
-
-/* Read the vertices, wherever they are: faces are checked and cut with them. The reader ends up
- * after them. */
-static supine_status read_vertices(ply_reader *in) {
-  supine_status status = SUPINE_OK;
-  for (size_t e = 0; status == SUPINE_OK; ++e) {
-    ply_element element = in->header.elements[e];
-    if (element.kind == PLY_VERTICES) {
-      return take_vertices(in, &element);
-    }
-    element.kind = PLY_OTHER;
-    status = take_items(in, &element);
-  }
-  return status;
-}
-
-static supine_status read_faces(ply_reader *in, const unsigned char *after_vertices) {
-  supine_status status = SUPINE_OK;
-  for (size_t e = 0; status == SUPINE_OK && e < in->header.element_count; ++e) {
-    const ply_element *element = &in->header.elements[e];
-    if (element->kind == PLY_VERTICES) {
-      in->text.at = after_vertices;
-    } else {
-      status = take_items(in, element);
-    }
-  }
-  return status;
-}
-
-static supine_status begin(const mesh_file *file, ply_reader *in, supine_error *error) {
-  *in = (ply_reader){.file = file, .error = error};
-  const supine_status status = supine_mesh_ply_header_read(file, &in->header, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  in->text = (mesh_text){file->bytes + in->header.size, file->bytes + file->size};
-  for (size_t e = 0; e < in->header.element_count; ++e) {
-    if (in->header.elements[e].property_count == 0) { /* items without bytes, of any count */
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          "%s: element %zu of the PLY header has no property; save the mesh again", file->path,
-          e + 1);
-    }
-    if (in->header.elements[e].kind == PLY_STRIPS && in->header.elements[e].count > 0) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: strips of triangles (tristrips) are not read; save triangles",
-                              file->path);
-    }
-  }
-  return in->header.encoding == PLY_ASCII && !supine_mesh_guard_text(file, error)
-             ? SUPINE_ERROR_FORMAT
              : SUPINE_OK;
-}
-
-static bool holds(const ply_header *header, ply_role role) {
-  return (header->present >> role & 1U) != 0;
-}
-
-static bool holds_positions(const ply_header *header) {
-  return holds(header, PLY_X) && holds(header, PLY_Y) && holds(header, PLY_Z);
 }
 
 supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
-  ply_reader in;
-  supine_status status = begin(file, &in, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  supine_mesh_space_note(file, in.header.size);
-  if (!holds_positions(&in.header) || !holds(&in.header, PLY_CORNERS)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: no triangles: the PLY header has no faces with vertex_indices, or "
-                            "no vertices with x, y and z",
-                            file->path);
-  }
+  ply in = {.file = file,
+            .error = error,
+            .text = {file->bytes, file->bytes + file->size},
+            .faces = {.path = file->path, .mesh = mesh}};
+  size_t again = 0; /* elements to read again, as faces stand before the vertices */
+  supine_status status = read_header(&in);
+  status = status == SUPINE_OK ? check_header(&in) : status;
   const unsigned char *body = in.text.at;
-  in.faces = (mesh_faces){.path = file->path, .mesh = mesh};
-  status = read_vertices(&in);
-  mesh->vertices = in.rows;
-  mesh->vertex_count = in.row_count;
   if (status == SUPINE_OK) {
-    const unsigned char *after_vertices = in.text.at;
-    in.text.at = body;
-    status = read_faces(&in, after_vertices);
+    supine_mesh_space_note(file, (size_t)(body - file->bytes));
+  }
+  for (size_t e = 0; e < in.element_count && status == SUPINE_OK; ++e) {
+    const element *of = &in.elements[e];
+    again = of->kind == FACES && mesh->vertices == NULL ? e + 1 : again;
+    status = of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK;
+    status = status == SUPINE_OK ? take_items(&in, of, mesh->vertices != NULL) : status;
+  }
+  in.text.at = body;
+  for (size_t e = 0; e < again && status == SUPINE_OK; ++e) {
+    status = take_items(&in, &in.elements[e], true);
   }
   *dropped = in.faces.dropped;
   return status;

@@ -31,30 +31,32 @@ bool supine_mesh_text_number(mesh_text *text, double *value);
 /** Parse three numbers, rounded to single precision. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
 
-/* ---- file.c: a file's bytes. ---- */
+/** A type of binary numbers. */
+typedef struct mesh_type {
+  const char *name;
+  unsigned size;  /**< bytes */
+  bool is_signed; /**< may be negative */
+  bool is_real;
+} mesh_type;
 
-typedef enum mesh_format {
-  MESH_FORMAT_OTHER = 0, /**< an ending that assimp knows, without a guard of ours */
-  MESH_FORMAT_PLY,
-  MESH_FORMAT_VTP,
-  MESH_FORMAT_STL,
-  MESH_FORMAT_OBJ
-} mesh_format;
+/** Find a type by its name in PLY or VTP, in any case; NULL: none. */
+const mesh_type *supine_mesh_type_find(mesh_text name);
+/** Decode a number; big: most significant byte first. */
+double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big);
 
 /** A file being read. */
 typedef struct mesh_file {
   const char *path;
-  mesh_format format;
-  unsigned char *bytes; /**< all of PLY, STL and OBJ, the head of others; then a 0 */
+  unsigned char *bytes; /**< all of the file, or its head if assimp opens it itself; then a 0 */
   size_t size;
   bool tagged;       /**< a SPACE tag is present */
   supine_axes space; /**< the axes it names; AUTO: unknown ones */
   bool mentions_ras; /**< a comment contains the word RAS */
 } mesh_file;
 
-/** Open and read the file; find its format by the ending, or else by the first bytes. */
-supine_status supine_mesh_file_read(const char *path, mesh_file *file, supine_error *error);
-void supine_mesh_file_free(mesh_file *file);
+/** Refuse NUL bytes and CR without LF in a text, which readers would take differently: they end
+ * words at a NUL, and lines at a LF. False: error set, SUPINE_ERROR_FORMAT. */
+bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- space.c ---- */
 
@@ -84,27 +86,21 @@ typedef struct mesh_faces {
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 
-/* ---- ply.c, stl.c, import.c (assimp: all else): read a surface in the file's units and axes,
- * not welded, in single precision. The caller frees `mesh` even after a failure; `dropped`
- * counts points and lines. The SPACE tag is noted if the head did not show it. ---- */
+/* ---- ply.c, stl.c, vtp_read.c, import.c: one function for each format. ---- */
 
-supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error);
-supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error);
-supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error);
-supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                 supine_error *error);
+/** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
+ * `mesh` even after a failure; `dropped` counts points and lines. The SPACE tag is noted if the
+ * head did not show it. */
+typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                  supine_error *error);
+mesh_reader supine_mesh_read_ply;
+mesh_reader supine_mesh_read_vtp;
+mesh_reader supine_mesh_read_stl;
+mesh_reader supine_mesh_read_obj;
+/** Read any other format that assimp knows. */
+mesh_reader supine_mesh_import;
 /** Report whether assimp is installed and imports this ending. */
 bool supine_mesh_import_knows(const char *ending);
-
-/* ---- guard_*.c: refuse what importers mishandle ---- */
-
-/** Check an OBJ file for coordinates that are not numbers, and remove names of other files.
- * @retval SUPINE_ERROR_FORMAT */
-supine_status supine_mesh_guard_obj(mesh_file *file, supine_error *error);
-/** Check line ends and NUL bytes of a text; false: error set, SUPINE_ERROR_FORMAT. */
-bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- weld.c ---- */
 

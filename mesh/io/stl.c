@@ -73,7 +73,9 @@ static supine_status refuse(const mesh_file *file, size_t facets, size_t promise
                                 file->path, file->size, facets, promised);
 }
 
-supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, supine_error *error) {
+supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
+  (void)dropped;
   const size_t facets = file->size < STL_HEADER + 4 ? 0 : read_bits(file->bytes + STL_HEADER);
   const size_t promised = STL_HEADER + 4 + STL_FACET * facets;
   const bool binary = file->size == promised;

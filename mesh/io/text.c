@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Split a text of any content into lines, words and numbers. */
+/* Split a text of any content into lines, words and numbers; decode binary numbers. */
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -103,4 +103,62 @@ bool supine_mesh_text_position(mesh_text *text, double position[3]) {
     position[k] = (double)(float)position[k];
   }
   return good;
+}
+
+const mesh_type *supine_mesh_type_find(mesh_text name) {
+  static const mesh_type types[] = {
+      {"char", 1, true, false},    {"int8", 1, true, false},    {"uchar", 1, false, false},
+      {"uint8", 1, false, false},  {"short", 2, true, false},   {"int16", 2, true, false},
+      {"ushort", 2, false, false}, {"uint16", 2, false, false}, {"int", 4, true, false},
+      {"int32", 4, true, false},   {"uint", 4, false, false},   {"uint32", 4, false, false},
+      {"int64", 8, true, false},   {"uint64", 8, false, false}, {"float", 4, true, true},
+      {"float32", 4, true, true},  {"double", 8, true, true},   {"float64", 8, true, true}};
+  for (size_t i = 0; i < sizeof types / sizeof *types; ++i) {
+    if (supine_mesh_text_is(name, types[i].name)) {
+      return &types[i];
+    }
+  }
+  return NULL;
+}
+
+double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big) {
+  uint64_t bits = 0;
+  for (unsigned k = 0; k < type->size; ++k) {
+    bits = bits << 8 | bytes[big ? k : type->size - 1 - k];
+  }
+  if (type->is_real && type->size == 8) {
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+  }
+  if (type->is_real) {
+    const uint32_t low = (uint32_t)bits;
+    float value;
+    memcpy(&value, &low, sizeof value);
+    return (double)value;
+  }
+  const uint64_t sign = UINT64_C(1) << (8 * type->size - 1);
+  return type->is_signed && (bits & sign) != 0 ? (double)(int64_t)(bits - sign) - (double)sign
+                                               : (double)bits;
+}
+
+bool supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
+  const unsigned char *end = file->bytes + file->size;
+  const unsigned char *nul = memchr(file->bytes, '\0', file->size);
+  if (nul != NULL) {
+    (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8",
+                           file->path);
+    return false;
+  }
+  for (const unsigned char *at = file->bytes; (at = memchr(at, '\r', (size_t)(end - at))) != NULL;
+       ++at) {
+    if (at + 1 == end || at[1] != '\n') {
+      (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
+                             "%s: a carriage return without a line feed; save it with LF line ends",
+                             file->path);
+      return false;
+    }
+  }
+  return true;
 }

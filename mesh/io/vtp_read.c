@@ -24,11 +24,6 @@ typedef struct element {
   const char *body;     /* text after its > */
 } element;
 
-typedef struct array {
-  unsigned char *bytes;
-  size_t size;
-} array;
-
 static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", v->file->path, what);
 }
@@ -90,109 +85,81 @@ static int sextet(char c) {
                                 : -1;
 }
 
-/* Decode base64 up to `bytes` bytes or its end, and move *at after the last group. Return the
- * number of bytes. */
-static size_t base64(const char **at, const char *end, unsigned char *bytes, size_t most) {
-  size_t count = 0;
-  while (count < most) {
-    int group[4];
-    int got = 0;
-    for (; got < 4 && *at < end; ++*at) {
-      if (isspace((unsigned char)**at)) {
-        continue;
+/* Decode base64 up to the first other character; streams may follow each other, each padded to
+ * whole groups. Return the number of bytes.
+ * @param bytes  room for 3 bytes for each 4 characters */
+static size_t base64(const char *at, const char *end, unsigned char *bytes) {
+  unsigned char *to = bytes;
+  unsigned word = 0;
+  int got = 0;
+  int padding = 0;
+  for (; at < end; ++at) {
+    const int value = *at == '=' ? 0 : sextet(*at);
+    if (value < 0 && isspace((unsigned char)*at)) {
+      continue;
+    }
+    if (value < 0) {
+      break;
+    }
+    word = word << 6 | (unsigned)value;
+    padding += *at == '=';
+    if (++got == 4) {
+      for (int k = 0; k < 3 - padding; ++k) {
+        *to++ = (unsigned char)(word >> (16 - 8 * k));
       }
-      group[got] = **at == '=' ? 64 : sextet(**at);
-      if (group[got] < 0) {
-        return count;
-      }
-      ++got;
-    }
-    if (got < 4 || group[0] == 64 || group[1] == 64) {
-      return count;
-    }
-    const unsigned word =
-        (unsigned)(group[0] << 18 | group[1] << 12 | (group[2] & 63) << 6 | (group[3] & 63));
-    const int valid = group[2] == 64 ? 1 : group[3] == 64 ? 2 : 3;
-    for (int k = 0; k < valid && count < most; ++k) {
-      bytes[count++] = (unsigned char)(word >> (16 - 8 * k));
-    }
-    if (valid < 3) {
-      break; /* padding ends a stream */
+      word = 0;
+      got = padding = 0;
     }
   }
-  return count;
+  return (size_t)(to - bytes);
 }
 
-/* Read bytes from a stream, raw or base64. */
-static bool take_bytes(const char **at, const char *end, bool raw, unsigned char *bytes,
-                       size_t count) {
-  if (!raw) {
-    return base64(at, end, bytes, count) == count;
-  }
-  if ((size_t)(end - *at) < count) {
-    return false;
-  }
-  memcpy(bytes, *at, count);
-  *at += count;
-  return true;
-}
-
-/* Read compressed blocks: their number, size, the last one's size, the compressed sizes; then
- * the blocks. In base64 the sizes and the blocks are separate streams. */
-static bool take_blocks(const vtp_file *v, const char *at, bool raw, size_t wanted, array *out) {
-  unsigned char sizes[3 * 8];
+/* Unpack the bytes of an array into out [wanted]: its size and the numbers; or, if compressed, the
+ * number of blocks, their size, that of a shorter last one, their compressed sizes, the blocks. */
+static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
+                   unsigned char *out) {
   const size_t h = v->header_size;
-  const char *begin = at;
-  bool good = false;
-  if (!take_bytes(&at, v->end, raw, sizes, 3 * h)) {
+  const unsigned char *end = bytes + size;
+  if (!v->compressed) {
+    if (size < h || little(bytes, h) != wanted || size - h < wanted) {
+      return false;
+    }
+    memcpy(out, bytes + h, wanted);
+    return true;
+  }
+  if (size < 3 * h) {
     return false;
   }
-  const uint64_t blocks = little(sizes, h);
-  const uint64_t block = little(sizes + h, h);
-  const uint64_t last = little(sizes + 2 * h, h);
-  const uint64_t left = (uint64_t)(v->end - at);
+  const uint64_t blocks = little(bytes, h);
+  const uint64_t block = little(bytes + h, h);
+  const uint64_t last = little(bytes + 2 * h, h);
   if (blocks == 0) {
     return wanted == 0;
   }
-  if (blocks > left / h || block == 0 || last > block || (blocks - 1) > wanted / block ||
+  if (blocks > size / h - 3 || block == 0 || last > block || (blocks - 1) > wanted / block ||
       (blocks - 1) * block + (last > 0 ? last : block) != wanted) {
     return false;
   }
-  unsigned char *table = malloc((3 + blocks) * h);
-  unsigned char *packed = malloc(left + 1);
-  at = begin;
-  if (table != NULL && packed != NULL && take_bytes(&at, v->end, raw, table, (3 + blocks) * h)) {
-    uint64_t total = 0;
-    good = true;
-    for (uint64_t b = 0; b < blocks && good; ++b) {
-      const uint64_t size = little(table + (3 + b) * h, h);
-      good = size <= left - total;
-      total += good ? size : 0;
+  const unsigned char *packed = bytes + (3 + blocks) * h;
+  for (uint64_t b = 0; b < blocks; ++b) {
+    const uint64_t here = little(bytes + (3 + b) * h, h);
+    const uint64_t whole = b + 1 < blocks || last == 0 ? block : last;
+    uLongf made = whole;
+    if (here > (uint64_t)(end - packed) ||
+        uncompress(out + b * block, &made, packed, here) != Z_OK || made != whole) {
+      return false;
     }
-    good = good && take_bytes(&at, v->end, raw, packed, total);
-    size_t from = 0;
-    for (uint64_t b = 0; b < blocks && good; ++b) {
-      const uint64_t size = little(table + (3 + b) * h, h);
-      const uint64_t whole = b + 1 < blocks || last == 0 ? block : last;
-      uLongf made = whole;
-      good =
-          uncompress(out->bytes + b * block, &made, packed + from, size) == Z_OK && made == whole;
-      from += size;
-    }
+    packed += here;
   }
-  free(table);
-  free(packed);
-  return good;
+  return true;
 }
 
-/* Read an array of `count` numbers of `each` bytes, in binary or appended format, into `out`. */
-static bool take_binary(const vtp_file *v, const element *e, size_t count, size_t each,
-                        array *out) {
-  char text[64];
+/* Read `wanted` bytes of an array in binary or appended format. */
+static bool take_bytes(const vtp_file *v, const element *e, size_t wanted, unsigned char *out) {
   const bool appended = is_attribute(e, "format", "appended");
   const char *at = e->body;
-  bool raw = false;
   if (appended) {
+    char text[64];
     char *stop = NULL;
     if (v->appended == NULL || !attribute(e, "offset", text, sizeof text)) {
       return false;
@@ -202,93 +169,55 @@ static bool take_binary(const vtp_file *v, const element *e, size_t count, size_
       return false;
     }
     at = v->appended + offset;
-    raw = v->appended_raw;
+    if (v->appended_raw) {
+      return unpack(v, (const unsigned char *)at, (size_t)(v->end - at), wanted, out);
+    }
   }
-  out->size = count * each;
-  if (v->compressed) {
-    return take_blocks(v, at, raw, out->size, out);
-  }
-  /* One size precedes the numbers in the same base64 stream. */
-  unsigned char *whole = malloc(v->header_size + out->size + 1);
-  const bool good = whole != NULL &&
-                    take_bytes(&at, v->end, raw, whole, v->header_size + out->size) &&
-                    little(whole, v->header_size) == out->size;
-  if (good) {
-    memcpy(out->bytes, whole + v->header_size, out->size);
-  }
-  free(whole);
+  unsigned char *decoded = malloc((size_t)(v->end - at) / 4 * 3 + 1);
+  const bool good = decoded != NULL && unpack(v, decoded, base64(at, v->end, decoded), wanted, out);
+  free(decoded);
   return good;
 }
 
-static double number_of(const char *type, const unsigned char *bytes, size_t each) {
-  const uint64_t bits = little(bytes, each);
-  if (strcmp(type, "Float32") == 0) {
-    const uint32_t low = (uint32_t)bits;
-    float value;
-    memcpy(&value, &low, sizeof value);
-    return (double)value;
-  }
-  if (strcmp(type, "Float64") == 0) {
-    double value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-  }
-  const bool below = type[0] == 'I' && each < 8 && bits >> (8 * each - 1) != 0;
-  return type[0] == 'I' && each == 8 ? (double)(int64_t)bits
-         : below                     ? (double)bits - (double)(1ULL << (8 * each))
-                                     : (double)bits;
-}
-
-static size_t size_of_type(const char *type) {
-  static const struct {
-    const char *name;
-    size_t size;
-  } known[] = {{"Float32", 4}, {"Float64", 8}, {"Int8", 1},   {"UInt8", 1}, {"Int16", 2},
-               {"UInt16", 2},  {"Int32", 4},   {"UInt32", 4}, {"Int64", 8}, {"UInt64", 8}};
-  for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    if (strcmp(type, known[i].name) == 0) {
-      return known[i].size;
-    }
-  }
-  return 0;
-}
-
-/* Read `count` numbers of an array as doubles; NULL after an error. */
-static double *take_numbers(const vtp_file *v, const element *e, size_t count,
-                            supine_error *error) {
-  char type[32] = "";
-  (void)attribute(e, "type", type, sizeof type);
-  const size_t each = size_of_type(type);
+/* Read `count` numbers of an array; strings hold the codes of their characters. */
+static supine_status take_numbers(const vtp_file *v, const element *e, size_t count,
+                                  double **numbers, supine_error *error) {
+  char name[32] = "";
+  (void)attribute(e, "type", name, sizeof name);
+  const mesh_text word = {(const unsigned char *)name, (const unsigned char *)strchr(name, '\0')};
+  static const mesh_type character = {"String", 1, false, false};
+  const mesh_type *type =
+      strcmp(name, character.name) == 0 ? &character : supine_mesh_type_find(word);
+  *numbers = NULL;
   /* zlib expands a byte to at most 1032 */
-  if (each == 0 || count > 1032 * (size_t)(v->end - v->bytes) / 1) {
-    (void)malformed(v, "an array of its points or polygons is not read", error);
-    return NULL;
+  if (type == NULL || count > 1032 * (size_t)(v->end - v->bytes)) {
+    return malformed(v, "an array of its points or polygons is not read", error);
   }
   double *values = malloc((count + 1) * sizeof *values);
-  array raw = {malloc(count * each + 1), 0};
-  bool good = values != NULL && raw.bytes != NULL;
-  if (!good) {
-    (void)supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", v->file->path);
-  } else if (is_attribute(e, "format", "ascii")) {
+  unsigned char *bytes = malloc(count * type->size + 1);
+  supine_status status = SUPINE_OK;
+  if (values == NULL || bytes == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", v->file->path);
+  } else {
+    const bool ascii = is_attribute(e, "format", "ascii");
     mesh_text text = {(const unsigned char *)e->body, (const unsigned char *)v->end};
-    for (size_t i = 0; i < count && good; ++i) {
+    bool good = ascii || take_bytes(v, e, count * type->size, bytes);
+    for (size_t i = 0; i < count && good && ascii; ++i) {
       good = supine_mesh_text_number(&text, &values[i]);
     }
-  } else {
-    good = take_binary(v, e, count, each, &raw);
-    for (size_t i = 0; i < count && good; ++i) {
-      values[i] = number_of(type, raw.bytes + i * each, each);
+    for (size_t i = 0; i < count && good && !ascii; ++i) {
+      values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
     }
+    status =
+        good ? SUPINE_OK : malformed(v, "an array is truncated or damaged; save it again", error);
   }
-  if (values != NULL && raw.bytes != NULL && !good) {
-    (void)malformed(v, "an array is truncated or damaged; save it again", error);
-  }
-  free(raw.bytes);
-  if (!good) {
+  free(bytes);
+  if (status != SUPINE_OK) {
     free(values);
-    return NULL;
+    return status;
   }
-  return values;
+  *numbers = values;
+  return SUPINE_OK;
 }
 
 /* Bound an element's body by its end tag, and find an array in it by name, or the first. */
@@ -338,19 +267,14 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
       !find_array(v, piece, within, "connectivity", &connectivity)) {
     return malformed(v, "its polygons have no offsets or connectivity", error);
   }
-  double *ends = take_numbers(v, &offsets, count, error);
-  if (ends == NULL) {
-    return error != NULL ? error->status : SUPINE_ERROR_FORMAT;
-  }
-  const double total = ends[count - 1];
+  double *ends = NULL;
   double *corners = NULL;
-  supine_status status = SUPINE_ERROR_FORMAT;
-  if (!(total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX)) {
-    (void)malformed(v, "the offsets of its polygons are invalid; save it again", error);
-  } else if ((corners = take_numbers(v, &connectivity, (size_t)total, error)) != NULL) {
-    status = SUPINE_OK;
-  } else {
-    status = error != NULL ? error->status : SUPINE_ERROR_FORMAT;
+  supine_status status = take_numbers(v, &offsets, count, &ends, error);
+  const double total = status == SUPINE_OK ? ends[count - 1] : 0.0;
+  if (status == SUPINE_OK) {
+    status = total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX
+                 ? take_numbers(v, &connectivity, (size_t)total, &corners, error)
+                 : malformed(v, "the offsets of its polygons are invalid; save it again", error);
   }
   double from = 0.0;
   for (size_t p = 0; p < count && status == SUPINE_OK; ++p) {
@@ -410,31 +334,22 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
 /* Note the axes that 3D Slicer and Supine name in a string array SPACE. */
 static void note_space(const vtp_file *v, const element *piece, mesh_file *file) {
   enum { SIZE = 4 }; /* including its NUL */
-  const char *at = v->bytes;
-  unsigned char letters[SIZE] = {0};
-  array raw = {letters, SIZE};
-  element e = {NULL, NULL, NULL};
-  while (find_element(at, piece->at, "Array", &e) && !is_attribute(&e, "Name", "SPACE")) {
-    at = e.body;
-  }
-  if (e.at == NULL || !is_attribute(&e, "Name", "SPACE")) {
-    return;
-  }
-  if (is_attribute(&e, "format", "ascii")) {
-    mesh_text text = {(const unsigned char *)e.body, (const unsigned char *)v->end};
-    for (size_t i = 0; i < SIZE; ++i) {
-      double code = 0.0;
-      if (!supine_mesh_text_number(&text, &code) || !(code >= 0.0 && code < 128.0)) {
-        return;
-      }
-      letters[i] = (unsigned char)code;
+  element e;
+  double *codes = NULL;
+  for (const char *at = v->bytes; find_element(at, piece->at, "Array", &e); at = e.body) {
+    if (!is_attribute(&e, "Name", "SPACE")) {
+      continue;
     }
-  } else if (!take_binary(v, &e, SIZE, 1, &raw)) {
+    char letters[SIZE] = {'?'};
+    if (take_numbers(v, &e, SIZE, &codes, NULL) == SUPINE_OK && codes[3] == 0.0) {
+      for (size_t i = 0; i < SIZE; ++i) {
+        letters[i] = codes[i] >= 0.0 && codes[i] < 128.0 ? (char)codes[i] : '?';
+      }
+      file->tagged = true;
+      (void)supine_mesh_axes_parse(letters, &file->space);
+    }
+    free(codes);
     return;
-  }
-  if (letters[3] == 0) {
-    file->tagged = true;
-    (void)supine_mesh_axes_parse((const char *)letters, &file->space);
   }
 }
 
@@ -446,8 +361,6 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   element piece;
   element points;
   size_t count[3];
-  supine_error local = {SUPINE_OK, ""};
-  error = error == NULL ? &local : error;
   supine_status status = read_head(&v, &piece, error);
   if (status != SUPINE_OK) {
     return status;
@@ -462,9 +375,9 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     return malformed(&v, "no array of points", error);
   }
   if (count[0] > 0) {
-    mesh->vertices = take_numbers(&v, &points, 3 * count[0], error);
-    if (mesh->vertices == NULL) {
-      return error->status;
+    status = take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error);
+    if (status != SUPINE_OK) {
+      return status;
     }
     mesh->vertex_count = count[0];
   }
