@@ -59,23 +59,21 @@ void supine_mesh_reverse(const supine_mesh *mesh) {
   }
 }
 
+/* Compute the normal of a triangle, with twice its area as its length. */
+static void triangle_normal(const double *vertices, const uint32_t *corner, double normal[3]) {
+  supine_normal(vertices + 3 * (size_t)corner[0], vertices + 3 * (size_t)corner[1],
+                vertices + 3 * (size_t)corner[2], normal);
+}
+
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     area[i] = 0.0;
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    const double *p = mesh->vertices + 3 * (size_t)corner[0];
-    double side[2][3];
-    for (int k = 0; k < 2; ++k) {
-      const double *q = mesh->vertices + 3 * (size_t)corner[k + 1];
-      for (int axis = 0; axis < 3; ++axis) {
-        side[k][axis] = q[axis] - p[axis];
-      }
-    }
-    double product[3];
-    supine_cross(side[0], side[1], product);
-    const double third = supine_length(product) / 6.0;
+    double normal[3];
+    triangle_normal(mesh->vertices, corner, normal);
+    const double third = supine_length(normal) / 6.0;
     for (int k = 0; k < 3; ++k) {
       area[corner[k]] += third;
     }
@@ -87,15 +85,8 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices) 
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     double normal[2][3];
-    for (int state = 0; state < 2; ++state) {
-      const double *from = state == 0 ? mesh->vertices : vertices;
-      double side[2][3];
-      for (size_t k = 0; k < 6; ++k) {
-        side[k / 3][k % 3] =
-            from[3 * (size_t)corner[1 + k / 3] + k % 3] - from[3 * (size_t)corner[0] + k % 3];
-      }
-      supine_cross(side[0], side[1], normal[state]);
-    }
+    triangle_normal(mesh->vertices, corner, normal[0]);
+    triangle_normal(vertices, corner, normal[1]);
     turned += supine_dot(normal[0], normal[1]) < 0.0;
   }
   return mesh->triangle_count == 0 ? 0.0 : (double)turned / (double)mesh->triangle_count;
@@ -105,16 +96,10 @@ void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
   memset(normals, 0, 3 * mesh->vertex_count * sizeof *normals);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    const double *p = mesh->vertices + 3 * (size_t)corner[0];
-    const double *q = mesh->vertices + 3 * (size_t)corner[1];
-    const double *r = mesh->vertices + 3 * (size_t)corner[2];
-    for (size_t k = 0; k < 3; ++k) {
-      const size_t a = (k + 1) % 3;
-      const size_t b = (k + 2) % 3;
-      const double area = (q[a] - p[a]) * (r[b] - p[b]) - (q[b] - p[b]) * (r[a] - p[a]);
-      for (size_t v = 0; v < 3; ++v) {
-        normals[3 * (size_t)corner[v] + k] += area;
-      }
+    double normal[3];
+    triangle_normal(mesh->vertices, corner, normal);
+    for (size_t k = 0; k < 9; ++k) {
+      normals[3 * (size_t)corner[k / 3] + k % 3] += normal[k % 3];
     }
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {

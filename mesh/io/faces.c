@@ -9,23 +9,21 @@
 
 /* Find twice the area of the triangle abc, signed as seen against `normal`. */
 static double turn(const double normal[3], const double *a, const double *b, const double *c) {
-  const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-  const double v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-  return supine_triple(normal, u, v);
+  double own[3];
+  supine_normal(a, b, c, own);
+  return supine_dot(normal, own);
 }
 
 /* Sum the corners' cross products about the first. */
 static void find_normal(const double *vertices, const uint32_t *corner, size_t count,
                         double normal[3]) {
-  const double *o = vertices + 3 * (size_t)corner[0];
-  for (int axis = 0; axis < 3; ++axis) {
-    const int y = (axis + 1) % 3;
-    const int z = (axis + 2) % 3;
-    normal[axis] = 0.0;
-    for (size_t i = 1; i + 1 < count; ++i) {
-      const double *a = vertices + 3 * (size_t)corner[i];
-      const double *b = vertices + 3 * (size_t)corner[i + 1];
-      normal[axis] += (a[y] - o[y]) * (b[z] - o[z]) - (a[z] - o[z]) * (b[y] - o[y]);
+  memset(normal, 0, 3 * sizeof *normal);
+  for (size_t i = 1; i + 1 < count; ++i) {
+    double part[3];
+    supine_normal(vertices + 3 * (size_t)corner[0], vertices + 3 * (size_t)corner[i],
+                  vertices + 3 * (size_t)corner[i + 1], part);
+    for (int k = 0; k < 3; ++k) {
+      normal[k] += part[k];
     }
   }
 }

@@ -11,12 +11,7 @@
 typedef struct mesh_writer {
   FILE *out;
   const supine_mesh *mesh;
-  const double *rest;          /**< NULL: no displacement */
-  const float *expected_error; /**< NULL: none */
-  const float *normals;        /**< NULL: none */
-  const unsigned char *lung;   /**< NULL: none */
-  const supine_mesh_field *fields;
-  size_t field_count;
+  supine_mesh_save_options options;
   unsigned char source[3]; /**< source axis, 0 to 2, of each coordinate in the file */
   double factor[3];        /**< its sign, divided by the file's unit */
   bool mirrored;           /**< left-handed axes: triangles are written in reverse order */

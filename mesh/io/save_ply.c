@@ -12,12 +12,12 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
   (void)fprintf(writer->out,
                 "element vertex %zu\nproperty float x\nproperty float y\nproperty float z\n",
                 mesh->vertex_count);
-  if (writer->rest != NULL) {
+  if (writer->options.rest != NULL) {
     (void)fputs("property float displacement_x\nproperty float displacement_y\n"
                 "property float displacement_z\nproperty float displacement_magnitude\n",
                 writer->out);
   }
-  if (writer->expected_error != NULL) {
+  if (writer->options.expected_error != NULL) {
     (void)fputs("property float expected_error_mm\n", writer->out);
   }
   (void)fprintf(writer->out,
@@ -27,12 +27,12 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
     float row[8];
     size_t count = 3;
     supine_mesh_writer_position(writer, i, row);
-    if (writer->rest != NULL) {
+    if (writer->options.rest != NULL) {
       supine_mesh_writer_displacement(writer, i, row + 3);
       count = 7;
     }
-    if (writer->expected_error != NULL) {
-      row[count++] = writer->expected_error[i];
+    if (writer->options.expected_error != NULL) {
+      row[count++] = writer->options.expected_error[i];
     }
     unsigned char bytes[sizeof row];
     unsigned char *at = bytes;

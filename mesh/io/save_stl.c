@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/io/save.h"
 
 enum { HEADER = 80, FACET = 50 };
@@ -16,14 +18,9 @@ static void facet_normal(float corners[3][3], float normal[3]) {
     }
   }
   double n[3];
-  double square = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = (axis + 1) % 3;
-    const int v = (axis + 2) % 3;
-    n[axis] = side[0][u] * side[1][v] - side[0][v] * side[1][u];
-    square += n[axis] * n[axis];
-  }
-  const double scale = square > 0.0 && isfinite(square) ? 1.0 / sqrt(square) : 0.0;
+  supine_cross(side[0], side[1], n);
+  const double length = supine_length(n);
+  const double scale = length > 0.0 && isfinite(length) ? 1.0 / length : 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     normal[axis] = scale > 0.0 ? (float)(scale * n[axis]) : 0.0F;
   }

@@ -47,14 +47,8 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
       options == NULL ? (supine_mesh_save_options){0} : *options;
   const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
   double matrix[3][3];
-  *writer = (mesh_writer){.mesh = mesh,
-                          .rest = chosen.rest,
-                          .expected_error = chosen.expected_error,
-                          .normals = chosen.normals,
-                          .lung = chosen.lung,
-                          .fields = chosen.fields,
-                          .field_count = chosen.field_count,
-                          .mirrored = supine_mesh_axes_mirrored(chosen.axes)};
+  *writer = (mesh_writer){
+      .mesh = mesh, .options = chosen, .mirrored = supine_mesh_axes_mirrored(chosen.axes)};
   supine_mesh_axes_letters(chosen.axes, writer->space);
   supine_mesh_axes_matrix(chosen.axes, matrix);
   for (unsigned i = 0; i < 9; ++i) {
@@ -78,7 +72,7 @@ static double rounded(const mesh_writer *writer, double length) {
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
   static const double steps = 256.0; /* a grid for normals of 0.1 degrees, if lengths have one */
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double value = (double)writer->normals[3 * i + writer->source[axis]];
+    const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);
     normal[axis] = (float)((writer->quantum > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
   }
@@ -97,7 +91,7 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t from = 3 * i + writer->source[axis];
-    const double d = writer->mesh->vertices[from] - writer->rest[from];
+    const double d = writer->mesh->vertices[from] - writer->options.rest[from];
     const double scaled = rounded(writer, writer->factor[axis] * d);
     displacement[axis] = (float)(scaled + 0.0);
     square += scaled * scaled;

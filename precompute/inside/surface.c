@@ -45,12 +45,6 @@ struct supine_inside_surface {
   uint32_t leaf_count;
 };
 
-static void subtract(const double a[3], const double b[3], double out[3]) {
-  for (int k = 0; k < 3; ++k) {
-    out[k] = a[k] - b[k];
-  }
-}
-
 static void corners(const supine_inside_surface *s, size_t triangle, const double *corner[3]) {
   for (int k = 0; k < 3; ++k) {
     corner[k] = s->vertices + 3 * (size_t)s->triangles[3 * triangle + (size_t)k];
@@ -144,14 +138,10 @@ static void find_dipole(const supine_inside_surface *s, node *n) {
   }
   for (size_t i = n->begin; i < n->end && n->right == 0; ++i) {
     const double *p[3];
-    double u[3];
-    double v[3];
     double normal[3];
     double centre[3];
     corners(s, s->order[i], p);
-    subtract(p[1], p[0], u);
-    subtract(p[2], p[0], v);
-    supine_cross(u, v, normal);
+    supine_normal(p[0], p[1], p[2], normal);
     for (int k = 0; k < 3; ++k) {
       normal[k] *= 0.5;
       centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3.0;
@@ -254,9 +244,9 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   double u[3];
   double v[3];
   double w[3];
-  subtract(p[1], p[0], u);
-  subtract(p[2], p[0], v);
-  subtract(x, p[0], w);
+  supine_subtract(p[1], p[0], u);
+  supine_subtract(p[2], p[0], v);
+  supine_subtract(x, p[0], w);
   const double uu = supine_dot(u, u);
   const double uv = supine_dot(u, v);
   const double vv = supine_dot(v, v);
@@ -286,8 +276,8 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
     const double *to = p[(k + 1) % 3];
     double edge[3];
     double offset[3];
-    subtract(to, from, edge);
-    subtract(x, from, offset);
+    supine_subtract(to, from, edge);
+    supine_subtract(x, from, offset);
     const double t = along(offset, edge);
     double square = 0.0;
     for (int a = 0; a < 3; ++a) {
@@ -370,7 +360,7 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
     for (int k = 0; k < 3; ++k) {
       q[k] = b[0] * p[0][k] + b[1] * p[1][k] + b[2] * p[2][k];
     }
-    subtract(x, q, apart);
+    supine_subtract(x, q, apart);
     const double apart_square = supine_dot(apart, apart);
     if (apart_square < *best) {
       *best = apart_square;
@@ -387,9 +377,9 @@ static double solid_angle(const double *const p[3], const double x[3]) {
   double b[3];
   double c[3];
   double bc[3];
-  subtract(p[0], x, a);
-  subtract(p[1], x, b);
-  subtract(p[2], x, c);
+  supine_subtract(p[0], x, a);
+  supine_subtract(p[1], x, b);
+  supine_subtract(p[2], x, c);
   supine_cross(b, c, bc);
   const double la = sqrt(supine_dot(a, a));
   const double lb = sqrt(supine_dot(b, b));
@@ -401,7 +391,7 @@ static double solid_angle(const double *const p[3], const double x[3]) {
 static double angle(const supine_inside_surface *s, size_t at, const double x[3]) {
   const node *n = &s->nodes[at];
   double apart[3];
-  subtract(n->centre, x, apart);
+  supine_subtract(n->centre, x, apart);
   const double distance = sqrt(supine_dot(apart, apart));
   if (distance > dipole_distance * n->radius) {
     return supine_dot(n->dipole, apart) / (distance * distance * distance);

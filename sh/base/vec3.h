@@ -27,9 +27,26 @@ static inline double supine_length(const double v[3]) {
   return sqrt(supine_dot(v, v));
 }
 
+static inline void supine_subtract(const double a[3], const double b[3], double difference[3]) {
+  for (int k = 0; k < 3; ++k) {
+    difference[k] = a[k] - b[k];
+  }
+}
+
 static inline double supine_distance(const double a[3], const double b[3]) {
-  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  double d[3];
+  supine_subtract(a, b, d);
   return supine_length(d);
+}
+
+/** Compute the normal of the triangle p, q, r, with twice its area as its length. */
+static inline void supine_normal(const double p[3], const double q[3], const double r[3],
+                                 double normal[3]) {
+  double u[3];
+  double v[3];
+  supine_subtract(q, p, u);
+  supine_subtract(r, p, v);
+  supine_cross(u, v, normal);
 }
 
 /** Find point `at`, 0 to `count` - 1 or between, of a golden-angle spiral of `count` directions
