@@ -4,6 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/text.h"
+#include "sh/base/vec3.h"
+
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
@@ -134,6 +137,20 @@ static void count_cut(work *w, const size_t image_size[3]) {
   }
 }
 
+/* Describe an image's axes, as "i to the left, j to the back, k to the head". */
+static void describe_axes(const double step[3][3], char *text, size_t size) {
+  static const char *const ways[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
+  text[0] = '\0';
+  for (int a = 0; a < 3; ++a) {
+    int most = 0;
+    for (int k = 1; k < 3; ++k) {
+      most = fabs(step[a][k]) > fabs(step[a][most]) ? k : most;
+    }
+    supine_text_add(text, size, "%s%c to the %s", a == 0 ? "" : ", ", "ijk"[a],
+                    ways[most][step[a][most] > 0.0]);
+  }
+}
+
 static supine_status read_map(work *w, const char *const *paths, size_t count,
                               supine_error *error) {
   supine_labels_report *report = w->report;
@@ -146,10 +163,9 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   }
   memcpy(report->size, w->image.size, sizeof report->size);
   for (int a = 0; a < 3; ++a) {
-    const double *s = w->image.step[a];
-    report->spacing[a] = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    report->spacing[a] = supine_length(w->image.step[a]);
   }
-  supine_labels_axes((const double(*)[3])w->image.step, report->axes, sizeof report->axes);
+  describe_axes((const double(*)[3])w->image.step, report->axes, sizeof report->axes);
   report->source = w->image.frame_source;
   report->frames_differ = w->image.frames_differ;
   report->coordinates = w->image.axes;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Extract boxes of voxels from masks and images. */
+/* Count the labels of an image, and extract boxes of voxels from images and masks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,11 +13,7 @@ size_t supine_labels_mask_count(const labels_mask *mask) {
 }
 
 double supine_labels_voxel_ml(const labels_mask *mask) {
-  const double *u = mask->step[0];
-  const double *v = mask->step[1];
-  const double *w = mask->step[2];
-  return 1e-3 * fabs(u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
-                     u[2] * (v[0] * w[1] - v[1] * w[0]));
+  return 1e-3 * fabs(supine_triple(mask->step[0], mask->step[1], mask->step[2]));
 }
 
 void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], double place[3]) {
@@ -91,6 +87,71 @@ void supine_labels_mask_offset(const labels_mask *mask, const labels_mask *other
   }
 }
 
+/* Read the labels [count] of one row; false if a voxel, then put into `bad`, is not a label. */
+static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
+  const size_t size = image->size[0];
+  for (size_t i = 0; i < size; ++i) {
+    const double value = supine_image_get(image, row * size + i);
+    if (!(value >= 0.0 && value < (double)LABELS_MAX) || value != floor(value)) {
+      *bad = value;
+      return false;
+    }
+    labels[i] = (uint16_t)value;
+  }
+  return true;
+}
+
+static void count_row(const supine_image *image, size_t row, const uint16_t *labels,
+                      labels_tally *tally) {
+  const size_t size = image->size[0];
+  const size_t place[3] = {0, row % image->size[1], row / image->size[1]};
+  for (size_t i = 0; i < size;) {
+    const size_t begin = i;
+    while (i < size && labels[i] == labels[begin]) {
+      ++i;
+    }
+    labels_tally *t = &tally[labels[begin]];
+    const size_t from[3] = {begin, place[1], place[2]};
+    const size_t to[3] = {i - 1, place[1], place[2]};
+    const uint64_t length = i - begin;
+    for (int a = 0; a < 3; ++a) {
+      t->low[a] = t->count == 0 || from[a] < t->low[a] ? (uint32_t)from[a] : t->low[a];
+      t->high[a] = t->count == 0 || to[a] > t->high[a] ? (uint32_t)to[a] : t->high[a];
+      t->sum[a] += a == 0 ? length * (begin + i - 1) / 2 : length * place[a];
+    }
+    t->count += length;
+  }
+}
+
+supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
+                                  supine_error *error) {
+  uint16_t *labels = malloc(image->size[0] * sizeof *labels);
+  if (labels == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  for (size_t i = 0; i < LABELS_MAX; ++i) {
+    tally[i] = (labels_tally){0};
+  }
+  double bad = 0.0;
+  bool well = true;
+  for (size_t row = 0; row < image->size[1] * image->size[2] && well; ++row) {
+    well = read_row(image, row, labels, &bad);
+    if (well) {
+      count_row(image, row, labels, tally);
+    }
+  }
+  free(labels);
+  if (well) {
+    return SUPINE_OK;
+  }
+  return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                          bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is "
+                                      "the CT itself, segment it first"
+                                    : "%s: a voxel holds %g, but labels are whole numbers, 0 to "
+                                      "65535: threshold probabilities into a mask first",
+                          path, bad);
+}
+
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], const uint8_t *value,
                                      labels_mask *mask) {
@@ -116,7 +177,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
-      (void)supine_labels_row(image, j + image->size[1] * k, row, &bad); /* read before */
+      (void)read_row(image, j + image->size[1] * k, row, &bad); /* read before */
       uint8_t *out = mask->at + LABELS_MARGIN +
                      mask->size[0] * (j - low[1] + LABELS_MARGIN +
                                       mask->size[1] * (k - low[2] + LABELS_MARGIN));

@@ -32,7 +32,7 @@ void supine_labels_mask_free(labels_mask *mask);
 /** Convert a position in voxels to mm. */
 void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], double place[3]);
 
-/* ---- count.c, convention.c: the side of each label ---- */
+/* ---- labels of an image, and the side of each (convention.c) ---- */
 
 enum { LABELS_MAX = 65536, LABELS_MARGIN = 2 };
 
@@ -43,8 +43,6 @@ typedef struct labels_tally {
   uint32_t low[3], high[3];
 } labels_tally;
 
-/** Read the labels [count] of one row; false if a voxel, then put into `bad`, is not a label. */
-bool supine_labels_row(const supine_image *image, size_t row, uint16_t *labels, double *bad);
 /** @param tally  [LABELS_MAX], written */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
@@ -123,42 +121,11 @@ supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, b
                                          labels_cubes *cubes);
 void supine_labels_cubes_free(labels_cubes *cubes);
 
-/* ---- net.c, relax.c ---- */
-
-#define LABELS_NONE UINT32_MAX
-
-/** A surface net: a vertex in each cell between eight cubes that are partly inside. */
-typedef struct labels_net {
-  size_t count;
-  uint32_t (*cell)[3];      /**< lowest cube of each vertex's cell */
-  double (*at)[3];          /**< position in the cell, 0 to 1 along each axis */
-  uint32_t (*neighbour)[6]; /**< across each face of the cell: -x, +x, -y, ...; or LABELS_NONE */
-  size_t quad_count;
-  uint32_t (*quad)[4]; /**< outwards where the map's axes are right-handed */
-} labels_net;
-
-supine_status supine_labels_net_create(const labels_cubes *cubes, labels_net *net);
-void supine_labels_net_free(labels_net *net);
-/** Smooth the net; every vertex stays in its cell. */
-supine_status supine_labels_net_relax(labels_net *net);
-/** Move vertices farther than `limit` mm from the mask's surface back towards `before`. Return
- * the largest distance, mm. */
-double supine_labels_net_hold(labels_net *net, const double (*before)[3], const labels_cubes *cubes,
-                              const labels_mask *mask, double limit);
-/** Cut the net into triangles, in mm. */
-supine_status supine_labels_net_mesh(const labels_net *net, const labels_cubes *cubes,
-                                     const labels_mask *mask, supine_mesh *mesh);
-
-/* ---- surface.c ---- */
+/* ---- net.c ---- */
 
 /** Make the net of a mask's cubes, of `one` piece or all, smoothed and held to the mask within
  * `held` mm, half a voxel; `farthest` is the largest distance of a vertex, mm. */
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
                                          double *held, double *farthest, supine_mesh *mesh);
-
-/* ---- anatomy.c ---- */
-
-/** "i to the left, j to the back, k to the head" */
-void supine_labels_axes(const double step[3][3], char *text, size_t size);
 
 #endif

@@ -1,19 +1,33 @@
 /* SPDX-License-Identifier: MIT */
-/* Surface nets: a vertex in each cell that the surface runs through, a quadrilateral across each
- * edge between an inner and an outer cube [Gibson1998]. */
+/* The surface of a mask by surface nets: a vertex in each cell that the surface runs through, a
+ * quadrilateral across each edge between an inner and an outer cube [Gibson1998]. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/labels/mask.h"
+
+#define NONE UINT32_MAX
+
+/* A surface net: a vertex in each cell between eight cubes that are partly inside. */
+typedef struct surface_net {
+  size_t count;
+  uint32_t (*cell)[3];      /* lowest cube of each vertex's cell */
+  double (*at)[3];          /* position in the cell, 0 to 1 along each axis */
+  uint32_t (*neighbour)[6]; /* across each face of the cell: -x, +x, -y, ...; or NONE */
+  size_t quad_count;
+  uint32_t (*quad)[4]; /* outwards where the map's axes are right-handed */
+} surface_net;
 
 static const float half = 0.5F;
 
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3];
-  uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or LABELS_NONE */
-  labels_net *net;
+  uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or NONE */
+  surface_net *net;
 } build;
 
 /* Find the mean crossing of the surface with the cell's edges, 0 to 1; false if there is none. */
@@ -56,7 +70,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
 /* Number the cells; with `write`, fill the net's vertices. */
 static void find_vertices(build *b, bool write) {
   const size_t *size = b->cubes->size;
-  labels_net *net = b->net;
+  surface_net *net = b->net;
   net->count = 0;
   for (size_t k = 0; k + 1 < size[2]; ++k) {
     for (size_t j = 0; j + 1 < size[1]; ++j) {
@@ -81,7 +95,7 @@ static void find_vertices(build *b, bool write) {
 
 /* Add a quadrilateral around the edge from a cube along an axis; link its neighbours. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
-  labels_net *net = b->net;
+  surface_net *net = b->net;
   const size_t u = (a + 1) % 3;
   const size_t v = (a + 2) % 3;
   const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
@@ -119,8 +133,16 @@ static void find_quads(build *b, bool write) {
   }
 }
 
-supine_status supine_labels_net_create(const labels_cubes *cubes, labels_net *net) {
-  labels_net made = {0};
+static void net_free(surface_net *net) {
+  free(net->cell);
+  free(net->at);
+  free(net->neighbour);
+  free(net->quad);
+  *net = (surface_net){0};
+}
+
+static supine_status create(const labels_cubes *cubes, surface_net *net) {
+  surface_net made = {0};
   const size_t count = cubes->size[0] * cubes->size[1] * cubes->size[2];
   build b = {
       .cubes = cubes, .stride = {1, cubes->size[0], cubes->size[0] * cubes->size[1]}, .net = &made};
@@ -134,10 +156,10 @@ supine_status supine_labels_net_create(const labels_cubes *cubes, labels_net *ne
   if (b.vertex == NULL || made.cell == NULL || made.at == NULL || made.neighbour == NULL ||
       made.quad == NULL || made.count >= INT32_MAX) {
     free(b.vertex);
-    supine_labels_net_free(&made);
+    net_free(&made);
     return SUPINE_ERROR_MEMORY;
   }
-  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* LABELS_NONE */
+  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* NONE */
   find_vertices(&b, true);
   find_quads(&b, true);
   free(b.vertex);
@@ -145,16 +167,50 @@ supine_status supine_labels_net_create(const labels_cubes *cubes, labels_net *ne
   return SUPINE_OK;
 }
 
-void supine_labels_net_free(labels_net *net) {
-  free(net->cell);
-  free(net->at);
-  free(net->neighbour);
-  free(net->quad);
-  *net = (labels_net){0};
+/* 1 / 0.5 - 1 / 0.51 = 0.04: keeps waves longer than some 16 cubes, removes terraces of slices. */
+static const double shrink = 0.5;
+static const double swell = -0.51;
+enum { TURNS = 40 };
+
+/* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
+static void step(const surface_net *net, double share, double (*next)[3]) {
+  for (size_t v = 0; v < net->count; ++v) {
+    double sum[3] = {0.0, 0.0, 0.0};
+    double count = 0.0;
+    for (size_t n = 0; n < 6; ++n) {
+      const uint32_t other = net->neighbour[v][n];
+      for (size_t a = 0; other != NONE && a < 3; ++a) {
+        sum[a] += (double)net->cell[other][a] - (double)net->cell[v][a] + net->at[other][a];
+      }
+      count += other != NONE;
+    }
+    for (size_t a = 0; a < 3; ++a) {
+      const double here = net->at[v][a];
+      const double there = here + share * (sum[a] / count - here);
+      next[v][a] = there < 0.0 ? 0.0 : there > 1.0 ? 1.0 : there;
+    }
+  }
+}
+
+/* Smooth the net by alternate shrinking and inflation, which keeps long waves [Taubin1995]; every
+ * vertex stays in its cell. */
+static supine_status relax(surface_net *net) {
+  double(*next)[3] = malloc((net->count + 1) * sizeof *next);
+  if (next == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (int turn = 0; turn < 2 * TURNS; ++turn) {
+    step(net, turn % 2 == 0 ? shrink : swell, next);
+    double(*old)[3] = net->at;
+    net->at = next;
+    next = old;
+  }
+  free(next);
+  return SUPINE_OK;
 }
 
 /* Convert a vertex to voxels of the mask. */
-static void in_voxels(const labels_net *net, const labels_cubes *cubes, size_t vertex,
+static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t vertex,
                       double voxel[3]) {
   for (size_t a = 0; a < 3; ++a) {
     voxel[a] =
@@ -206,8 +262,10 @@ static double distance_to_mask(const labels_mask *mask, const double voxel[3]) {
   return nearest;
 }
 
-double supine_labels_net_hold(labels_net *net, const double (*before)[3], const labels_cubes *cubes,
-                              const labels_mask *mask, double limit) {
+/* Move vertices farther than `limit` mm from the mask's surface back towards `before`. Return the
+ * largest distance, mm. */
+static double hold(surface_net *net, const double (*before)[3], const labels_cubes *cubes,
+                   const labels_mask *mask, double limit) {
   enum { HALVINGS = 5 };
   double farthest = 0.0;
   for (size_t v = 0; v < net->count; ++v) {
@@ -226,19 +284,10 @@ double supine_labels_net_hold(labels_net *net, const double (*before)[3], const 
   return farthest;
 }
 
-static double square_between(const double *a, const double *b) {
-  return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
-         (a[2] - b[2]) * (a[2] - b[2]);
-}
-
-supine_status supine_labels_net_mesh(const labels_net *net, const labels_cubes *cubes,
-                                     const labels_mask *mask, supine_mesh *mesh) {
-  const double *u = mask->step[0];
-  const double *v = mask->step[1];
-  const double *w = mask->step[2];
-  const bool turned = u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
-                          u[2] * (v[0] * w[1] - v[1] * w[0]) <
-                      0.0;
+/* Cut the net into triangles, in mm. */
+static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes,
+                               const labels_mask *mask, supine_mesh *mesh) {
+  const bool turned = supine_triple(mask->step[0], mask->step[1], mask->step[2]) < 0.0;
   supine_mesh made = {.vertex_count = net->count, .triangle_count = 2 * net->quad_count};
   made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
   made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);
@@ -256,11 +305,37 @@ supine_status supine_labels_net_mesh(const labels_net *net, const labels_cubes *
     for (size_t k = 0; k < 4; ++k) {
       c[k] = net->quad[q][turned ? 3 - k : k];
     }
-    const bool first = square_between(made.vertices + 3 * c[0], made.vertices + 3 * c[2]) <=
-                       square_between(made.vertices + 3 * c[1], made.vertices + 3 * c[3]);
+    const bool first = supine_distance(made.vertices + 3 * c[0], made.vertices + 3 * c[2]) <=
+                       supine_distance(made.vertices + 3 * c[1], made.vertices + 3 * c[3]);
     const uint32_t corners[6] = {c[0], c[1], first ? c[2] : c[3], first ? c[0] : c[1], c[2], c[3]};
     memcpy(made.triangles + 6 * q, corners, sizeof corners);
   }
   *mesh = made;
   return SUPINE_OK;
+}
+
+supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
+                                         double *held, double *farthest, supine_mesh *mesh) {
+  labels_cubes cubes = {.share = NULL};
+  surface_net net = {0};
+  double(*before)[3] = NULL;
+  supine_status status = supine_labels_cubes_create(mask, edge, one, &cubes);
+  status = status == SUPINE_OK ? create(&cubes, &net) : status;
+  if (status == SUPINE_OK) {
+    before = malloc((net.count + 1) * sizeof *before);
+    status = before == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  }
+  if (status == SUPINE_OK && net.count > 0) {
+    memcpy(before, net.at, net.count * sizeof *before);
+    status = relax(&net);
+  }
+  if (status == SUPINE_OK) {
+    *held = 0.5 * fmax(edge, fmax(mask->spacing[0], fmax(mask->spacing[1], mask->spacing[2])));
+    *farthest = hold(&net, (const double(*)[3])before, &cubes, mask, *held);
+    status = make_mesh(&net, &cubes, mask, mesh);
+  }
+  free(before);
+  net_free(&net);
+  supine_labels_cubes_free(&cubes);
+  return status;
 }
