@@ -22,23 +22,6 @@ typedef struct request {
   export_glb_options glb;
 } request;
 
-static supine_status read_profile(const char *text, void *field, supine_error *error) {
-  static const char *const names[] = {"raw", "8", "clamp-safe", "8,clamp-safe"};
-  enum { NAMES = sizeof names / sizeof *names };
-  export_glb_options *glb = field;
-  for (size_t i = 0; i < NAMES; ++i) {
-    if (strcmp(text, names[i]) == 0) {
-      glb->eight = i == 1 || i == 3;
-      glb->clamp_safe = i >= 2;
-      return SUPINE_OK;
-    }
-  }
-  const char *nearest = supine_options_suggest(text, names, NAMES);
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no profile '%s'%s%s", text,
-                          nearest != NULL ? "; did you mean " : ": give raw, 8 or clamp-safe",
-                          nearest != NULL ? nearest : "");
-}
-
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      ".html: a page to explore the lungs in a browser: one file, no network; bases of up to 16 "
@@ -47,8 +30,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
     {"breath", 0, "ML",
-     "tidal volume of the breath played, and the largest for which clamp-safe weights stay "
-     "within 0 and 1",
+     "tidal volume of the breath played, and the largest for which the weights of morph targets "
+     "stay within 0 and 1",
      SUPINE_FILLS(request, volume), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
     {"scale", 0, "MM",
@@ -65,43 +48,27 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, title)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.help = "For glTF:"},
-    {"profile", 0, "NAME",
-     "raw: a target for each mode of the basis; weights of either sign (default)\n"
-     "8: at most eight targets, for engines that promise no more: the best eight; says what they "
-     "leave out\n"
-     "clamp-safe: weights within 0 and 1 for every posture and every breath up to --breath, for "
-     "engines that clamp them: the base is shifted and the targets are rescaled, so that rest is "
-     "not at weight 0\n"
-     "8,clamp-safe: both",
-     SUPINE_FILLS(request, glb), .read = read_profile, SUPINE_SAYS_GIVEN(request, glb_only)},
-    {"quantise", 0, NULL,
-     "targets' positions as 16-bit integers (KHR_mesh_quantization): a tenth smaller, within a "
-     "hundredth of a millimetre",
-     SUPINE_FILLS(request, glb.quantise), .alias = "quantize",
-     SUPINE_SAYS_GIVEN(request, glb_only)},
+    {"plain", 0, NULL,
+     "float32 without compression, for engines that know neither EXT_meshopt_compression nor "
+     "KHR_mesh_quantization",
+     SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
-     "add an animation: breathing while turning from supine over the left side to prone and on",
+     "add animations: breathing while turning from supine over the left side to prone and on, and "
+     "breathing in each lying posture",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
 static supine_status write_glb(const export_source *source, const request *wanted,
                                supine_error *error) {
-  export_glb_report report = {0};
-  if (source->resting_rows > 1) {
-    supine_options_say(name, "morph targets have the same gains for both lungs: their total volume "
-                             "is exact, each lung's own is not; a page (.html) has both");
-  }
+  size_t bytes = 0;
   const supine_status status =
-      supine_export_glb_write(wanted->path, source, &wanted->glb, &report, error);
+      supine_export_glb_write(wanted->path, source, &wanted->glb, &bytes, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  (void)printf("%s: %zu morph targets%s, %.1f MB\n", wanted->path, report.targets,
-               wanted->glb.animate ? " and an animation" : "", 1e-6 * (double)report.bytes);
-  if (report.targets < source->info->mode_count) {
-    (void)printf("  of %zu modes: leaves out %.3g %% of the RMS displacement\n",
-                 source->info->mode_count, report.loss_percent);
-  }
+  (void)printf("%s: %zu lung%s with morph targets%s, %.1f MB\n", wanted->path,
+               source->info->lung_count, source->info->lung_count == 1 ? "" : "s",
+               wanted->glb.animate ? " and animations" : "", 1e-6 * (double)bytes);
   return SUPINE_OK;
 }
 
@@ -172,7 +139,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form: .glb */
   if (wanted->page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--profile, --quantise and --animate need an output that ends in .glb");
+                            "--plain and --animate need an output that ends in .glb");
   }
   if (!wanted->page && (wanted->title != NULL || wanted->from.given)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
@@ -189,16 +156,15 @@ const supine_command supine_command_export = {
              "output's name selects it.",
     .options = table,
     .notes =
-        "In the .glb, the mesh's extras name the targets and say how their weights follow from "
-        "gravity and volume: weight k is (s times mode k's sum over Y_lm(g), less offset k) over "
-        "unit k.\n"
+        "In the .glb, each lung is a mesh with weights of its own; the file's extras say how they "
+        "follow from gravity and volume.\n"
         "\n"
         "Examples:\n"
         "  supine export lungs.safetensors -o lungs.html\n"
         "  supine export lungs.safetensors -o lungs.html --from scan\n"
         "  supine export lungs.safetensors -o lungs.glb --animate\n"
         "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
-        "  supine export lungs.safetensors -o lungs.glb --profile 8,clamp-safe --breath 1000",
+        "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -23,20 +23,18 @@ typedef struct export_source {
   const double *resting;     /**< [resting_rows, EXPORT_RESTING_TERMS], mL at rest beyond the
                                 reference surface; where info->has_rest */
   size_t resting_rows;       /**< G, or 1 for all lungs together */
-  bool bent;                 /**< gains differ between axes */
 } export_source;
 
-/** Opens a basis file.
+/** Open a basis file.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY  as supine_basis_open */
 supine_status supine_export_source_open(const char *path, export_source *source,
                                         supine_error *error);
 
-/** Releases it; a zeroed one is legal. */
+/** Close it; a zeroed one is legal. */
 void supine_export_source_close(export_source *source);
 
-/** Displacement of vertex `vertex` for a weight of 1 in field `field`, mm: of mode `field`, or from
- * K on of mode `field` - K with each axis times its bend. */
-void supine_export_field(const export_source *source, size_t vertex, size_t field, double u[3]);
+/** Compute the displacement of a vertex for a weight of 1 of a mode, mm. */
+void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** How deep a breath is. */
 typedef struct export_breath {
@@ -45,15 +43,14 @@ typedef struct export_breath {
   double scale;   /**< the gain that gives it */
 } export_breath;
 
-/** A breath of `volume` mL; on an open surface one whose largest displacement, supine, is
+/** Set a breath of `volume` mL; on an open surface one whose largest displacement, supine, is
  * `largest` mm.
- * @retval SUPINE_ERROR_NUMERICAL  nothing moves
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  nothing moves */
 supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
                                        export_breath *breath, supine_error *error);
 
-/** The pose at a fraction of the breath (0 rest, or the scan where no rest is known; 1 all of it),
- * with the same gains for all lungs, as morph targets have it.
+/** Compute the pose at a fraction of the breath: 0 at rest, or at the scan where no rest is known;
+ * 1 at its end.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before */
 supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
                                         const double g[3], double fraction, supine_pose *pose,
@@ -66,44 +63,34 @@ typedef struct export_parts {
   const uint32_t *of; /**< [N] which each vertex goes by */
 } export_parts;
 
-/** How to write glTF. Zeros: every mode as a target, float32, no animation. */
+/** How to write glTF. */
 typedef struct export_glb_options {
-  bool eight;      /**< at most eight targets, the best there are */
-  bool clamp_safe; /**< keep weights within 0 to 1 for every gravity and every breath up to `breath`
-                    */
-  bool quantise;   /**< targets as 16-bit counts (KHR_mesh_quantization) */
-  bool animate;    /**< an animation that breathes and turns the patient; clamp-safe too, because
-                      there are engines whose animations know no other weights */
+  bool plain;   /**< float32 throughout; else positions as counts of 0.02 mm and normals as bytes
+                   (KHR_mesh_quantization), compressed (EXT_meshopt_compression) */
+  bool animate; /**< add an animation that breathes and turns the patient, and one that breathes in
+                   each lying posture */
   export_breath breath;
-  const export_source *inside; /**< content of the same lungs, of kind vector, with their modes: a
-                                    second mesh, seen through them; NULL: none */
+  const export_source *inside; /**< content of the same lungs, of kind vector, with their modes:
+                                  drawn inside them, seen through; NULL: none */
   const export_parts *parts;   /**< with it */
 } export_glb_options;
 
-/** What was written. */
-typedef struct export_glb_report {
-  size_t targets;
-  double loss_percent; /**< RMS of what `eight` left out, of the RMS displacement */
-  size_t bytes;
-} export_glb_report;
-
-/** Writes glTF 2.0 binary: a mesh of K morph targets that any engine deforms,
+/** Write glTF 2.0 binary. Each lung is a mesh of its own, with morph targets that any engine plays:
  *
- *     position_i = base_i + sum over k of weight_k target_ik
- *     weight_k   = (s sum over lm of modes[k, lm] Y_lm(g) - offset_k) / unit_k
+ *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
- * with modes, offset, unit and the volume forms that give s in the mesh's `extras`, and vertices
- * in the basis' order. Where gains differ between axes, A_j = s + t bend_j, there are K targets
- * more for the bend, whose weights have t in the place of s. Each lung is a primitive of its own
- * material, named for it. Targets hold normals as well: the linear change with the weights that
- * fits the surface's own best, over breaths up to `breath` in all postures. What is inside is a
- * mesh of the same targets, each part a primitive of a material of its name; points are balls of 4
- * mm. The node turns and scales millimetres LPS to glTF's metres, y up.
- * @retval SUPINE_ERROR_ARGUMENT   larger than the format's 4 GiB
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume
+ * The file's `extras` say how each lung's weights follow from gravity and volume. Targets hold
+ * normals too. Vertices keep the basis' order; their colour is the largest move in a lying posture,
+ * counted from supine, at rest. What is inside a lung is a mesh beside it with the same weights,
+ * each part a primitive of a material of its name; points are balls of 4 mm. The node "patient"
+ * lies on a table, turned about the lungs' middle, and an arrow shows gravity: glTF's metres, y up.
+ * @param bytes  of the file; written
+ * @retval SUPINE_ERROR_ARGUMENT     larger than the format's 4 GiB
+ * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed
+ * @retval SUPINE_ERROR_NUMERICAL    the surface folds before the breath's volume
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_export_glb_write(const char *path, const export_source *source,
-                                      const export_glb_options *options, export_glb_report *report,
+                                      const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
 /** Most modes that the page carries: four vertex attributes of four. */
@@ -121,8 +108,8 @@ typedef struct export_page {
 } export_page;
 
 /** Print one self-contained page that shows the lungs in a browser (WebGL 2), without a network.
- * Vertices, their motion and triangles are compressed by meshoptimizer; positions are within 0.02 mm
- * of the library's for lungs of up to 650 mm. Write errors stay in the stream.
+ * Vertices, their motion and triangles are compressed by meshoptimizer; positions are within 0.02
+ * mm of the library's for lungs of up to 650 mm. Write errors stay in the stream.
  * @retval SUPINE_ERROR_UNSUPPORTED  a vector basis, more than EXPORT_PAGE_MODES_MAX modes, or
  * meshoptimizer is not installed
  * @retval SUPINE_ERROR_MEMORY */

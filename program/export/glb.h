@@ -1,84 +1,88 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Parts of a glTF binary file on its way, for the files that write them. */
+ * A glTF binary file being made, for the files that make its parts. */
 #ifndef SUPINE_EXPORT_GLB_H
 #define SUPINE_EXPORT_GLB_H
 
-#include "sh/base/output.h"
 #include <jansson.h>
 
 #include "program/export/targets.h"
 
-/** glTF's numbers for component types and buffer targets. */
-enum { GLTF_SHORT = 5122, GLTF_UINT = 5125, GLTF_FLOAT = 5126 };
-enum { GLTF_NO_TARGET = 0, GLTF_VERTICES = 34962, GLTF_INDICES = 34963 };
+/** What arrays hold. Unless the file is plain, places are stored as counts and normals as bytes,
+ * and all but numbers and rotations are compressed. */
+typedef enum glb_kind {
+  GLB_CORNERS,  /**< uint32_t: vertex numbers of triangles */
+  GLB_PLACES,   /**< float [3], mm */
+  GLB_NORMALS,  /**< float [3], unit */
+  GLB_CHANGES,  /**< float [3], what a target adds to normals */
+  GLB_COLOURS,  /**< uint8_t [4], linear */
+  GLB_NUMBERS,  /**< float, of animations */
+  GLB_ROTATIONS /**< float [4], quaternions X, Y, Z, W */
+} glb_kind;
 
-/** What the file's buffer will hold, in order. */
-typedef struct glb_plan {
-  json_t *views;
-  json_t *accessors;
-  size_t bytes;
-} glb_plan;
+/** The file's parts. */
+typedef struct glb {
+  const export_source *source;
+  const export_glb_options *options;
+  export_targets targets;
+  double step; /**< mm per stored unit of places */
+  json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
+  FILE *numbers;        /**< the buffer */
+  size_t unpacked;      /**< bytes of the compressed arrays when decoded */
+  supine_status status; /**< of memory */
+} glb;
 
-/** Appends a view and its accessor of `count` elements; the accessor's index. `type` is SCALAR,
- * VEC3 or VEC4; low and high are its bounds, `axes` numbers each, or NULL. */
-size_t supine_export_glb_plan_add(glb_plan *plan, int component, const char *type, size_t count,
-                                  int target, size_t axes, const double *low, const double *high);
+/** Vertices of a lung or of what is inside it, and how they are drawn. */
+typedef struct glb_shape {
+  const char *name;
+  const export_source *source;
+  size_t lung;
+  const float *normals;           /**< [N, 3] of all of the source's vertices */
+  const float *added;             /**< [count, N, 3] what targets add to them, or NULL */
+  const uint8_t *colours;         /**< [N, 4], or NULL */
+  size_t parts;                   /**< primitives, each of a material */
+  const uint32_t *const *corners; /**< of each part, vertex numbers of the source */
+  const size_t *corner_count;
+  const json_int_t *material;
+} glb_shape;
 
-/** Bounds of `count` points, as they will stand in the file. */
-void supine_export_glb_bounds(const float *xyz, size_t count, bool rounded, double low[3],
-                              double high[3]);
+/** Append an array and return its accessor's index. */
+json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count);
 
-/** An array of numbers. */
+/** Append a mesh and the node that shows it, in mm LPS from the lungs' middle; return the node's
+ * index. @param mesh  taken over */
+json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
+
+/** Append a shape with morph targets; return its node's index. */
+json_int_t supine_export_glb_add(glb *g, const glb_shape *shape);
+
+/** Append a material and return its index; below an `alpha` of 1 it is seen through. */
+json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3], double alpha);
+
+/** Write the name of a lung: "left lung", or "lung 0" where the basis names none. */
+void supine_export_glb_lung_name(const export_source *source, size_t lung, char name[64]);
+
+/** Return numbers as an array. */
 json_t *supine_export_glb_numbers(const double *values, size_t count);
 
-/** What the mesh's `extras` say: names, and how weights follow from gravity and volume. */
-json_t *supine_export_glb_extras(const export_source *source, const export_glb_options *options,
-                                 const export_targets *targets);
+/** Return the extras of the file: how weights follow from gravity and volume. */
+json_t *supine_export_glb_extras(const glb *g, double largest_move);
 
-/** The patient on the back turns over the left side onto the belly and over the right side back,
- * and breathes. */
-typedef struct glb_animation {
-  size_t frames;
-  float *times;     /**< [frames], s */
-  float *weights;   /**< [frames, J] */
-  float *rotations; /**< [frames, 4], quaternions X, Y, Z, W of the patient's node */
-} glb_animation;
+/** Return the extras of a lung's mesh. */
+json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
-/** @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
-supine_status supine_export_glb_animation_make(const export_source *source,
-                                               const export_glb_options *options,
-                                               const export_targets *targets,
-                                               glb_animation *animation, supine_error *error);
-void supine_export_glb_animation_free(glb_animation *animation);
+/** Compute the rotation X, Y, Z, W of the node "patient", who lies down and has turned about the
+ * body's long axis by `roll`: pi / 2 is the left side. */
+void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Plans its three accessors and returns the "animations" array; `nodes` 2: node 2 has the same
- * weights as node 1. */
-json_t *supine_export_glb_animation_plan(const glb_animation *animation, size_t targets,
-                                         size_t nodes, glb_plan *plan);
+/** Append the animations. @param nodes  [count] with targets, of lungs [count] */
+void supine_export_glb_animate(glb *g, size_t count, const json_int_t *nodes, const size_t *lungs);
 
-/** What is inside the lungs, ready for the file. */
-typedef struct glb_inside {
-  export_source source; /**< the content, with balls for points; what it has is this struct's: */
-  supine_basis_info info;
-  float *vertices, *normals; /**< [N, 3] */
-  float *coefficients;       /**< [N, 3, K] */
-  uint32_t *corners;         /**< [M, 3] part by part */
-  size_t part_count;         /**< primitives */
-  size_t *part_begin;        /**< [part_count + 1] of corners */
-  const export_parts *parts;
-  float *xyz; /**< [N, 3] space */
-} glb_inside;
+/** Append what is inside the lungs, for each lung that has something; nodes and lungs get an entry
+ * each. */
+void supine_export_glb_inside(glb *g, size_t *count, json_int_t *nodes, size_t *lungs);
 
-/** @param inside  zero-initialised
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_export_glb_inside_make(const export_source *content, const export_parts *parts,
-                                            glb_inside *inside, supine_error *error);
-void supine_export_glb_inside_free(glb_inside *inside);
-/** Plans its accessors and returns its mesh, without weights; materials count from `material`. */
-json_t *supine_export_glb_inside_plan(glb_inside *inside, const export_targets *targets,
-                                      json_int_t material, glb_plan *plan);
-json_t *supine_export_glb_inside_materials(const glb_inside *inside);
-void supine_export_glb_inside_write(glb_inside *inside, const export_targets *targets, FILE *file);
+/** Append a table and an arrow that shows gravity; return their nodes as an array. */
+json_t *supine_export_glb_room(glb *g);
 
 #endif

@@ -1,115 +1,66 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What a reader of the glTF file needs to set the weights itself. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "program/export/glb.h"
 
 enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
 
-/* "Y_1_-1" where the modes are the harmonics themselves, else "mode_3". */
-static json_t *target_names(const export_source *source, const export_targets *targets) {
-  const char *modes = supine_basis_metadata(source->basis, "modes");
-  const bool harmonics = modes != NULL && strcmp(modes, "harmonics") == 0 && !targets->mixed &&
-                         targets->count == targets->mixes;
+static const char frame_text[] =
+    "Meshes of lungs are in the patient's axes, LPS (x left, y back, z head), from 'middle', mm: "
+    "position = middle + millimetresPerUnit * vertex. Their nodes turn them to glTF's metres, y to "
+    "the head, z to the front, and the node 'patient' lays the patient down.";
+static const char weights_text[] =
+    "weight[j] = (gain v - offset[j]) / unit[j] with the lung's offset and unit, where v = v[k] = "
+    "sum "
+    "over i of modes[k][i] * Y[i](g) and the gain is s for j = k < K, t for j = K + k. g: unit "
+    "vector "
+    "of gravity in the patient's axes (supine 0,1,0). Y: real spherical harmonics, orthonormal, no "
+    "Condon-Shortley phase, index l*l+l+m, m < 0 the sine terms: Y[0] = 0.28209479, Y[1..3] = "
+    "0.48860251 * (y, z, x). The displacement along axis a is that of the modes times A[a] = s + t "
+    "* "
+    "bend[a]; s = t = 0 gives the basis' own surface.";
+static const char volume_text[] =
+    "mL a lung gains beyond its referenceVolume: L[a] A[a] + Q[0] A[1] A[2] + Q[1] A[0] A[2] + "
+    "Q[2] "
+    "A[0] A[1] + C A[0] A[1] A[2], summed over the axes a, L[a] = sum linear[a][k] v[k], Q[a] = "
+    "sum "
+    "quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] v[l] v[m]; arrays are flat, last "
+    "index "
+    "fastest; if linear has no axis a, all A are s and the terms L s + Q s^2 + C s^3. For a volume "
+    "with "
+    "a bend: r, the root for s at rest, t = 0, then the q at which s = r q, t = 2 r e(q), e = (q^3 "
+    "- q) "
+    "/ 2 for q <= 1, 1 - 1 / q above; without: the root s that grows out of 0.";
+static const char resting_text[] =
+    "mL that a lung holds at rest beyond referenceVolume, negative: the sum over l <= 2 and m of "
+    "resting[l*l+l+m] * Y[l*l+l+m](g), of all lungs together if byLung is false. Above rest all "
+    "lungs "
+    "have gone the same part of the way to full, which is max(0, -g_z)^2 * fullUprightGain * "
+    "referenceVolume.";
+
+void supine_export_glb_lung_name(const export_source *source, size_t lung, char name[64]) {
+  const char *at = supine_basis_metadata(source->basis, "lungs");
+  for (size_t i = 0; i < lung && at != NULL; ++i) {
+    at = strchr(at, ',');
+    at = at == NULL ? NULL : at + 1;
+  }
+  if (at == NULL || strcspn(at, ",") == 0) {
+    (void)snprintf(name, 64, "lung %zu", lung);
+  } else {
+    (void)snprintf(name, 64, "%.*s lung", (int)strcspn(at, ","), at);
+  }
+}
+
+/* "mode_3", and "bend_3" for the same mode's bend. */
+static json_t *target_names(const glb *g) {
+  const size_t k = g->source->info->mode_count;
   json_t *names = json_array();
-  long l = 0;
-  for (size_t j = 0; j < targets->count; ++j) {
-    char text[48];
-    while ((size_t)((l + 1) * (l + 1)) <= j) {
-      ++l;
-    }
-    if (harmonics) {
-      (void)snprintf(text, sizeof text, "Y_%ld_%ld", l, (long)j - l * l - l);
-    } else {
-      (void)snprintf(text, sizeof text, "%s_%zu", j < targets->mixes ? "mode" : "bend",
-                     j % targets->mixes);
-    }
-    (void)json_array_append_new(names, json_string(text));
+  for (size_t j = 0; j < g->targets.count; ++j) {
+    (void)json_array_append_new(names, json_sprintf("%s_%zu", j < k ? "mode" : "bend", j % k));
   }
   return names;
-}
-
-/* One axis of a form goes from modes to mixes: [rows, K, columns] -> [rows, J, columns]. */
-static void mix_axis(const export_targets *targets, size_t k, size_t rows, size_t columns,
-                     const double *from, double *to) {
-  const size_t count = targets->mixes;
-  memset(to, 0, rows * count * columns * sizeof *to);
-  for (size_t r = 0; r < rows; ++r) {
-    for (size_t a = 0; a < k; ++a) {
-      for (size_t j = 0; j < count; ++j) {
-        const double amount = targets->mix[a * count + j];
-        for (size_t c = 0; c < columns; ++c) {
-          to[(r * count + j) * columns + c] += amount * from[(r * k + a) * columns + c];
-        }
-      }
-    }
-  }
-}
-
-/* A form of `rank` axes [rows, K, ...] as numbers [rows, J, ...]; NULL when memory is short. */
-static json_t *form(const export_source *source, const export_targets *targets, size_t rows,
-                    size_t rank, const double *values) {
-  const size_t k = source->info->mode_count;
-  size_t columns = 1;
-  for (size_t i = 1; i < rank; ++i) {
-    columns *= k;
-  }
-  const size_t size = rows * k * columns;
-  double *from = malloc((size + 1) * sizeof *from);
-  double *to = malloc((size + 1) * sizeof *to);
-  json_t *numbers = NULL;
-  if (from != NULL && to != NULL) {
-    memcpy(from, values, size * sizeof *from);
-    for (size_t i = 0; i < rank; ++i) {
-      mix_axis(targets, k, rows, columns, from, to);
-      memcpy(from, to, rows * targets->mixes * columns * sizeof *from);
-      rows *= targets->mixes;
-      columns /= i + 1 < rank ? k : 1;
-    }
-    numbers = supine_export_glb_numbers(from, rows * columns);
-  }
-  free(from);
-  free(to);
-  return numbers;
-}
-
-static const char weights_text[] =
-    "weight[k] = (s * v[k] - offset[k]) / unit[k], v[k] = sum over i of modes[k][i] * Y[i](g); if "
-    "there are twice as many targets, weight[J + k] = (t * v[k] - offset[J + k]) / unit[J + k]. g: "
-    "unit vector of gravity in the patient's axes (x left, y back, z head; supine 0,1,0). Y: real "
-    "spherical harmonics, orthonormal, no Condon-Shortley phase, index l*l+l+m, m < 0 the sine "
-    "terms: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). s and t: 0 for the vertices as "
-    "they are; the displacement along axis a is that of the modes times A[a] = s + t * bend[a].";
-static const char volume_text[] =
-    "mL gained by lung j: L[a] A[a] + Q[0] A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] "
-    "A[1] A[2], summed over the axes a, L[a] = sum linear[j][a][k] v[k], Q[a] = sum "
-    "quadratic[j][a][k][l] v[k] v[l], C = sum cubic[j][k][l][m] v[k] v[l] v[m]; arrays are flat, "
-    "last index fastest; if linear has no axis a, all A are s and the terms L s + Q s^2 + C s^3. "
-    "For a volume with a bend: r, the root for s at rest, t = 0, then the q at which s = r q, "
-    "t = 2 r e(q), e = (q^3 - q) / 2 for q <= 1, 1 - 1 / q above; without: the root s that grows "
-    "out of 0.";
-
-static const char resting_text[] =
-    "mL that all lungs hold at rest beyond the vertices as they are, which are full inflation: the "
-    "sum over l <= 2 and m of harmonics[l*l+l+m] * Y[l*l+l+m](g), negative.";
-
-static json_t *lungs(const export_source *source) {
-  json_t *array = json_array();
-  for (size_t j = 0; j <= source->info->lung_count; ++j) {
-    (void)json_array_append_new(array, json_integer((json_int_t)source->info->lung_begin[j]));
-  }
-  return array;
-}
-
-/* All lungs' resting volume over Y_lm. */
-static json_t *resting_harmonics(const export_source *source) {
-  double sum[EXPORT_RESTING_TERMS] = {0};
-  for (size_t i = 0; i < source->resting_rows * EXPORT_RESTING_TERMS; ++i) {
-    sum[i % EXPORT_RESTING_TERMS] += source->resting[i];
-  }
-  return supine_export_glb_numbers(sum, EXPORT_RESTING_TERMS);
 }
 
 /* Keys of the basis' metadata that go along. */
@@ -127,44 +78,55 @@ static json_t *origin(const export_source *source) {
   return object;
 }
 
-json_t *supine_export_glb_extras(const export_source *source, const export_glb_options *options,
-                                 const export_targets *targets) {
-  const supine_basis_info *info = source->info;
-  const size_t count = targets->count;
-  const size_t rows = info->lung_count * info->volume_axes;
+json_t *supine_export_glb_extras(const glb *g, double largest_move) {
+  const export_source *s = g->source;
+  const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
   json_t *modes = json_array();
-  for (size_t j = 0; j < targets->mixes; ++j) {
-    (void)json_array_append_new(
-        modes, supine_export_glb_numbers(targets->modes + j * source->terms, source->terms));
+  for (size_t k = 0; k < s->info->mode_count; ++k) {
+    (void)json_array_append_new(modes,
+                                supine_export_glb_numbers(s->modes + k * s->terms, s->terms));
   }
-  json_t *supine = json_pack(
-      "{s:s, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:s}", "weights", weights_text, "band",
-      (int)source->info->band, "modes", modes, "offset",
-      supine_export_glb_numbers(targets->offset, count), "unit",
-      supine_export_glb_numbers(targets->unit, count), "bend",
-      supine_export_glb_numbers(info->bend, 3), "lungBegin", lungs(source), "basis", origin(source),
-      "millimetresPerUnit", targets->count_mm, "lossPercent", targets->loss_percent, "frame",
-      "vertices are in the patient's axes, LPS; the node 'lungs' turns and scales them to metres, "
-      "y to the head, z to the front");
-  if (source->info->has_volume) {
-    (void)json_object_set_new(supine, "breathVolume", json_real(options->breath.volume));
-  } else {
-    (void)json_object_set_new(supine, "breathScale", json_real(options->breath.scale));
+  json_t *supine =
+      json_pack("{s:s, s:s, s:i, s:o, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
+                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "bend",
+                supine_export_glb_numbers(s->info->bend, 3), "middle",
+                supine_export_glb_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
+                s->info->has_volume ? "breathVolume" : "breathScale",
+                s->info->has_volume ? g->options->breath.volume : g->options->breath.scale,
+                "largestMoveColoured", largest_move, "basis", origin(s));
+  if (s->info->has_volume && g->targets.count <= FORMS_MAX) {
+    (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }
-  if (source->info->has_rest) {
-    (void)json_object_set_new(
-        supine, "restingVolume",
-        json_pack("{s:s, s:o}", "text", resting_text, "harmonics", resting_harmonics(source)));
+  if (s->info->has_rest) {
+    (void)json_object_update_new(supine, json_pack("{s:s, s:b, s:f}", "rest", resting_text,
+                                                   "byLung", s->resting_rows > 1, "fullUprightGain",
+                                                   full != NULL ? strtod(full, NULL) : 0));
   }
-  if (source->info->has_volume && count <= FORMS_MAX &&
-      json_object_set_new(
-          supine, "volume",
-          json_pack("{s:s, s:o, s:o, s:o}", "text", volume_text, "linear",
-                    form(source, targets, rows, 1, info->volume_linear), "quadratic",
-                    form(source, targets, rows, 2, info->volume_quadratic), "cubic",
-                    form(source, targets, info->lung_count, 3, info->volume_cubic))) != 0) {
-    json_decref(supine);
-    return NULL;
+  return json_pack("{s:o}", "supine", supine);
+}
+
+json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
+  const supine_basis_info *info = g->source->info;
+  const size_t k = info->mode_count;
+  const size_t axes = info->volume_axes;
+  json_t *supine =
+      json_pack("{s:I, s:o, s:o}", "lung", (json_int_t)lung, "offset",
+                supine_export_glb_numbers(g->targets.lung[lung].offset, g->targets.count), "unit",
+                supine_export_glb_numbers(g->targets.lung[lung].unit, g->targets.count));
+  if (info->has_rest) {
+    const double *resting =
+        g->source->resting + (g->source->resting_rows > 1 ? lung * EXPORT_RESTING_TERMS : 0);
+    (void)json_object_set_new(supine, "resting",
+                              supine_export_glb_numbers(resting, EXPORT_RESTING_TERMS));
   }
-  return json_pack("{s:o, s:o}", "targetNames", target_names(source, targets), "supine", supine);
+  if (info->has_volume && g->targets.count <= FORMS_MAX) {
+    (void)json_object_update_new(
+        supine,
+        json_pack(
+            "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
+            supine_export_glb_numbers(info->volume_linear + lung * axes * k, axes * k), "quadratic",
+            supine_export_glb_numbers(info->volume_quadratic + lung * axes * k * k, axes * k * k),
+            "cubic", supine_export_glb_numbers(info->volume_cubic + lung * k * k * k, k * k * k)));
+  }
+  return json_pack("{s:o, s:o}", "targetNames", target_names(g), "supine", supine);
 }

@@ -59,12 +59,12 @@ static void place_row(const page *p, const export_source *s, size_t vertex, int1
 }
 
 static void direction_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+  static const float none[3] = {0, 0, 1};
   const float *d = s->direction + 3 * vertex;
-  const double length = length_of(d);
-  const double up[3] = {0, 0, 1};
-  const double unit[3] = {(double)d[0] / length, (double)d[1] / length, (double)d[2] / length};
+  const float length = (float)length_of(d);
+  const float unit[3] = {d[0] / length, d[1] / length, d[2] / length};
   (void)p;
-  supine_export_pack_direction(length > 0 ? unit : up, 16, row);
+  supine_export_pack_direction(length > 0 ? unit : none, 4 * sizeof *row, row);
 }
 
 static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {

@@ -26,9 +26,9 @@ supine_status supine_export_pack_begin(supine_error *error) {
   return status;
 }
 
-void supine_export_pack_direction(const double direction[3], int bits, int16_t counts[4]) {
-  const float d[4] = {(float)direction[0], (float)direction[1], (float)direction[2], 0};
-  meshopt.encodeFilterOct(counts, 1, 4 * sizeof *counts, bits, d);
+void supine_export_pack_direction(const float direction[3], size_t size, void *numbers) {
+  const float d[4] = {direction[0], direction[1], direction[2], 0};
+  meshopt.encodeFilterOct(numbers, 1, size, size == 4 ? 8 : 16, d);
 }
 
 supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,

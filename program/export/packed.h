@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Arrays compressed by meshoptimizer's codecs, as the page and EXT_meshopt_compression have them. */
+ * Arrays compressed by meshoptimizer's codecs, as the page and EXT_meshopt_compression have them.
+ */
 #ifndef SUPINE_EXPORT_PACKED_H
 #define SUPINE_EXPORT_PACKED_H
 
@@ -16,9 +17,9 @@ typedef struct export_packed {
  * @retval SUPINE_ERROR_UNSUPPORTED  it is not installed */
 supine_status supine_export_pack_begin(supine_error *error);
 
-/** Encode a unit vector as 4 counts of 16 bits, for the decoder's filter OCTAHEDRAL; the last is 0.
- * @param bits  of each of its two coordinates, at most 16 */
-void supine_export_pack_direction(const double direction[3], int bits, int16_t counts[4]);
+/** Encode a unit vector for the decoder's filter OCTAHEDRAL as 4 numbers, of which the last is 0.
+ * @param size  of the 4 numbers, bytes: 4 or 8 */
+void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 
 /** Compress `count` rows of `stride` bytes, a multiple of 4, at most 256.
  * @retval SUPINE_ERROR_MEMORY */

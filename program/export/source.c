@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A basis with all of its tensors. */
+/* A basis with all of its tensors, and a breath of its lungs. */
+#include <math.h>
+#include <stdlib.h>
+
 #include <supine/sh.h>
 
 #include "program/export/export.h"
@@ -24,9 +27,6 @@ supine_status supine_export_source_open(const char *path, export_source *source,
     made.resting = resting->data;
     made.resting_rows = resting->rank == 2 ? resting->shape[0] : 1;
   }
-  for (size_t axis = 0; axis < 3; ++axis) {
-    made.bent = made.bent || made.info->bend[axis] != 0;
-  }
   *source = made;
   return SUPINE_OK;
 }
@@ -36,13 +36,53 @@ void supine_export_source_close(export_source *source) {
   *source = (export_source){0};
 }
 
-void supine_export_field(const export_source *source, size_t vertex, size_t field, double u[3]) {
+void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]) {
   const size_t k = source->info->mode_count;
-  const size_t mode = field % k;
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = source->info->vector ? (double)source->coefficients[(3 * vertex + axis) * k + mode]
                                    : (double)source->coefficients[vertex * k + mode] *
                                          (double)source->direction[3 * vertex + axis];
-    u[axis] *= field < k ? 1 : source->info->bend[axis];
   }
+}
+
+supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
+                                       export_breath *breath, supine_error *error) {
+  static const double supine[3] = {0, 1, 0};
+  *breath = (export_breath){.volume = volume, .largest = largest};
+  if (source->info->has_volume) {
+    return SUPINE_OK;
+  }
+  supine_pose pose;
+  double farthest = 0;
+  (void)supine_basis_weights(source->basis, supine, pose.weights); /* a valid direction */
+  for (size_t i = 0; i < source->info->vertex_count; ++i) {
+    double sum[3] = {0, 0, 0};
+    for (size_t mode = 0; mode < source->info->mode_count; ++mode) {
+      double u[3];
+      supine_export_field(source, i, mode, u);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        sum[axis] += pose.weights[mode] * u[axis];
+      }
+    }
+    farthest = fmax(farthest, hypot(hypot(sum[0], sum[1]), sum[2]));
+  }
+  if (!(farthest > 0)) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "nothing moves when supine: no breath scale gives %g mm", largest);
+  }
+  breath->scale = largest / farthest;
+  return SUPINE_OK;
+}
+
+supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
+                                        const double g[3], double fraction, supine_pose *pose,
+                                        supine_error *error) {
+  if (!source->info->has_volume) {
+    supine_pose_fill(pose, fraction * breath->scale);
+    return supine_basis_weights(source->basis, g, pose->weights);
+  }
+  const supine_volume_kind from = source->info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
+  const supine_state state = {.gravity = {g[0], g[1], g[2]},
+                              .volume = {from, fraction * breath->volume}};
+  return supine_basis_pose(source->basis, &state, pose, error);
 }

@@ -77,7 +77,7 @@ render lungs.safetensors --turn supine:left:0.1s --size 300x200 -o out/a.webp
 export lungs.safetensors -o out/a.html
 export lungs.safetensors --inside points.safetensors -o out/a.html
 export lungs.safetensors -o out/a.glb
-export lungs.safetensors -o out/a.glb --profile 8,clamp-safe --quantise --animate
+export lungs.safetensors -o out/a.glb --plain --animate
 pv show patient.pv.csv
 pv fit samples.csv -o out/a.csv
 pv fit samples.csv --json

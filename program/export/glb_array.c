@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Arrays of a glTF file: accessors, buffer views and the buffer. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/export/glb.h"
+#include "program/export/packed.h"
+
+json_t *supine_export_glb_numbers(const double *values, size_t count) {
+  json_t *array = json_array();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(array, json_real(values[i]));
+  }
+  return array;
+}
+
+/* How a kind of array is stored. */
+typedef struct layout {
+  const char *type;
+  size_t columns;
+  size_t stride; /* bytes a row */
+  int component; /* glTF's number of the type of a column */
+  int limit;     /* largest count, or 0: rows are stored as given */
+  int target;    /* of the buffer view, or 0 */
+} layout;
+
+static layout layout_of(const glb *g, glb_kind kind) {
+  enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_INT = 5125, FLOAT };
+  enum { VERTICES = 34962, CORNERS };
+  const bool plain = g->options->plain;
+  switch (kind) {
+  case GLB_CORNERS:
+    return (layout){"SCALAR", 1, 4, UNSIGNED_INT, 0, CORNERS};
+  case GLB_COLOURS:
+    return (layout){"VEC4", 4, 4, UNSIGNED_BYTE, 0, VERTICES};
+  case GLB_NUMBERS:
+    return (layout){"SCALAR", 1, 4, FLOAT, 0, 0};
+  case GLB_ROTATIONS:
+    return (layout){"VEC4", 4, 16, FLOAT, 0, 0};
+  case GLB_PLACES:
+    return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
+                 : (layout){"VEC3", 3, 8, SHORT, INT16_MAX, VERTICES};
+  default: /* normals */
+    return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
+                 : (layout){"VEC3", 3, 4, BYTE, INT8_MAX, VERTICES};
+  }
+}
+
+/* Return rows as they are stored, malloc. */
+static unsigned char *store(glb_kind kind, const layout *l, const void *rows, size_t count) {
+  unsigned char *stored = calloc(count + 1, l->stride);
+  if (stored == NULL || l->limit == 0) {
+    return stored == NULL ? NULL : memcpy(stored, rows, count * l->stride);
+  }
+  const float *values = rows;
+  for (size_t i = 0; i < count; ++i) {
+    unsigned char *row = stored + i * l->stride;
+    if (kind == GLB_NORMALS) {
+      supine_export_pack_direction(values + 3 * i, l->stride, row);
+      continue;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double value = (double)values[3 * i + axis] * (kind == GLB_PLACES ? 1 : l->limit);
+      const int16_t counts = (int16_t)rint(fmax(-l->limit, fmin(l->limit, value)));
+      memcpy(row + axis * l->stride / 4, &counts, l->stride / 4); /* the low byte comes first */
+    }
+  }
+  return stored;
+}
+
+/* Write stored rows, compressed if `mode` is not NULL, and describe them as a buffer view. */
+static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
+                          size_t count, const char *mode) {
+  const size_t bytes = count * l->stride;
+  const json_int_t begin = (json_int_t)ftell(g->numbers);
+  export_packed packed = {0};
+  if (mode == NULL) {
+    (void)fwrite(stored, 1, bytes, g->numbers);
+    return json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", begin, "byteLength",
+                     (json_int_t)bytes);
+  }
+  g->status = kind == GLB_CORNERS
+                  ? supine_export_pack_corners((const uint32_t *)stored, count, count, &packed)
+                  : supine_export_pack_rows(stored, count, l->stride, &packed);
+  if (g->status != SUPINE_OK) {
+    return NULL;
+  }
+  (void)fwrite(packed.bytes, 1, packed.size, g->numbers);
+  (void)fwrite("\0\0\0", 1, -packed.size % 4, g->numbers);
+  free(packed.bytes);
+  json_t *extension = json_pack("{s:i, s:I, s:I, s:I, s:I, s:s}", "buffer", 0, "byteOffset", begin,
+                                "byteLength", (json_int_t)packed.size, "byteStride",
+                                (json_int_t)l->stride, "count", (json_int_t)count, "mode", mode);
+  if (kind == GLB_NORMALS) {
+    (void)json_object_set_new(extension, "filter", json_string("OCTAHEDRAL"));
+  }
+  json_t *view = json_pack("{s:i, s:I, s:I, s:{s:o}}", "buffer", 1, "byteOffset",
+                           (json_int_t)g->unpacked, "byteLength", (json_int_t)bytes, "extensions",
+                           "EXT_meshopt_compression", extension);
+  g->unpacked += bytes;
+  return view;
+}
+
+/* Least and largest of each column of what is stored. */
+static void set_bounds(json_t *accessor, const layout *l, const unsigned char *stored,
+                       size_t count) {
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < count * l->columns; ++i) {
+    const size_t axis = i % l->columns;
+    const unsigned char *row = stored + i / l->columns * l->stride;
+    const double x =
+        l->limit == 0 ? (double)((const float *)row)[axis] : (double)((const int16_t *)row)[axis];
+    low[axis] = fmin(low[axis], x);
+    high[axis] = fmax(high[axis], x);
+  }
+  (void)json_object_set_new(accessor, "min", supine_export_glb_numbers(low, l->columns));
+  (void)json_object_set_new(accessor, "max", supine_export_glb_numbers(high, l->columns));
+}
+
+json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count) {
+  const layout l = layout_of(g, kind);
+  const bool number = kind == GLB_NUMBERS || kind == GLB_ROTATIONS;
+  unsigned char *stored = store(kind, &l, rows, count);
+  if (stored == NULL) {
+    g->status = SUPINE_ERROR_MEMORY;
+    return 0;
+  }
+  json_t *view = write_rows(g, kind, &l, stored, count,
+                            g->options->plain || number ? NULL
+                            : kind == GLB_CORNERS       ? "TRIANGLES"
+                                                        : "ATTRIBUTES");
+  if (l.target != 0) {
+    (void)json_object_set_new(view, "target", json_integer(l.target));
+  }
+  if (l.limit != 0) {
+    (void)json_object_set_new(view, "byteStride", json_integer((json_int_t)l.stride));
+  }
+  json_t *accessor =
+      json_pack("{s:I, s:i, s:I, s:s, s:b}", "bufferView", (json_int_t)json_array_size(g->views),
+                "componentType", l.component, "count", (json_int_t)count, "type", l.type,
+                "normalized", kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_PLACES));
+  if (kind == GLB_PLACES || kind == GLB_NUMBERS) {
+    set_bounds(accessor, &l, stored, count);
+  }
+  (void)json_array_append_new(g->views, view);
+  (void)json_array_append_new(g->accessors, accessor);
+  free(stored);
+  return (json_int_t)json_array_size(g->accessors) - 1;
+}
