@@ -10,7 +10,7 @@
 #include "sh/base/vec3.h"
 
 #include "program/compare_content.h"
-#include "program/names.h"
+#include "program/inside.h"
 #include "program/options/expected.h"
 
 /* Displacements of each name in each posture, [postures, names, 3], mm from the reference

@@ -5,7 +5,7 @@
 
 #include <supine/runtime.h>
 
-#include "program/options/posture_list.h"
+#include "program/options/orientation.h"
 #include "program/options/state.h"
 
 /* Prints, for every two postures and every name, how far what goes by it moves and where to: the

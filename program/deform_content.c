@@ -11,7 +11,7 @@
 #include "mesh/mesh.h"
 #include "program/deform_content.h"
 #include "program/field/field.h"
-#include "program/names.h"
+#include "program/inside.h"
 
 /* How far outside the lungs a field fades to 0, mm: no steeper than the tissue moves. 'supine
  * embed' leaves as much room around. */

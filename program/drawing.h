@@ -8,7 +8,7 @@
 
 #include "program/breath/breath_course.h"
 #include "program/inside.h"
-#include "program/options/posture_list.h"
+#include "program/options/orientation.h"
 #include "program/options/state.h"
 #include "program/render/render.h"
 

@@ -1,31 +1,46 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Structures embedded in the lungs, shown with them: a file of 'supine embed' beside its basis. */
+/* Structures embedded in the lungs: a file of 'supine embed', the names in it, and pictures of it.
+ */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
 #include "program/render/render.h"
 
-#include "program/names.h"
+typedef struct supine_command_names {
+  size_t count;         /* names */
+  char **text;          /* [count] */
+  const uint32_t *part; /* [N] number of each vertex's name */
+  size_t *order;        /* [N] vertices by name, and by input order within each name */
+  char *space;          /* the text */
+} supine_command_names;
 
-/* SUPINE_ERROR_FORMAT where the content was not made from this basis. */
+/* Read the names of embedded structures.
+ * @retval SUPINE_ERROR_FORMAT  the basis has no names, or malformed ones */
+supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
+                                        supine_error *error);
+void supine_command_names_close(supine_command_names *names);
+
+/* Return the lung of a vertex. */
+size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
+
+/* Check that structures were embedded in these lungs (SUPINE_ERROR_FORMAT). */
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Open the structures and their names; both arguments start zeroed and must be closed also after a
- * failure. Statuses of opening, of the names, and of the check. */
+/* Open the structures and their names, and check them. Both arguments start zeroed and must be
+ * closed also after a failure. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
 
-/* Make the marks of a picture: each named point with its displacement; the vertices of meshes, with
- * the name at the middle. */
+/* Marks of a picture: the vertices of each structure, and its name with its mean displacement. */
 typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;
   char (*label)[48];
 } supine_command_marks;
 
-/* @param from  what moves count from
+/* @param from  pose that displacements are measured from
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names, const supine_pose *pose,

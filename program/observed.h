@@ -5,7 +5,7 @@
 
 #include <supine/locate.h>
 
-#include "program/names.h"
+#include "program/inside.h"
 #include "program/stream/sensors.h"
 
 typedef struct supine_command_observed {

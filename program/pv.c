@@ -159,8 +159,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (strcmp(verb, "fit") == 0 && file != NULL) {
     return run_fit(file, chosen, error);
   }
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give 'fit FILE' or 'show [FILE]', not '%s'",
-                          verb);
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "give 'fit FILE' or 'show [FILE]', not '%s'", verb);
 }
 
 const supine_command supine_command_pv = {

@@ -5,7 +5,8 @@
 
 #include "program/field/field.h"
 
-/* Where a point lies among the voxels: the cell's first corner, and how far in it, 0 to 1. */
+/* The cell of voxels that contains a point: its first corner, and the point's place in it, 0 to 1.
+ */
 typedef struct supine_field_cell {
   size_t corner[3];
   double share[3];

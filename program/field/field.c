@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A field from a basis's grid, faded out around it; its value anywhere. */
+/* Compute a field on the grid of a basis, and fade it out around the lungs. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 
 #include "program/field/cell.h"
 
-/* The tensors of a grid, checked: a file may hold anything. */
+/* Read the tensors of a grid, and check them. */
 static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
                                const uint32_t **part, const float **depth, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
@@ -44,8 +44,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   }
   double axes[3] = {0.0, 0.0, 0.0};
   if (well) {
-    supine_image_locate(nodes, axes,
-                        axes); /* not finite where the steps of the grid are not independent */
+    supine_image_locate(nodes, axes, axes); /* not finite where the grid's steps are dependent */
   }
   if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -57,8 +56,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Mean of the neighbours of node i that a pass before this one has set; false where there is none.
- */
+/* Compute the mean of the neighbours of node i that earlier layers have set; false: none. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -86,15 +84,14 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
   return count > 0;
 }
 
-/* Layer by layer outwards, each a share less, so that it falls linearly to 0. `known` is 1 where
- * the basis has a node; the layers are 2 and 3 in turn. */
+/* Extend the field outwards layer by layer, so that it falls linearly to 0. `known` is 1 where the
+ * basis has a node; the layers are alternately 2 and 3. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
   double step = INFINITY;
   for (int a = 0; a < 3; ++a) {
-    const double *s = nodes->step[a];
-    step = fmin(step, supine_length(s));
+    step = fmin(step, supine_length(nodes->step[a]));
   }
   const size_t layers = (size_t)fmin(ceil(fade / step), 1000.0);
   for (size_t layer = 1; layer < layers; ++layer) {
@@ -150,7 +147,8 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
     for (size_t i = 0; i < count; ++i) {
       below[i] = (float)-fade; /* where the basis has no node */
     }
-    for (size_t i = 0; i < n; ++i) { /* from the scan's node, which full inflation may have moved */
+    for (size_t i = 0; i < n;
+         ++i) { /* from the node in the scan; the basis has it at full inflation */
       double node[3];
       supine_image_place(&made.nodes, part[i], node);
       for (size_t k = 0; k < 3; ++k) {

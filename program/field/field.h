@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The displacement field over a grid that 'supine embed' made: where the tissue of each node goes,
- * its inverse, and images moved by it. Between nodes fields are trilinear, and beyond the outermost
- * ones as there. */
+ * The displacement field on the grid of a basis ('supine embed'), its inverse, and images moved by
+ * it. Fields are trilinear between nodes, and constant beyond the outermost nodes. */
 #ifndef SUPINE_FIELD_H
 #define SUPINE_FIELD_H
 
@@ -12,44 +11,44 @@
 
 /** u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
-  supine_image nodes; /**< three channels, F32 */
-  supine_image
-      depth; /**< one, F32: mm below the lungs' surface, negative outside; none of an inverse */
+  supine_image nodes; /**< F32, three channels */
+  supine_image depth; /**< F32, one channel: mm below the surface of the lungs, negative outside;
+                           without values in an inverse */
 } supine_field;
 
-/** The field of a basis's grid in a pose, from the scan. Outside the lungs, beyond the nodes that
- * the basis has, it fades out to 0 over `fade` mm: smooth to look at, but it means nothing there.
- * @param field  written; release with supine_field_free
- * @retval SUPINE_ERROR_FORMAT  the basis is of no grid, or its grid is malformed
+/** Compute the field from the scan to a pose. Beyond the nodes of the basis, outside the lungs, it
+ * fades out to 0 over `fade` mm; it has no meaning there.
+ * @param field  release with supine_field_free
+ * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
                                   supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);
 
-/** u at any point. */
+/** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
-/** Residual of the field followed by its inverse. */
+/** How well an inverse inverts. */
 typedef struct supine_field_residual {
-  double rms, largest; /**< mm, over the nodes inside: |u(x) + v(x + u(x))| */
-  size_t lost; /**< nodes of the inverse at which none was found to 0.01 mm: the field folds */
+  double rms, largest; /**< |u(x) + v(x + u(x))| over the nodes x inside the lungs, mm */
+  size_t lost;         /**< nodes whose inverse is not found to 0.01 mm, because the field folds */
 } supine_field_residual;
 
-/** The inverse v on the same nodes: v(y) = x - y where x + u(x) = y, by Newton's steps. What a
- * resampled image takes its voxel at y from is y + v(y).
- * @retval SUPINE_ERROR_MEMORY
- * Cost: some ten evaluations a node, in parallel. */
+/** Invert a field on the same nodes by Newton's method: v(y) = x - y where x + u(x) = y. A
+ * resampled image takes its voxel at y from y + v(y). Cost: about ten evaluations per node, in
+ * parallel.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
 
-/** moved(y) = image(y + v(y)) on the image's own voxels; where that lies outside the image, the
- * nearest of its voxels. With a depth, that of the field, densities (Hounsfield units + 1000)
- * inside the lungs are multiplied by det(dv/dy + 1), the volume that the tissue had of that it has
- * now, so that its mass is kept; outside, where the field means nothing, they stay.
+/** Move an image: moved(y) = image(y + v(y)) on its own voxels, where places outside the image take
+ * the nearest voxel. With a depth, densities (Hounsfield units + 1000) inside the lungs are
+ * multiplied by det(dv/dy + 1), the ratio of the tissue's volume before and after, which keeps its
+ * mass.
  * @param inverse  of supine_field_invert
- * @param depth    NULL: densities are not scaled
- * @param labels   nearest voxel instead of linear
- * @param moved    written; supine_image_free releases it
+ * @param depth    of the field; NULL: densities are not scaled
+ * @param labels   take the nearest voxel instead of interpolating
+ * @param moved    release with supine_image_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
                                     bool labels, const supine_image *image, supine_image *moved,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The inverse of a field, node by node, and what the two together miss. */
+/* Invert a field node by node, and measure the residual of the two together. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,10 +9,11 @@
 
 #include "program/field/cell.h"
 
-static const double close_enough = 1e-5; /* mm */
-static const double lost_beyond = 0.01;  /* mm */
+static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
+static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */
 
-/* x + u(x) - y, and its derivative by the cell's shares: that of x, the steps, and of u. */
+/* Compute x + u(x) - y and its derivative with respect to x, in steps of the grid; return its
+ * length. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -28,9 +29,9 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* Compute the Newton step, in shares; false where the field folds. */
+/* Compute the Newton step, in steps of the grid; false where the derivative is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
-  supine_image cell = {.origin = {0.0}}; /* where shares are coordinates */
+  supine_image cell = {.origin = {0.0}}; /* supine_image_locate solves the equations */
   for (size_t k = 0; k < 9; ++k) {
     cell.step[k % 3][k / 3] = -slope[k / 3][k % 3];
   }
@@ -45,7 +46,7 @@ static double solve(const supine_field *field, const double y[3], double x[3]) {
   double residual[3];
   double slope[3][3];
   double off = misfit(field, x, y, residual, slope);
-  for (int i = 0; i < STEPS && off > close_enough; ++i) {
+  for (int i = 0; i < STEPS && off > tolerance; ++i) {
     double step[3];
     if (!newton((const double(*)[3])slope, residual, step)) {
       break;
@@ -94,7 +95,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* once more, from the node itself */
+      if (off > lost_beyond) { /* try again from the node itself */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);
@@ -111,7 +112,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Measure the residual of field and inverse at every node inside. */
+/* Measure the residual of the field followed by its inverse at every node inside the lungs. */
 static void measure(const supine_field *field, const supine_field *inverse,
                     supine_field_residual *residual) {
   const supine_image *nodes = &field->nodes;

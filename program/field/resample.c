@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Images moved by a field: each voxel is taken from where its tissue was. */
+/* Move an image by a field: take each voxel from where its tissue was. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 
 #include "program/field/cell.h"
 
-/* Voxels of a row that go through each step together, in vector units. */
+/* Number of voxels of a row that are processed together, by vector instructions. */
 enum { RUN = 128 };
 
 #define INLINE static inline __attribute__((always_inline))
@@ -24,8 +24,8 @@ typedef struct resampling {
   bool labels;
 } resampling;
 
-/* The cells of a run of points: the first number of each one's first voxel, and by axis how far in
- * the point lies, 0 to 1. */
+/* The cells of a run of points: the index of each cell's first value, and the point's place in the
+ * cell by axis, 0 to 1. */
 typedef struct cells {
   size_t first[RUN];
   double share[3][RUN];
@@ -63,7 +63,8 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
   }
 }
 
-/* Weights of the cells' corners, and where each corner's first number lies behind the cell's. */
+/* Compute the weights of the cells' corners, and the offset of each corner's first value from the
+ * cell's. */
 INLINE void weigh_corners(const supine_image *image, const cells *in, double (*weight)[RUN],
                           size_t *behind) {
   for (size_t corner = 0; corner < 8; ++corner) {
@@ -82,8 +83,8 @@ INLINE void weigh_corners(const supine_image *image, const cells *in, double (*w
   }
 }
 
-/* Add the displacements there to points: the operations of supine_field_interpolate in its order.
- */
+/* Add the displacements at points to them: the operations of supine_field_interpolate in the same
+ * order. */
 INLINE void displace(const supine_image *nodes, const cells *in, double (*point)[RUN]) {
   double weight[8][RUN];
   size_t behind[8];
@@ -102,7 +103,7 @@ INLINE void displace(const supine_image *nodes, const cells *in, double (*point)
   }
 }
 
-/* The values of an image there, likewise. */
+/* Interpolate an image at points. */
 INLINE void interpolate(const supine_image *image, const cells *in, double *values) {
   double weight[8][RUN];
   double value[RUN];
@@ -117,7 +118,7 @@ INLINE void interpolate(const supine_image *image, const cells *in, double *valu
   }
 }
 
-/* Take nearest voxels: labels have no means. */
+/* Take the nearest voxels. */
 INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   size_t stride = 1;
   for (size_t a = 0; a < 3; ++a) {

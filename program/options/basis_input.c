@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What commands that read a basis share. */
+/* Shared by commands that read a basis. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What commands that read a basis share: its surface as a mesh. */
+/* Shared by commands that read a basis. */
 #ifndef SUPINE_BASIS_INPUT_H
 #define SUPINE_BASIS_INPUT_H
 
@@ -8,10 +8,10 @@
 
 #include "program/options/command.h"
 
-/* --as-scanned, into a bool: outputs lie on top of the scan. */
+/* --as-scanned, into a bool: write outputs in the axes and units of the scan. */
 extern const supine_option supine_options_as_scanned[];
 
-/* Open a basis for a command that draws no normals, which then need not be packed. */
+/* Open a basis without its normals, which only pictures need. */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 

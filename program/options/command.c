@@ -74,7 +74,7 @@ void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   (void)supine_text_make_utf8(text);
 }
 
-/* The number at the front of `text`; NULL where there is none, else where it ends. */
+/* Read the number at the start of `text`; return its end, or NULL where there is none. */
 static const char *scan_number(const char *text, double *value) {
   char *end = NULL;
   *value = strtod(text, &end);

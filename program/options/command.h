@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What the commands of the program share: how they fail, read their arguments and show progress. */
+/* Shared by commands: exit codes, messages, numbers, suggestions, progress, signals. */
 #ifndef SUPINE_COMMAND_H
 #define SUPINE_COMMAND_H
 
@@ -27,7 +27,7 @@ extern const supine_command supine_command_phantom, supine_command_precompute, s
     supine_command_export, supine_command_solve, supine_command_pv, supine_command_stream,
     supine_command_fit, supine_command_validate, supine_command_embed, supine_command_locate;
 
-/* The same, ended by NULL. */
+/* All commands, ended by NULL. */
 extern const supine_command *const supine_command_list[];
 
 /* Print "supine COMMAND: MESSAGE" to stderr. */
@@ -39,7 +39,7 @@ int supine_options_fail(const char *command, supine_status status, const supine_
 /* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
 int supine_options_finish(const char *command);
 
-/* Write the command line as one line for a file's metadata; names of files lose their folders. */
+/* Write the command line as one line for the metadata of a file, without the folders of files. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
 /* Read a finite number, or a whole one, that takes up the whole text. */
@@ -52,8 +52,8 @@ bool supine_options_parse_numbers(const char *text, size_t count, double *values
 /* Return the candidate with the fewest edits from `text`, or NULL where all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
-/* Progress on stderr, where it is a terminal: one line, rewritten, with the time left. Matches
- * supine_progress_function; false after SIGINT or SIGTERM. */
+/* Progress with the remaining time, in one line of stderr where that is a terminal. step is a
+ * supine_progress_function; it returns false after an interruption. */
 typedef struct supine_progress {
   const char *label;
   double start;  /* seconds */
@@ -65,8 +65,9 @@ supine_progress supine_options_progress_begin(const char *label);
 bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 
-/* Signals that end the program leave no unfinished file behind. With an orderly end SIGINT, SIGTERM
- * and SIGHUP ask for it instead, once: progress says so. */
+/* Make SIGINT, SIGTERM and SIGHUP remove unfinished outputs before they end the program. With
+ * `orderly_end` the first of them only sets supine_options_interrupted, so that the command can
+ * stop by itself. */
 void supine_options_signals_catch(bool orderly_end);
 bool supine_options_interrupted(void);
 

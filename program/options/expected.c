@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors in the output of commands. */
+/* Expected errors of a state, for the output of commands. */
 #include <math.h>
 #include <stdlib.h>
 

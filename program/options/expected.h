@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors in the output of commands. */
+/* Expected errors of a state, for the output of commands. */
 #ifndef SUPINE_OPTIONS_EXPECTED_H
 #define SUPINE_OPTIONS_EXPECTED_H
 
@@ -14,22 +14,22 @@
   "It was measured on full breaths in one posture; for a change of posture it is an "              \
   "extrapolation."
 
-/* Zero-initialise; supine_options_expected_free releases what find put there. */
+/* Zero-initialise, and release with supine_options_expected_free. */
 typedef struct supine_expected {
-  float *sigma;        /* [N] mm; NULL where nothing is known of them */
+  float *sigma;        /* [N] mm; NULL: unknown */
   double rms, largest; /* over the vertices, mm */
-  bool turned;         /* the two states are of two postures */
+  bool turned;         /* the two states differ in posture */
 } supine_expected;
 
-/* Find the expected error of a state, counted from another. Another simulator's fields and open
- * surfaces leave `sigma` NULL.
+/* Compute the expected errors of a displacement from one state to another. They are unknown for
+ * fields of another simulator and for open surfaces.
  * @retval those of supine_basis_pose, SUPINE_ERROR_MEMORY */
 supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
                                            const supine_state *from, supine_expected *expected,
                                            supine_error *error);
 void supine_options_expected_free(supine_expected *expected);
 
-/* Print them in one line, with what supports them; nothing where they are not known. */
+/* Print them in one line; nothing where they are unknown. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

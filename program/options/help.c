@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A command's table of options, row by row, and its --help. */
+/* Print the help of a command from its table of options. */
 #include <string.h>
 
 #include "program/options/option.h"
 
 enum { WIDTH = 80, TEXT_COLUMN = 23 };
 
-/* Prints one line's words between the columns `left` and WIDTH, from `column` on. */
+/* Print the words of one line between the columns `left` and WIDTH, starting at `column`. */
 static void print_words(const char *line, size_t length, size_t column, size_t left, FILE *file) {
   for (size_t at = 0; at < length;) {
     const char *word = line + at;
@@ -24,8 +24,8 @@ static void print_words(const char *line, size_t length, size_t column, size_t l
   }
 }
 
-/* Prints text between the columns `left` and WIDTH, the first line from `column` on; lines that
- * begin with a space stay as they are. */
+/* Print text between the columns `left` and WIDTH, starting at `column`; lines that begin with a
+ * space are not wrapped. */
 static void print_text(const char *text, size_t column, size_t left, FILE *file) {
   for (;;) {
     const size_t length = strcspn(text, "\n");

@@ -202,7 +202,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   return status;
 }
 
-/* Check that a name ends in one of ".ply, .obj or .stl", in any case. */
+/* Return whether a name ends in one of ".ply, .obj or .stl", in any case. */
 static bool has_ending(const char *path, const char *endings) {
   const char *dot = strrchr(path, '.');
   if (dot == NULL || dot == path || dot[-1] == '/') {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How a command is described: one table of its options, from which come parsing, --help,
- * suggestions, manual pages and completions. A whole command:
+/* A command and the table of its options, from which parsing, --help, suggestions, manual pages and
+ * completions follow. A whole command:
  *
  *     typedef struct request { const char *output; size_t vertices; } request;
  *
@@ -30,19 +30,19 @@
 
 #include <supine/status.h>
 
-/* How a value is read; SUPINE_FILLS takes it from the type of the field. */
+/* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
 typedef enum supine_option_kind {
-  SUPINE_OPTION_OWN,     /* by the option's own reader */
+  SUPINE_OPTION_OWN,     /* the option has a reader */
   SUPINE_OPTION_FLAG,    /* bool: no value; true where given */
-  SUPINE_OPTION_NUMBER,  /* double: a finite number, within the range */
-  SUPINE_OPTION_NUMBERS, /* double[n]: as many, separated by commas */
-  SUPINE_OPTION_COUNT,   /* size_t: a whole number, within the range */
-  SUPINE_OPTION_TEXT,    /* const char *: as it stands; it lives as long as argv */
-  SUPINE_OPTION_CHOICE   /* an enum: the position of the word among the choices */
+  SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
+  SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
+  SUPINE_OPTION_COUNT,   /* size_t: a whole number within the range */
+  SUPINE_OPTION_TEXT,    /* const char *: the argument itself, which lives as long as argv */
+  SUPINE_OPTION_CHOICE   /* enum: the index of the word among the choices */
 } supine_option_kind;
 
-/* What a file that an option names is to the command. An output is never an input, and is tried
- * before the work begins. */
+/* Role of a file that an option names. Before the command runs, each output is checked not to be an
+ * input, and tried. */
 typedef enum supine_option_file {
   SUPINE_FILE_NONE,
   SUPINE_FILE_IN,
@@ -58,28 +58,28 @@ static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
 }
 
-/* One row: an option, words between options, or another table. The last row is all zero. */
+/* One row: an option, a heading, or another table. The last row is all zero. */
 typedef struct supine_option {
-  const char *name;     /* long name; NULL: words or a table */
+  const char *name;     /* long name; NULL: a heading or a table */
   char letter;          /* short name, or 0 */
-  const char *argument; /* its value's name in the help; NULL: none follows */
-  const char *help;     /* wrapped to the terminal; "\n" begins a line. Without a name: words */
+  const char *argument; /* name of its value in the help; NULL: it has no value */
+  const char *help;     /* wrapped to the terminal; "\n" begins a line. Without a name: heading */
   supine_option_kind kind;
   size_t offset, size; /* of the field */
-  size_t given;        /* 1 + offset of a bool that says whether it was given; 0: none */
+  size_t given;        /* 1 + offset of a bool set where the option was given; 0: none */
   supine_option_reader *read;
-  const char *standard; /* default, read like a value, told in the help; NULL: the field's zero */
-  double range[2];      /* range of numbers and counts; both 0: any */
-  bool open;            /* the range's ends are outside it */
-  const char *wants;    /* "millilitres": for messages; NULL: from the kind and the range */
-  const char *const *choices; /* ends with NULL; for completion where there is a reader */
+  const char *standard;       /* default, read like a value and shown in the help; NULL: zero */
+  double range[2];            /* range of numbers and counts; both 0: any */
+  bool open;                  /* the ends of the range are excluded */
+  const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
+  const char *const *choices; /* ends with NULL; only for completion where there is a reader */
   const char *alias;          /* another long name, not shown */
-  const char *rivals;         /* at most one of the options with the same word may be given, once */
+  const char *rivals;         /* of the options with the same word at most one may be given, once */
   bool required;
-  bool more; /* shown by --help-all, not by --help */
+  bool more; /* shown by --help-all only */
   supine_option_file file;
-  const char *endings;               /* that a file's name must have one of: ".ply, .obj or .stl" */
-  const struct supine_option *table; /* a shared table; its fields count from `offset` */
+  const char *endings;               /* valid endings of a file's name: ".ply, .obj or .stl" */
+  const struct supine_option *table; /* a shared table, which fills the struct at `offset` */
 } supine_option;
 
 #define SUPINE_FILLS(type, member)                                                                 \
@@ -96,9 +96,9 @@ typedef struct supine_option {
 #define SUPINE_SAYS_GIVEN(type, member) .given = (1 + offsetof(type, member))
 #define SUPINE_ABOVE_ZERO .range = {0.0, INFINITY}, .open = true
 
-/* What a command runs on, beside its request. */
+/* Input of a command besides its request. */
 typedef struct supine_arguments {
-  char **operand; /* operands, in order */
+  char **operand; /* [count] in order */
   size_t count;
   const char *made_by; /* the command line, for the metadata of a file */
 } supine_arguments;
@@ -107,13 +107,13 @@ typedef struct supine_command {
   const char *name;
   const char *summary; /* a few words, for the list of commands */
   const char *usage;   /* what follows "supine NAME "; further lines after "\n" */
-  const char *about;   /* what it does; wrapped, lines that begin with a space are kept */
+  const char *about;   /* its purpose; wrapped, but lines that begin with a space are kept */
   const supine_option *options;
-  const char *notes; /* after the options, examples last; as `about` */
+  const char *notes; /* below the options, examples last; formatted as `about` */
   size_t operands_least, operands_most;
-  const char *operands_missing; /* the message where there are fewer or more */
+  const char *operands_missing; /* message for fewer or more operands */
   size_t request_size;
-  void (*begin)(void *request); /* sets what defaults cannot say; NULL: all zero */
+  void (*begin)(void *request); /* sets defaults that rows cannot express; NULL: none */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States on the command line. */
+/* States on the command line: --volume, --from, and the pose that follows. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "program/options/basis_input.h"
 #include "program/options/state.h"
 
-static const double least_of_full =
-    0.1; /* share of full inflation held by tissue alone, the least possible */
+/* Plausible volumes, as shares of full inflation; the least is that of tissue alone. */
+static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
-static const double folded_limit =
-    0.01; /* share of turned-over triangles above which the surface is implausible */
+/* Share of turned-over triangles above which the surface is implausible. */
+static const double folded_limit = 0.01;
 
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error) {
   return supine_state_parse_volume(text, field, error);
@@ -82,7 +82,7 @@ static supine_status say_or_fail(const supine_error *wrong, const char *command,
                                  supine_error *error) {
   if (strict) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "%s; give --allow-folds to compute it all the same", wrong->message);
+                            "%s; --allow-folds computes it nevertheless", wrong->message);
   }
   supine_options_say(command, "%s", wrong->message);
   return SUPINE_OK;

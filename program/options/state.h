@@ -7,7 +7,7 @@
 
 #include "program/options/command.h"
 
-/* A table of options that fills a supine_volume_options: --volume and --allow-folds. */
+/* --volume and --allow-folds: a table that fills a supine_volume_options. */
 extern const supine_option supine_options_volume[];
 
 /* Read the value of --volume into a supine_state. */
@@ -35,22 +35,23 @@ typedef struct supine_from {
   supine_state state;
 } supine_from;
 
-/* State that displacements are measured from, its pose, and its name for people. */
+/* State that displacements are measured from, its pose, and its name in words. */
 typedef struct supine_reference_pose {
   supine_state state;
   supine_pose pose;
   char name[96]; /* "the scan", "supine at rest" */
 } supine_reference_pose;
 
-/* The state that displacements count from: --from where it is given; else supine at rest where
- * postures are compared and rest is known; else the scan. Statuses as supine_basis_pose. */
+/* Choose the state that displacements are measured from: --from where it is given; else supine at
+ * rest where postures are compared and rest is known; else the scan. Statuses as
+ * supine_basis_pose. */
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Check that the state is plausible. Where rest is known, volumes below tissue alone or a fifth
- * above full, and surfaces that fold, are SUPINE_ERROR_NUMERICAL unless folds are allowed;
- * otherwise they are warned about. */
+/* Check that the state is plausible: a volume between that of tissue alone and a fifth above full,
+ * and a surface that does not fold. Where rest is known and folds are not allowed, an implausible
+ * state is an error, SUPINE_ERROR_NUMERICAL; otherwise a warning. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The options of every command that reads surfaces: their axes and units. */
+/* Options of commands that read surfaces: axes and units, landmarks. */
 #ifndef SUPINE_SURFACE_OPTIONS_H
 #define SUPINE_SURFACE_OPTIONS_H
 
@@ -12,7 +12,7 @@
 /* --axes and --units, a table that fills a supine_mesh_load_options. */
 extern const supine_option supine_options_surface_frame[];
 
-/* Points that are known in two scans of one person, and how far the scans' frames agree. */
+/* Points known in two scans of one person, and the motion between the frames to be fitted. */
 typedef struct supine_landmark_options {
   const char *path; /* CSV; NULL: none */
   bool reverse, translation, rigid;

@@ -8,7 +8,7 @@
 #include <supine/compare.h>
 
 #include "program/options/expected.h"
-#include "program/options/posture_list.h"
+#include "program/options/orientation.h"
 #include "program/options/state.h"
 
 enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
