@@ -9,7 +9,6 @@
 #include "precompute/inside/surface.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/patient/gain.h"
-#include "precompute/patient/patient_file.h"
 #include "precompute/patient/surfaces.h"
 #include "program/options/command.h"
 #include "program/options/surface_options.h"
@@ -127,22 +126,21 @@ static const supine_option table[] = {
 /* Gain of the law deep: it empties the lowest parts about 1.5 times as far as the uppermost. */
 static const double usual_gain = 0.4;
 
-static void print_row(const char *what, double fitted, double held_out, const char *after) {
-  (void)printf("  %-24s %7.2f   %7.2f%s\n", what, fitted, held_out, after);
-}
-
-static void print_scores(const supine_patient_fit_report *report, supine_patient_law law,
-                         bool corrected) {
-  char text[64];
+static void print_scores(const supine_patient_record *record) {
+  const supine_patient_fit_report *report = &record->report;
+  const char *law = supine_patient_law_names[record->patient.law];
+  const bool corrected = record->patient.centre_count > 0;
   (void)printf("residual displacement, mm RMS:\n                             fitted  held-out\n");
-  print_row("nothing moved", report->fitted.none, report->held_out.none, "");
-  print_row("translation", report->fitted.translation, report->held_out.translation, "");
-  print_row("affine map", report->fitted.affine, report->held_out.affine, "");
-  (void)snprintf(text, sizeof text, "law %s", supine_patient_law_names[law]);
-  print_row(text, report->fitted.law, report->held_out.law, "");
+  for (size_t k = 0; k < (corrected ? SUPINE_PATIENT_SCORES : SUPINE_PATIENT_SCORE_CORRECTED);
+       ++k) {
+    static const char *const names[] = {"nothing moved", "translation", "affine map", "law %s",
+                                        "law %s + kriging"};
+    char text[64];
+    (void)snprintf(text, sizeof text, names[k], law);
+    (void)printf("  %-24s %7.2f   %7.2f%s\n", text, report->fitted[k], report->held_out[k],
+                 k == SUPINE_PATIENT_SCORE_CORRECTED ? "   <- kept" : "");
+  }
   if (corrected) {
-    (void)snprintf(text, sizeof text, "law %s + kriging", supine_patient_law_names[law]);
-    print_row(text, report->fitted.corrected, report->held_out.corrected, "   <- kept");
     (void)printf("expected error at held-out points %.2f mm RMS; %.0f %% of them lie within "
                  "the 95 %% band\n",
                  report->expected, 100.0 * report->band);
@@ -154,7 +152,7 @@ static void print_scores(const supine_patient_fit_report *report, supine_patient
 static void print_paper_law(const supine_patient *patient,
                             const supine_patient_fit_report *report) {
   double c[SUPINE_PATIENT_CONSTANTS];
-  supine_patient_constants(patient, c);
+  supine_patient_constants(&patient->power, c);
   (void)printf("paper law, force 1 at the centre of the box (95 %% intervals):\n");
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
     const double half = 1.96 * report->error[k];
@@ -173,25 +171,25 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
   }
 }
 
+static void print_region(const char *before, const supine_patient_mode *mode) {
+  (void)printf("%s%s lung, %.0f mm about %.0f,%.0f,%.0f", before, mode->side > 0 ? "left" : "right",
+               0.5 * mode->radius, mode->centre[0], mode->centre[1], mode->centre[2]);
+}
+
 /* Print the determined region with the least (`sign` -1) or greatest expandability. */
 static void print_extreme(const supine_patient_stiffness *stiffness, const char *what,
                           double sign) {
   const supine_patient_mode *found = NULL;
-  size_t lung = 0;
-  for (size_t side = 0; side < 2; ++side) {
-    for (size_t k = 0; k < stiffness->count[side]; ++k) {
-      const supine_patient_mode *mode = &stiffness->mode[side][k];
-      if (mode->seen >= SUPINE_PATIENT_SEEN &&
-          (found == NULL || sign * mode->value > sign * found->value)) {
-        found = mode;
-        lung = side;
-      }
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    const supine_patient_mode *mode = &stiffness->mode[k];
+    if (mode->seen >= SUPINE_PATIENT_SEEN &&
+        (found == NULL || sign * mode->value > sign * found->value)) {
+      found = mode;
     }
   }
   if (found != NULL) {
-    (void)printf("  %s expandable: %s lung, %.0f mm about %.0f,%.0f,%.0f, %.2f\n", what,
-                 lung == 0 ? "left" : "right", 0.5 * found->radius, found->centre[0],
-                 found->centre[1], found->centre[2], found->value);
+    print_region(what, found);
+    (void)printf(", %.2f\n", found->value);
   }
 }
 
@@ -201,13 +199,10 @@ static void print_unseen(const supine_patient_stiffness *stiffness,
                          const supine_patient_expand_report *expand) {
   (void)printf("  not determined: %zu of %zu regions; they take their neighbours' values%s\n",
                expand->unseen, expand->regions, expand->unseen > 0 ? ":" : "");
-  for (size_t side = 0; side < 2; ++side) {
-    for (size_t k = 0; k < stiffness->count[side]; ++k) {
-      const supine_patient_mode *mode = &stiffness->mode[side][k];
-      if (mode->seen < SUPINE_PATIENT_SEEN) {
-        (void)printf("    %s lung, %.0f mm about %.0f,%.0f,%.0f\n", side == 0 ? "left" : "right",
-                     0.5 * mode->radius, mode->centre[0], mode->centre[1], mode->centre[2]);
-      }
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    if (stiffness->mode[k].seen < SUPINE_PATIENT_SEEN) {
+      print_region("    ", &stiffness->mode[k]);
+      (void)putchar('\n');
     }
   }
 }
@@ -220,10 +215,10 @@ static void print_expandability(const supine_patient_expand_report *expand,
                  expand->fitted[1], expand->fitted[0], expand->held_out[1], expand->held_out[0]);
     if (expand->kept) {
       (void)printf(
-          "kept; 90 %% of the determined tissue has %.2f to %.2f times the mean stiffness\n",
+          "kept; 90 %% of the determined regions have %.2f to %.2f times the mean stiffness\n",
           expand->softest, expand->stiffest);
-      print_extreme(stiffness, "least", -1.0);
-      print_extreme(stiffness, "most", 1.0);
+      print_extreme(stiffness, "  least expandable: ", -1.0);
+      print_extreme(stiffness, "  most expandable: ", 1.0);
       print_unseen(stiffness, expand);
     } else {
       (void)puts("not kept, as the held-out residual is not lower: stiffness stays uniform");
@@ -231,9 +226,9 @@ static void print_expandability(const supine_patient_expand_report *expand,
   }
 }
 
-static void print_applied(const supine_patient_surface_fit *found) {
-  const supine_patient_applied *applied = &found->applied;
-  const double *c = found->patient.powers + 3;
+static void print_applied(const supine_patient_record *record) {
+  const supine_patient_applied *applied = &record->applied;
+  const double *c = record->patient.power.powers + 3;
   (void)printf("the force that the displacement shows, back through the operator, means of %zu "
                "blocks:\n"
                "  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
@@ -279,16 +274,16 @@ static void print_states(const supine_patient_record *record) {
   }
 }
 
-static void print_text(const supine_patient_record *record, const supine_patient_fit_report *report,
-                       const request *wanted) {
+static void print_text(const supine_patient_record *record, const request *wanted) {
   const supine_patient *patient = &record->patient;
+  const supine_patient_fit_report *report = &record->report;
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   print_states(record);
   (void)printf("%zu %s in %zu blocks of 40 mm\n", report->count,
                report->components == 3 ? "landmarks" : "measurements", report->blocks);
-  print_scores(report, patient->law, patient->correction.count > 0);
+  print_scores(record);
   if (moved) {
-    const double *t = patient->motion;
+    const double *t = patient->power.motion;
     (void)printf("motion between the scans: %.1f,%.1f,%.1f mm", t[0], t[1], t[2]);
     if (wanted->landmarks.rigid) {
       (void)printf(", turned by %.1f degrees",
@@ -429,46 +424,41 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
     const supine_lungs lungs = of->lungs[0];
     of->lungs[0] = of->lungs[1];
     of->lungs[1] = lungs;
-    supine_patient_pairs_swap(&of->pairs);
+    double *from = of->pairs.from;
+    of->pairs.from = of->pairs.to;
+    of->pairs.to = from;
   }
   return SUPINE_OK;
 }
 
 static supine_status fit_surfaces(const request *wanted, const evidence *of,
                                   const supine_patient_fit_options *options,
-                                  supine_patient_surface_fit *found, supine_error *error) {
+                                  supine_patient_record *record, supine_error *error) {
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_progress progress = supine_options_progress_begin(name);
   model.reach = wanted->reach;
   model.force.gain = wanted->has_gain ? wanted->gain : usual_gain; /* fixed for --expandability */
-  supine_patient_surface_task task = {.rest = &of->lungs[0],
-                                      .state = &of->lungs[1].mesh,
-                                      .model = &model,
-                                      .landmarks = of->pairs.count > 0 ? &of->pairs : NULL,
-                                      .options = *options,
-                                      .expandability = wanted->expandability,
-                                      .progress = supine_options_progress_step,
-                                      .progress_context = &progress};
-  memcpy(task.gravity, options->gravity, sizeof task.gravity);
-  supine_options_signals_catch(true);
-  const supine_status status = supine_patient_fit_surface(&task, found, error);
-  supine_options_progress_end(&progress);
-  return status;
+  const supine_patient_surface_task task = {.rest = &of->lungs[0],
+                                            .state = &of->lungs[1].mesh,
+                                            .model = &model,
+                                            .landmarks = of->pairs.count > 0 ? &of->pairs : NULL,
+                                            .options = *options,
+                                            .expandability = wanted->expandability};
+  return supine_patient_fit_surface(&task, record, error);
 }
 
 static supine_status fit_landmarks(const request *wanted, const supine_patient_pairs *pairs,
                                    const supine_patient_fit_options *options,
-                                   supine_patient_surface_fit *found, supine_error *error) {
-  const supine_patient_frame frame = supine_patient_frame_of_points(
-      pairs->count, pairs->from, wanted->has_midline ? &wanted->midline : NULL);
+                                   supine_patient_record *record, supine_error *error) {
   supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
   if (rows == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
                             pairs->count);
   }
-  supine_patient_rows_of_pairs(&frame, pairs, rows);
-  const supine_status status = supine_patient_fit(&frame, rows, 0, pairs->count, options,
-                                                  &found->patient, &found->report, error);
+  record->patient.frame = supine_patient_frame_of_points(
+      pairs->count, pairs->from, wanted->has_midline ? &wanted->midline : NULL);
+  supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
+  const supine_status status =
+      supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report, error);
   free(rows);
   return status;
 }
@@ -530,7 +520,8 @@ static supine_status find_gain(const request *wanted, evidence *of, supine_patie
     record->gain_told = gain.told;
     record->gain_open = gain.open;
     record->gain_error = gain.error;
-    record->force = supine_patient_force(&record->patient, gain.gain, record->state[1].gravity);
+    record->force =
+        supine_patient_force(&record->patient.power, gain.gain, record->state[1].gravity);
     record->told_count = wanted->count;
     for (size_t k = 0; k < wanted->count; ++k) {
       const supine_patient_other *other = &work->other[k];
@@ -607,39 +598,31 @@ static void warn_of_rest(const supine_patient_record *record) {
   }
 }
 
-static void keep(const request *wanted, const supine_patient_surface_fit *found,
-                 supine_patient_record *record) {
-  const supine_patient_fit_report *report = &found->report;
-  const supine_patient_scores *held = &report->held_out;
+static void keep(const request *wanted, supine_patient_record *record) {
+  const supine_patient_fit_report *report = &record->report;
   const char *source = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->state_path;
   const char *slash = strrchr(source, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
                  wanted->name != NULL ? wanted->name
                  : slash != NULL      ? slash + 1
                                       : source);
-  record->patient = found->patient;
-  record->stiffness = found->stiffness;
-  record->expand = found->expand;
-  record->applied = found->applied;
   record->reach = wanted->reach;
-
-  record->force = supine_patient_force(
-      &record->patient, wanted->has_gain ? wanted->gain : usual_gain, record->state[1].gravity);
-  record->points = report->count;
-  record->held_out = held->corrected;
-  record->held_out_baseline =
-      wanted->landmarks.translation || wanted->landmarks.rigid ? held->translation : held->none;
+  record->force =
+      supine_patient_force(&record->patient.power, wanted->has_gain ? wanted->gain : usual_gain,
+                           record->state[1].gravity);
+  record->points = (double)report->count;
+  record->held_out = report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
+  record->held_out_baseline = report->baseline;
   record->expected = report->components == 3 ? report->expected : report->expected_point;
   record->expected_constant =
       report->moved > 0.0 ? pow(record->expected, 2.0) / report->moved : 0.0;
-  record->band = report->band;
-  record->fitted = report->fitted.corrected;
-  record->explained = report->explained;
+  record->band = 100.0 * report->band;
+  record->fitted = report->fitted[SUPINE_PATIENT_SCORE_CORRECTED];
+  record->explained = 100.0 * report->explained;
 }
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
-                         supine_patient_surface_fit *found, supine_patient_record *record,
-                         supine_error *error) {
+                         supine_patient_record *record, supine_error *error) {
   supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
                                         .moved = wanted->landmarks.rigid ? SUPINE_PATIENT_RIGID
                                                  : wanted->landmarks.translation
@@ -652,25 +635,22 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
     status = order_states(wanted, &of, error);
   }
   if (status == SUPINE_OK) {
-    memcpy(options.gravity, of.swapped ? wanted->rest.gravity : wanted->state.gravity,
-           sizeof options.gravity);
     keep_states(wanted, &of, record);
+    memcpy(options.gravity, record->state[1].gravity, sizeof options.gravity);
     warn_of_rest(record);
     supine_patient_path(record, gains);
     for (size_t k = 0; k < 3; ++k) {
       options.way[k] = gains[1][k] - gains[0][k];
     }
-    status = wanted->state_path != NULL ? fit_surfaces(wanted, &of, &options, found, error)
-                                        : fit_landmarks(wanted, &of.pairs, &options, found, error);
+    status = wanted->state_path != NULL ? fit_surfaces(wanted, &of, &options, record, error)
+                                        : fit_landmarks(wanted, &of.pairs, &options, record, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, found, record);
-    if (wanted->count > 0) {
-      status = find_gain(wanted, &of, record, error);
-    }
+    keep(wanted, record);
+    status = wanted->count > 0 ? find_gain(wanted, &of, record, error) : SUPINE_OK;
   }
   if (status == SUPINE_OK && wanted->path != NULL) {
-    status = supine_patient_write(wanted->path, record, &found->report, given->made_by, error);
+    status = supine_patient_write(wanted->path, record, given->made_by, error);
   }
   evidence_free(&of);
   return status;
@@ -737,27 +717,26 @@ static supine_status arrange(request *wanted, const supine_arguments *given, sup
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  static supine_patient_record record; /* about 40 kB each, too large for the stack */
-  static supine_patient_surface_fit found;
+  static supine_patient_record record; /* about 100 kB, too large for the stack */
   supine_status status = arrange(wanted, given, error);
   if (status == SUPINE_OK) {
-    status = fit(wanted, given, &found, &record, error);
+    status = fit(wanted, given, &record, error);
   }
   if (status != SUPINE_OK) {
     return status;
   }
   if (wanted->json) {
-    char *text = supine_patient_text(&record, &found.report, given->made_by);
+    char *text = supine_patient_text(&record, given->made_by);
     (void)puts(text != NULL ? text : "{}");
     free(text);
   } else {
     if (wanted->state_path != NULL) {
-      print_surface(&found.surface, wanted->landmarks.path != NULL);
+      print_surface(&record.surface, wanted->landmarks.path != NULL);
     }
-    print_text(&record, &found.report, wanted);
+    print_text(&record, wanted);
     if (wanted->state_path != NULL) {
-      print_expandability(&found.expand, &found.stiffness);
-      print_applied(&found);
+      print_expandability(&record.expand, &record.stiffness);
+      print_applied(&record);
     }
     print_gain(&record, wanted->has_gain);
   }

@@ -290,7 +290,7 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
                         "note: assumed to be the %s of the two fitted states; --scanned changes it",
                         state == 0 ? "fuller" : "emptier");
   }
-  if (supine_patient_is_uneven(record)) {
+  if (record->stiffness.count > 0) {
     *stiffness = malloc(lungs->mesh.vertex_count * sizeof **stiffness);
     if (*stiffness == NULL) {
       return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",

@@ -193,7 +193,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
   if (status != SUPINE_OK) {
     return status;
   }
-  *text = supine_patient_text(record, NULL, NULL);
+  *text = supine_patient_text(record, NULL);
   if (*text == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
@@ -201,11 +201,11 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
   wanted->model.choice.law = SUPINE_LAW_DEEP; /* law whose constants the options below replace */
   wanted->basis.patient = *text;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
-                 "%s: %s law%s from %zu points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
+                 "%s: %s law%s from %.0f points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
                  "expected error %.1f mm RMS",
                  record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.correction.count > 0 ? " and kriging" : "", record->points,
-                 record->held_out, record->held_out_baseline, 100.0 * record->explained,
+                 record->patient.centre_count > 0 ? " and kriging" : "", record->points,
+                 record->held_out, record->held_out_baseline, record->explained,
                  record->expected);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = record->expected_constant;

@@ -144,7 +144,7 @@ grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain 
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   >fit.txt || fail "fit a lesion"
-grep -q 'kept; 90 % of the determined tissue' fit.txt || fail "no expandability kept"
+grep -q 'kept; 90 % of the determined regions' fit.txt || fail "no expandability kept"
 grep -q 'least expandable: left lung' fit.txt || fail "not told: $(cat fit.txt)"
 grep -q 'not determined: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
 grep -q 'correlation with height along gravity \(0.99\|1.00\);.* leaves [0-3] %' fit.txt || # what was made

@@ -83,13 +83,13 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
 /* Fits the lungs at rest to others of the same shape, moved by the truth of stiffness e, which it
  * frees. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
-                       supine_patient_surface_fit *found) {
+                       supine_patient_record *found) {
   const supine_model model = truth(); /* its reach and force are known; the rest is found */
   supine_mesh state = other->mesh;
   const supine_patient_surface_task task = {.rest = rest,
                                             .state = &state,
                                             .model = &model,
-                                            .gravity = {0.0, 1.0, 0.0},
+                                            .options.gravity = {0.0, 1.0, 0.0},
                                             .expandability = true};
   supine_error error = {0};
   state.vertices = moved_by_truth(other, e, 0.5);
@@ -105,13 +105,13 @@ static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, doub
 }
 
 static void fit(const supine_lungs *rest, const supine_lungs *other, const supine_lesion *lesion,
-                supine_patient_surface_fit *found) {
+                supine_patient_record *found) {
   fit_uneven(rest, other, stiffness_of(other, lesion), found);
 }
 
 static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
                           const supine_lesion *lesion) {
-  supine_patient_surface_fit found;
+  static supine_patient_record found;
   fit(rest, other, lesion, &found);
   const double times = contrast(rest, &found.stiffness, lesion);
   printf("%.2f times as stiff, %.0f in truth\n", times, lesion->factor);
@@ -119,7 +119,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
   /* What is said to be held out is what the regions had not seen. */
-  assert_true(found.report.held_out.corrected == found.expand.held_out[1]);
+  assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
 static void test_lesion_of_a_real_lung_comes_back(void **state_) {
@@ -160,13 +160,13 @@ static void test_even_lungs_keep_no_stiffness(void **state_) {
   (void)state_;
   supine_lungs rest = {0};
   supine_lungs other = {0};
-  supine_patient_surface_fit found;
+  static supine_patient_record found;
   made(1600, &rest);
   made(6000, &other);
   fit(&rest, &other, NULL, &found);
   assert_false(found.expand.kept);
-  assert_true(found.stiffness.count[0] == 0 && found.stiffness.count[1] == 0);
-  assert_true(found.report.held_out.corrected < 1.0);
+  assert_true(found.stiffness.count == 0);
+  assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] < 1.0);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
@@ -176,7 +176,7 @@ static void test_even_lungs_keep_no_stiffness(void **state_) {
 static void check_gradient(const supine_lungs *rest, const supine_lungs *other) {
   const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, 0.5, 1.5};
   const size_t n = rest->mesh.vertex_count;
-  supine_patient_surface_fit found;
+  static supine_patient_record found;
   double *should = gradient_of(rest, &law);
   double *is = malloc(n * sizeof *is);
   double mean[2] = {0.0, 0.0};
@@ -191,12 +191,11 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
     mean[1] += log(is[i]) / (double)n;
   }
   for (size_t i = 0; i < n; ++i) {
-    const size_t side = supine_patient_side_of(rest, i);
     double shares[SUPINE_PATIENT_MODES];
     double share = 0.0;
-    supine_patient_stiffness_shares(&found.stiffness, side, rest->mesh.vertices + 3 * i, shares);
-    for (size_t k = 0; k < found.stiffness.count[side]; ++k) {
-      share += shares[k] * found.stiffness.mode[side][k].seen;
+    supine_patient_stiffness_shares(&found.stiffness, rest, i, shares);
+    for (size_t k = 0; k < found.stiffness.count; ++k) {
+      share += shares[k] * found.stiffness.mode[k].seen;
     }
     if (share >= SUPINE_PATIENT_SEEN) {
       const double miss = log(is[i]) - mean[1] - log(should[i]) + mean[0];

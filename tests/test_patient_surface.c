@@ -52,8 +52,8 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
                                             .state = &state,
                                             .model = &model,
                                             .options = {.law = SUPINE_PATIENT_PAPER},
-                                            .gravity = {0.0, 1.0, 0.0}};
-  supine_patient_surface_fit fit;
+                                            .options.gravity = {0.0, 1.0, 0.0}};
+  static supine_patient_record fit;
   supine_error error = {0};
   if (supine_patient_fit_surface(&task, &fit, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
@@ -63,7 +63,7 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   /* As a basis would move it: counted from the emptier state, the scale is of opposite sign. */
   supine_patient_record record = {.patient = patient, .reach = 10.0, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
-  record.force = supine_patient_force(&patient, 0.4, supine_gravity);
+  record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
   supine_patient_field field = {0};
   const supine_resting resting = supine_reference_resting_default();
@@ -80,7 +80,7 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
     square += pow(positions[i] - expected[i], 2.0) / (double)rest.mesh.vertex_count;
   }
   double c[SUPINE_PATIENT_CONSTANTS];
-  supine_patient_constants(&patient, c);
+  supine_patient_constants(&patient.power, c);
   printf("largest move %.1f mm; points %.3f mm RMS off; surface %.2f -> %.2f "
          "mm\n",
          largest, sqrt(square), surface.before, surface.after);
@@ -127,16 +127,18 @@ static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
   state.vertices = moved_by_truth(&other, &largest);
   const supine_model model = truth();
   const supine_patient_surface_task task = {
-      .rest = &rest, .state = &state, .model = &model, .gravity = {0.0, 1.0, 0.0}};
-  static supine_patient_surface_fit fit;
+      .rest = &rest, .state = &state, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+  static supine_patient_record fit;
   assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
   printf("largest move %.1f mm; %.2f mm before, %.3f in the end; deep alone %.2f, held out %.3f "
          "mm\n",
-         largest, fit.surface.before, fit.surface.after, fit.report.held_out.law,
-         fit.report.held_out.corrected);
-  assert_true(fit.report.held_out.law > 4.0 * fit.report.held_out.corrected);
+         largest, fit.surface.before, fit.surface.after,
+         fit.report.held_out[SUPINE_PATIENT_SCORE_LAW],
+         fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
+  assert_true(fit.report.held_out[SUPINE_PATIENT_SCORE_LAW] >
+              4.0 * fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
   assert_true(fit.surface.before > 3.0 && fit.surface.after < 0.2);
-  assert_true(fit.report.held_out.corrected < 0.4);
+  assert_true(fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] < 0.4);
   free(state.vertices);
   supine_mesh_free(&coarse);
   supine_mesh_free(&fine);
@@ -157,7 +159,7 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
   for (int k = 0; k < 3; ++k) {
     supine_solution solution = {0};
     supine_mesh state = rest.mesh;
-    supine_patient_surface_fit fit;
+    static supine_patient_record fit;
     model.force = k == 0 ? (supine_force_law){.base = 0.5, .box = {0.9, 0.0, 0.1}}
                          : (supine_force_law){.base = 0.6, .gain = 0.8};
     assert_int_equal(supine_physics_solve(&rest, &model, supine_gravity, &solution, &error),
@@ -168,7 +170,7 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
                                               .state = &state,
                                               .model = &model,
                                               .options = {.law = SUPINE_PATIENT_PAPER},
-                                              .gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
+                                              .options.gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
     assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
     found[k] = fit.applied.correlation;
     printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f\n",
@@ -224,8 +226,8 @@ static void test_weights_end_at_4_685_standard_deviations(void **state_) {
 static void refused(const supine_lungs *rest, const supine_mesh *state, const char *words) {
   const supine_model model = truth();
   const supine_patient_surface_task task = {
-      .rest = rest, .state = state, .model = &model, .gravity = {0.0, 1.0, 0.0}};
-  supine_patient_surface_fit fit;
+      .rest = rest, .state = state, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+  static supine_patient_record fit;
   supine_error error = {0};
   assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_ERROR_MESH);
   if (strstr(error.message, words) == NULL) {

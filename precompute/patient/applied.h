@@ -2,8 +2,8 @@
 /** @file The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no
  * assumption about its form:
  *
- *     F_i = u_i . d_i / |d_i|^2      u: displacement to the other surface; d: fitted directions
- * (15)-(17) f = A F                        inverts the spreading operator (inverse.h)
+ *     F_i = u_i . d_i / |d_i|^2  u: displacement to the other surface; d: fitted directions
+ * (15)-(17) f = A F                    inverts the spreading operator (equilibrium.h)
  *
  * The inversion amplifies the roughness of u by (spreading length / edge length)^2, so f is
  * averaged over blocks of 40 mm of surface: the operator conserves sums. */
@@ -22,15 +22,13 @@ typedef struct supine_patient_applied {
 } supine_patient_applied;
 
 /** Find the force at every vertex of the reference surface.
- * @param matching   solved with the stiffness
- * @param patient    the law fitted to the matching
- * @param stiffness  [N] or NULL: 1
- * @param gravity    of the other state
+ * @param matching  solved with the stiffness; afterwards it holds every vertex
+ * @param patient   the law fitted to the matching; its correction is not used
+ * @param gravity   of the other state
  * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_patient_applied_find(const supine_patient_matching *matching,
-                                          const supine_patient *patient, const double *stiffness,
-                                          const double gravity[3], supine_patient_applied *applied,
-                                          supine_error *error);
+supine_status supine_patient_applied_find(supine_patient_matching *matching,
+                                          const supine_patient *patient, const double gravity[3],
+                                          supine_patient_applied *applied, supine_error *error);
 
 #endif

@@ -19,40 +19,33 @@
 #ifndef SUPINE_PATIENT_EXPAND_H
 #define SUPINE_PATIENT_EXPAND_H
 
+#include "precompute/patient/krige.h"
 #include "precompute/patient/matching.h"
 #include "precompute/patient/stiffness.h"
 
-/** Called with the share of the work done; false asks to stop. */
-typedef bool supine_patient_progress(void *context, double share);
-
 /** Least diagonal of the resolution matrix at which a region counts as seen. */
 #define SUPINE_PATIENT_SEEN 0.5
-
-/** What is known before the fit. */
-typedef struct supine_patient_expand_task {
-  supine_patient_moved moved;
-  const supine_model *model;         /**< its force is held fixed */
-  const double *gravity;             /**< of the other state */
-  supine_patient_progress *progress; /**< optional */
-  void *context;
-} supine_patient_expand_task;
 
 /** Fit and held-out error, without and with expandability. */
 typedef struct supine_patient_expand_report {
   bool tried, kept;
   double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
   double held_out[2]; /**< the same on held-out blocks */
-  double softest, stiffest; /**< range that holds nine tenths of the seen E, of mean 1 */
+  double softest, stiffest; /**< range of E that holds nine tenths of the seen regions; the
+                             * geometric mean of all is 1 */
   size_t regions, unseen;
 } supine_patient_expand_report;
 
-/** Find the expandability, and keep it if held-out blocks improve. The matching ends at the rows
- * of the law that is kept.
+/** Find the expandability, and keep it if held-out blocks improve. The matching, without
+ * landmarks, ends at the rows of the law that is kept.
+ * @param options    of the paper's law; the gravity of the other state
+ * @param model      its force is held fixed
  * @param patient    in: the law without; out: the law that is kept
- * @param stiffness  counts are 0 if it was not kept
- * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+ * @param stiffness  no regions if it was not kept
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
-                                    const supine_patient_expand_task *task, supine_patient *patient,
+                                    const supine_patient_fit_options *options,
+                                    const supine_model *model, supine_patient *patient,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 

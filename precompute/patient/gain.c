@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cblas.h>
 #include <lapacke.h>
 
 #include "precompute/patient/gain.h"
@@ -16,90 +17,71 @@ static const double at_bound = 0.01;     /* distance to a bound at which a gain 
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
 static const double settled = 1e-4;      /* change of a scale between rounds at which they end */
-enum { SEARCH_STEPS = 40, GRID = 20, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, PARTS = 6 };
+enum { SEARCH_STEPS = 40, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, EIGHTHS = 8 };
 
-/* What is known of one point of a state: axis . (s now / then u + t) = value. */
-typedef struct point {
-  double u[3];         /* displacement from full inflation to rest in the fitted posture, mm */
-  double parts[PARTS]; /* spread forces 1, X, Y, Z and both heights here */
-  double axis[3], value, weight;
-  size_t block;
-} point;
-
+/* A further state as rows, axis . (s now / then u + t) = value. */
 typedef struct state {
   supine_patient_other *other;
   supine_patient_matching matching; /* of a state given as a surface */
   size_t count;
-  point *points;
+  supine_patient_row *rows;  /* [count]; block: the eighth of the lungs */
+  double *u;                 /* [count, 3] from full inflation to rest in the fitted posture, mm */
+  double *heights;           /* [count, 2] spread, in the fitted posture and in this one */
+  double unknowns[UNKNOWNS]; /* s, t */
 } state;
 
 typedef struct problem {
   const supine_patient_record *record;
   bool moved;
   double gains[2][3]; /* share of the way of the fuller and the emptier state, by axis */
-  state *states;
+  state states[SUPINE_PATIENT_OTHERS_MAX];
   size_t state_count;
-  size_t without_state, without_block; /* left out of the sums; SIZE_MAX: none */
+  size_t without; /* the eighth that is left out; EIGHTHS: none */
 } problem;
 
-/* Scale a displacement between the two states to that from full inflation to rest. */
-static void lengthen(const problem *p, double u[3]) {
+/* Compute now / then: the force (18) in this posture over that in the fitted one. */
+static double ratio_at(const state *s, size_t i, const supine_force_law *law) {
+  const double *columns = s->rows[i].place.force;
+  double fixed = law->base * columns[0];
   for (size_t k = 0; k < 3; ++k) {
-    u[k] /= p->gains[1][k] - p->gains[0][k];
+    fixed += law->box[k] * (columns[1 + k] + 0.5 * columns[0]);
   }
-}
-
-static double ratio_at(const point *p, const supine_force_law *law) {
-  double fixed = law->base * p->parts[0];
-  for (size_t k = 0; k < 3; ++k) {
-    fixed += law->box[k] * p->parts[1 + k];
-  }
-  const double then = fixed + law->gain * p->parts[4]; /* (18) */
-  return then != 0.0 ? (fixed + law->gain * p->parts[5]) / then : 0.0;
+  const double then = fixed + law->gain * s->heights[2 * i];
+  return then != 0.0 ? (fixed + law->gain * s->heights[2 * i + 1]) / then : 0.0;
 }
 
 /* Find the squared residual of a state at a gain, mm^2, with its best other unknowns. */
-static double squares_of(const problem *problem_, size_t which, double gain, double *unknowns,
+static double squares_of(const problem *p, size_t which, double gain, double *unknowns,
                          double *weight) {
-  const state *s = &problem_->states[which];
+  const state *s = &p->states[which];
   const supine_force_law law =
-      supine_patient_force(&problem_->record->patient, gain, problem_->record->state[1].gravity);
-  const size_t n = problem_->moved ? UNKNOWNS : 1;
+      supine_patient_force(&p->record->patient.power, gain, p->record->state[1].gravity);
+  const lapack_int n = p->moved ? UNKNOWNS : 1;
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
   double squares = 0.0;
   *weight = 0.0;
   for (size_t i = 0; i < s->count; ++i) {
-    const point *p = &s->points[i];
-    const double along = supine_dot(p->axis, p->u);
-    const double row[UNKNOWNS] = {ratio_at(p, &law) * along, p->axis[0], p->axis[1], p->axis[2]};
-    double value = p->value;
+    const double *axis = s->rows[i].axis;
+    const double *u = s->u + 3 * i;
+    const double row[UNKNOWNS] = {ratio_at(s, i, &law) * supine_dot(axis, u), axis[0], axis[1],
+                                  axis[2]};
+    const double w = s->rows[i].block == p->without ? 0.0 : s->rows[i].weight;
+    double value = s->rows[i].value; /* from full inflation */
     for (size_t a = 0; a < 3; ++a) {
-      value += problem_->gains[0][a] * p->axis[a] * p->u[a];
+      value += p->gains[0][a] * axis[a] * u[a];
     }
-    if (which == problem_->without_state && p->block == problem_->without_block) {
-      continue;
-    }
-    for (size_t a = 0; a < n; ++a) {
-      for (size_t b = 0; b < n; ++b) {
-        matrix[a * n + b] += p->weight * row[a] * row[b];
-      }
-      right[a] += p->weight * row[a] * value;
-    }
-    squares += p->weight * value * value;
-    *weight += p->weight;
+    cblas_dsyr(CblasColMajor, CblasUpper, n, w, row, 1, matrix, n);
+    cblas_daxpy(n, w * value, row, 1, right, 1);
+    squares += w * value * value;
+    *weight += w;
   }
-  double solved[UNKNOWNS];
-  memcpy(solved, right, sizeof solved);
   memset(unknowns, 0, UNKNOWNS * sizeof *unknowns);
-  const lapack_int size = (lapack_int)n;
-  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, size, solved, size) == 0) {
-    memcpy(unknowns, solved, n * sizeof *unknowns);
-    for (size_t a = 0; a < n; ++a) {
-      squares -= solved[a] * right[a];
-    }
+  cblas_dcopy(n, right, 1, unknowns, 1);
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', n, 1, matrix, n, unknowns, n) != 0) {
+    memset(unknowns, 0, UNKNOWNS * sizeof *unknowns);
   }
-  return fmax(0.0, squares);
+  return fmax(0.0, squares - cblas_ddot(n, unknowns, 1, right, 1));
 }
 
 static double squares_at(const problem *p, double gain) {
@@ -112,21 +94,11 @@ static double squares_at(const problem *p, double gain) {
   return squares;
 }
 
-/* Minimise over a grid of gains, then by golden section between the best one's neighbours. */
+/* Minimise over the gain by golden section: `now / then` is all but linear in it. */
 static double search(const problem *p) {
   static const double golden = 0.6180339887498949;
-  double best = 0.0;
-  double least = INFINITY;
-  for (int i = 0; i <= GRID; ++i) {
-    const double gain = gain_most * i / GRID;
-    const double squares = squares_at(p, gain);
-    if (squares < least) {
-      least = squares;
-      best = gain;
-    }
-  }
-  double low = fmax(0.0, best - gain_most / GRID);
-  double high = fmin(gain_most, best + gain_most / GRID);
+  double low = 0.0;
+  double high = gain_most;
   for (int i = 0; i < SEARCH_STEPS; ++i) {
     const double a = high - golden * (high - low);
     const double b = low + golden * (high - low);
@@ -136,165 +108,128 @@ static double search(const problem *p) {
   return 0.5 * (low + high);
 }
 
-/* Find the range of heights along gravity over the corners of the frame. */
-static double frame_height(const supine_patient_frame *frame, const double gravity[3],
-                           const supine_patient_place *place) {
-  double reach = 0.0;
-  double height = 0.5;
+/* Compute the height of a row along gravity from the spread columns of the force: coordinates are
+ * linear in box coordinates. */
+static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
+                        const double gravity[3], const double range[2]) {
+  const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
+  double height = -range[0] * place->force[0];
   for (int k = 0; k < 3; ++k) {
-    reach += fabs(gravity[k]) * (frame->maximum[k] - frame->minimum[k]);
+    const double from = k == 0 ? frame->midline : frame->maximum[k];
+    const double size = (k == 0 ? outer : frame->minimum[k]) - from;
+    height += gravity[k] * ((from + 0.5 * size) * place->force[0] + size * place->force[1 + k]);
   }
-  for (int k = 0; k < 3; ++k) {
-    height += gravity[k] * place->arm[k] / reach;
-  }
-  return height;
+  return height / (range[1] - range[0]);
 }
 
-/* Make three points of each pair, with forces that do not spread. */
-static supine_status take_pairs(const problem *p, state *s, supine_error *error) {
-  const supine_patient_pairs *pairs = s->other->pairs;
+/* Find the range of heights along gravity, mm: of the lungs, or of the box of landmarks. */
+static supine_status find_range(const problem *p, const state *s, const double gravity[3],
+                                double range[2], supine_error *error) {
   const supine_patient_frame *frame = &p->record->patient.frame;
-  supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
-  s->count = 3 * pairs->count;
-  s->points = calloc(s->count, sizeof *s->points);
-  if (rows == NULL || s->points == NULL) {
-    free(rows);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
-                            pairs->count);
+  if (s->other->surface != NULL) {
+    return supine_physics_height_range(s->matching.rest, false, 1, gravity, range, range + 1) ==
+                   SUPINE_OK
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for heights");
   }
-  supine_patient_rows_of_pairs(frame, pairs, rows);
-  (void)supine_patient_rows_block(frame, rows, s->count, 1);
-  for (size_t i = 0; i < s->count; ++i) {
-    const supine_patient_place *place = &rows[i].place;
-    point *to = &s->points[i];
-    *to = (point){.value = rows[i].value, .weight = rows[i].weight, .block = rows[i].block};
-    memcpy(to->axis, rows[i].axis, sizeof to->axis);
-    to->parts[0] = 1.0;
-    for (size_t k = 0; k < 3; ++k) {
-      to->parts[1 + k] = fmin(1.0, fmax(0.0, place->box[k]));
-    }
-    to->parts[4] = frame_height(frame, p->record->state[1].gravity, place);
-    to->parts[5] = frame_height(frame, s->other->gravity, place);
-    supine_patient_displacement(&p->record->patient, pairs->from + 3 * (i / 3), place->side, to->u);
-    lengthen(p, to->u);
+  range[0] = range[1] = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double ends[2] = {gravity[k] * frame->minimum[k], gravity[k] * frame->maximum[k]};
+    range[0] += fmin(ends[0], ends[1]);
+    range[1] += fmax(ends[0], ends[1]);
   }
-  free(rows);
   return SUPINE_OK;
 }
 
-/* Spread the heights along both gravities: their values at every vertex, [N, 2]. */
-static supine_status solve_heights(const problem *p, const state *s, const double *stiffness,
-                                   double *caught, supine_error *error) {
-  const supine_lungs *rest = s->matching.rest;
-  const size_t n = rest->mesh.vertex_count;
-  double *heights = malloc(2 * n * sizeof *heights);
-  const double *g[2] = {p->record->state[1].gravity, s->other->gravity};
-  if (heights == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  for (size_t c = 0; c < 2; ++c) {
-    double low;
-    double high;
-    if (supine_physics_height_range(rest, false, 1, g[c], &low, &high) != SUPINE_OK) {
-      free(heights);
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for heights");
+/* Make the rows of a state: three of each pair, whose force does not spread, or the vertices of
+ * `rest` that take part. */
+static supine_status take_rows(const problem *p, state *s, const supine_lungs *rest, double reach,
+                               supine_error *error) {
+  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
+  const supine_patient_pairs *pairs = s->other->pairs;
+  double *stiffness = NULL;
+  supine_status status = SUPINE_OK;
+  model.reach = reach;
+  if (pairs != NULL) {
+    s->count = 3 * pairs->count;
+    s->rows = malloc(s->count * sizeof *s->rows);
+  } else {
+    stiffness = malloc(rest->mesh.vertex_count * sizeof *stiffness);
+    if (stiffness != NULL) {
+      supine_patient_stiffness_of(&p->record->stiffness, rest, stiffness);
+      model.stiffness = stiffness;
+      status = supine_patient_matching_create(rest, s->other->surface, &model, VERTICES_MAX, 0,
+                                              &s->matching, error);
     }
-    for (size_t i = 0; i < n; ++i) {
-      const double *at = rest->mesh.vertices + 3 * i;
-      heights[2 * i + c] =
-          (g[c][0] * at[0] + g[c][1] * at[1] + g[c][2] * at[2] - low) / (high - low);
-    }
+    s->count = s->matching.count;
+    s->rows = s->matching.rows;
   }
-  supine_status status =
-      supine_physics_equilibrium_set_stiffness(s->matching.equilibrium, stiffness, error);
-  if (status == SUPINE_OK) {
-    status =
-        supine_physics_equilibrium_solve(s->matching.equilibrium, 2, heights, caught, NULL, error);
+  s->u = malloc(3 * s->count * sizeof *s->u);
+  s->heights = malloc(2 * s->count * sizeof *s->heights);
+  if (status == SUPINE_OK && (s->rows == NULL || s->u == NULL || s->heights == NULL)) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a further state");
+  } else if (status == SUPINE_OK && pairs != NULL) {
+    supine_patient_rows_of_pairs(&p->record->patient.frame, pairs, s->rows);
   }
-  free(heights);
+  free(stiffness);
   return status;
 }
 
-/* Gather the vertices that take part and their spread forces. */
-static supine_status take_surface(const problem *p, state *s, const supine_lungs *rest,
-                                  double reach, supine_error *error) {
-  const supine_patient_record *record = p->record;
-  const size_t n = rest->mesh.vertex_count;
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  double *stiffness = malloc(n * sizeof *stiffness);
-  double *caught = malloc(2 * n * sizeof *caught);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  model.reach = reach;
-  if (stiffness == NULL || caught == NULL) {
-    (void)supine_error_set(error, status, "no memory for %zu vertices", n);
-  } else {
-    supine_patient_stiffness_of(&record->stiffness, rest, stiffness);
-    model.stiffness = stiffness;
-    status = supine_patient_matching_create(rest, s->other->surface, &model, VERTICES_MAX, 0,
-                                            &s->matching, error);
-  }
-  if (status == SUPINE_OK) {
-    status = solve_heights(p, s, stiffness, caught, error);
-  }
-  s->count = s->matching.count;
-  s->points = calloc(s->count + 1, sizeof *s->points);
-  if (status == SUPINE_OK && s->points == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", s->count);
+/* Set up a state: rows, fitted displacements and heights. */
+static supine_status begin(const problem *p, state *s, const supine_lungs *rest, double reach,
+                           supine_error *error) {
+  const supine_patient *patient = &p->record->patient;
+  const double *g[2] = {p->record->state[1].gravity, s->other->gravity};
+  double range[2][2];
+  supine_status status = take_rows(p, s, rest, reach, error);
+  for (int c = 0; c < 2 && status == SUPINE_OK; ++c) {
+    status = find_range(p, s, g[c], range[c], error);
   }
   for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
-    point *to = &s->points[i];
-    const size_t v = s->matching.vertex[i];
-    const double *columns = s->matching.rows[i].force; /* of 1, X - 1/2, ... */
-    to->parts[0] = columns[0];
-    for (size_t k = 0; k < 3; ++k) {
-      to->parts[1 + k] = columns[1 + k] + 0.5 * columns[0];
+    supine_patient_place place = s->rows[i].place;
+    const supine_patient_frame *frame =
+        s->other->surface != NULL ? &s->matching.frame : &patient->frame;
+    for (size_t c = 0; c < 2; ++c) {
+      s->heights[2 * i + c] = height_at(frame, &place, g[c], range[c]);
     }
-    to->parts[4] = caught[2 * v];
-    to->parts[5] = caught[2 * v + 1];
-    if (record->from_surface) {
-      supine_patient_row_displacement(&record->patient, &s->matching.rows[i], to->u);
-    } else { /* the box of the landmarks is wider than the surface's */
-      supine_patient_displacement(&record->patient, rest->mesh.vertices + 3 * v,
-                                  s->matching.rows[i].place.side, to->u);
+    s->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
+                       (place.box[2] > 0.5 ? 1U : 0U);
+    if (s->other->surface != NULL && !p->record->from_surface) {
+      /* the box of the landmarks is wider than the surface's */
+      place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * s->matching.vertex[i],
+                                  place.side);
     }
-    lengthen(p, to->u);
+    supine_patient_displacement(patient, &place, s->u + 3 * i);
+    for (size_t k = 0; k < 3; ++k) { /* to that from full inflation to rest */
+      s->u[3 * i + k] /= p->gains[1][k] - p->gains[0][k];
+    }
   }
-  free(stiffness);
-  free(caught);
   return status;
 }
 
 /* Find the nearest points, with vertices moved at a gain, a scale and a translation. */
-static supine_status match_surface(const problem *p, state *s, double gain, const double *unknowns,
-                                   supine_error *error) {
+static supine_status match_surface(const problem *p, state *s, double gain, supine_error *error) {
   supine_patient_matching *m = &s->matching;
   const supine_force_law law =
-      supine_patient_force(&p->record->patient, gain, p->record->state[1].gravity);
+      supine_patient_force(&p->record->patient.power, gain, p->record->state[1].gravity);
   double rms;
   for (size_t i = 0; i < m->count; ++i) {
-    const double ratio = ratio_at(&s->points[i], &law);
+    const double ratio = ratio_at(s, i, &law);
     for (size_t k = 0; k < 3; ++k) {
       m->moved[3 * i + k] = m->rest->mesh.vertices[3 * m->vertex[i] + k] +
-                            (unknowns[0] * ratio - p->gains[0][k]) * s->points[i].u[k] +
-                            unknowns[1 + k];
+                            (s->unknowns[0] * ratio - p->gains[0][k]) * s->u[3 * i + k] +
+                            s->unknowns[1 + k];
     }
   }
   supine_patient_matching_find(m);
   const double matched = supine_patient_matching_weigh(m, 0.0, &rms);
-  if (matched < matched_least) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "only %.0f %% of the vertices find a further state's surface facing "
-                            "the same way: other axes, another person, or triangles inwards",
-                            100.0 * matched);
-  }
-  (void)supine_patient_rows_block(&m->frame, m->rows, m->count, 1);
-  for (size_t i = 0; i < m->count; ++i) {
-    memcpy(s->points[i].axis, m->rows[i].axis, sizeof s->points[i].axis);
-    s->points[i].value = m->rows[i].value;
-    s->points[i].weight = m->rows[i].weight;
-    s->points[i].block = m->rows[i].block;
-  }
-  return SUPINE_OK;
+  return matched >= matched_least
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "only %.0f %% of the vertices find a further state's surface "
+                                "facing the same way: other axes, another person, or triangles "
+                                "inwards",
+                                100.0 * matched);
 }
 
 void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
@@ -305,8 +240,9 @@ void supine_patient_refer(const supine_patient *patient, size_t count, double *p
     double motion[3];
     memcpy(at, points + 3 * i, sizeof at);
     for (int step = 0; step < STEPS; ++step) {
-      supine_patient_displacement(patient, at, 0.0, u);
-      supine_patient_motion(patient, at, motion);
+      const supine_patient_place place = supine_patient_find(&patient->frame, at, 0.0);
+      supine_patient_displacement(patient, &place, u);
+      supine_patient_motion(&patient->power, &place, motion);
       for (size_t k = 0; k < 3; ++k) {
         at[k] = points[3 * i + k] - u[k] - motion[k];
       }
@@ -317,26 +253,22 @@ void supine_patient_refer(const supine_patient *patient, size_t count, double *p
 
 /* Alternate between fitting gain and scales, and finding the nearest points. */
 static supine_status settle(problem *p, supine_patient_gain *found, supine_error *error) {
-  double unknowns[SUPINE_PATIENT_OTHERS_MAX][UNKNOWNS] = {{0.0}};
   supine_status status = SUPINE_OK;
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    double change = 0.0;
-    bool surfaces = false;
+  double change = INFINITY;
+  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
+    change = 0.0;
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
-      if (p->states[k].other->surface != NULL) {
-        surfaces = true;
-        status = match_surface(p, &p->states[k], found->gain, unknowns[k], error);
-      }
+      status = p->states[k].other->surface == NULL
+                   ? SUPINE_OK
+                   : match_surface(p, &p->states[k], found->gain, error);
     }
     found->gain = found->told ? search(p) : found->gain;
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
-      const double before = unknowns[k][0];
+      state *s = &p->states[k];
+      const double before = s->unknowns[0];
       double weight;
-      (void)squares_of(p, k, found->gain, unknowns[k], &weight);
-      change = fmax(change, fabs(unknowns[k][0] - before));
-    }
-    if (!surfaces || change < settled) {
-      break;
+      (void)squares_of(p, k, found->gain, s->unknowns, &weight);
+      change = fmax(change, fabs(s->unknowns[0] - before));
     }
   }
   return status;
@@ -353,31 +285,18 @@ static double root_mean(const problem *p, size_t which, double gain) {
 static void conclude(problem *p, supine_patient_gain *found) {
   double sum = 0.0;
   double square = 0.0;
-  double blocks = 0.0;
   for (size_t k = 0; k < p->state_count; ++k) {
     supine_patient_other *other = p->states[k].other;
-    double unknowns[UNKNOWNS];
-    double weight;
-    (void)squares_of(p, k, found->gain, unknowns, &weight);
-    other->scale = unknowns[0];
+    other->scale = p->states[k].unknowns[0];
     other->left = root_mean(p, k, found->gain);
     other->left_without = root_mean(p, k, 0.0);
   }
-  for (p->without_state = 0; p->without_state < p->state_count && found->told; ++p->without_state) {
-    const state *s = &p->states[p->without_state];
-    size_t count = 0;
-    for (size_t i = 0; i < s->count; ++i) {
-      count = s->points[i].block >= count ? s->points[i].block + 1 : count;
-    }
-    for (p->without_block = 0; p->without_block < count; ++p->without_block) {
-      const double gain = search(p);
-      sum += gain;
-      square += gain * gain;
-      blocks += 1.0;
-    }
+  for (p->without = 0; p->without < EIGHTHS && found->told; ++p->without) {
+    const double gain = search(p);
+    sum += gain;
+    square += gain * gain;
   }
-  found->error =
-      blocks > 0.0 ? sqrt(fmax(0.0, (blocks - 1.0) / blocks * (square - sum * sum / blocks))) : 0.0;
+  found->error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
 }
 
 /* The parameters are the inputs of one person: law, surfaces and landmarks. */
@@ -385,26 +304,15 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
                                       double reach, bool moved, supine_patient_other *others,
                                       size_t count, supine_patient_gain *found,
                                       supine_error *error) {
-  state states[SUPINE_PATIENT_OTHERS_MAX] = {{0}};
-  problem p = {.record = record,
-               .moved = moved,
-               .states = states,
-               .state_count = count,
-               .without_state = SIZE_MAX,
-               .without_block = SIZE_MAX};
+  problem p = {.record = record, .moved = moved, .without = EIGHTHS};
   supine_status status = SUPINE_OK;
-
   supine_patient_path(record, p.gains);
   *found = (supine_patient_gain){.gain = record->force.gain};
   for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
-    double apart = 0.0;
-    for (int a = 0; a < 3; ++a) {
-      apart += pow(others[k].gravity[a] - record->state[1].gravity[a], 2.0);
-    }
-    found->told = found->told || sqrt(apart) >= same_posture;
-    states[k].other = &others[k];
-    status = others[k].pairs != NULL ? take_pairs(&p, &states[k], error)
-                                     : take_surface(&p, &states[k], rest, reach, error);
+    found->told =
+        found->told || supine_distance(others[k].gravity, record->state[1].gravity) >= same_posture;
+    p.states[p.state_count].other = &others[k];
+    status = begin(&p, &p.states[p.state_count++], rest, reach, error);
   }
   if (status == SUPINE_OK) {
     status = settle(&p, found, error);
@@ -414,9 +322,13 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
     found->open = found->told && (found->gain < at_bound || found->gain > gain_most - at_bound);
     found->gain = found->open ? record->force.gain : found->gain;
   }
-  for (size_t k = 0; k < count; ++k) {
-    supine_patient_matching_free(&states[k].matching);
-    free(states[k].points);
+  for (size_t k = 0; k < p.state_count; ++k) {
+    if (p.states[k].other->surface == NULL) {
+      free(p.states[k].rows);
+    }
+    supine_patient_matching_free(&p.states[k].matching);
+    free(p.states[k].u);
+    free(p.states[k].heights);
   }
   return status;
 }

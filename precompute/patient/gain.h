@@ -20,10 +20,12 @@ typedef struct supine_patient_gain {
   bool told; /**< some state was in another posture, so the gain was fitted */
   bool open; /**< the fit ended at a bound: the gain is undetermined and kept */
   double gain;
-  double error; /**< standard error of the gain, by leaving out each block of 40 mm (jackknife) */
+  double
+      error; /**< standard error of the gain, by leaving out each eighth of the lungs (jackknife) */
 } supine_patient_gain;
 
-/** Move points [count, 3] of the emptier state to their places in the fuller one. */
+/** Move points [count, 3] of the emptier state to their places in the fuller one, where they came
+ * from. */
 void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
 
 /** Find the gain from further states, with the fitted field u of the law, scaled to the whole

@@ -9,7 +9,6 @@
 
 #include "precompute/patient/krige.h"
 
-#include "runtime/kriging.h"
 #include "sh/base/vec3.h"
 
 enum {
@@ -24,76 +23,48 @@ static const double scale_spread = 0.3;  /* prior deviation of the size of a kno
 static const double settled = 1e-10;     /* relative decrease of the squares that ends the fit */
 static const double damping_most = 1e10; /* damping at which no step decreases the squares */
 
-struct supine_patient_krige {
-  const supine_patient_row *rows;
-  size_t count;
-  supine_patient_krige_options options; /* with the sill and noise in use */
-  supine_patient_power law;
-  supine_patient_centre *centre; /* [count] of each row, with weight 0 */
-  double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
-  double *design;                /* [count, WIDTH] whitened */
-  double *weight;                /* [count] */
-  double normal[TERMS * TERMS];  /* normal matrix of the terms, Cholesky-factored */
-  double right[TERMS];
-  double squares; /* squared whitened residual, with the prior's */
-  double sill;    /* factor on the covariance of g, for a law of size 1 */
-};
+/* Beyond these exponents all motion is at one face; beyond these slopes the force changes sign. */
+static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
-                                                        const supine_patient_power *mean,
-                                                        supine_patient_moved moved) {
-  static const double spread[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
-  supine_patient_krige_options options = {.mean = *mean,
-                                          .shape_kept = law == SUPINE_PATIENT_DEEP,
-                                          .moved = moved,
-                                          .sill = -1.0,
-                                          .noise = -1.0};
-  memcpy(options.spread, spread[law], sizeof options.spread);
-  return options;
-}
-
-double supine_patient_krige_covariance(const supine_patient_centre *a,
-                                       const supine_patient_centre *b) {
-  supine_kriging_point p = {.size = a->size, .lung = a->side > 0.0 ? 0U : 1U};
-  supine_kriging_point q = {.size = b->size, .lung = b->side > 0.0 ? 0U : 1U};
-  memcpy(p.position, a->at, sizeof p.position);
-  memcpy(q.position, b->at, sizeof q.position);
-  return supine_kriging_covariance(&supine_kriging_default, &p, &q);
-}
+/* Prior standard deviations under each law: of lengths, relative; of exponents' logarithms; of
+ * slopes. */
+static const double spread[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
-                                       const supine_patient_row *row) {
-  supine_patient_centre centre = {.side = row->place.side};
+                                       const supine_patient_place *place) {
+  supine_patient_centre centre = {.side = place->side};
   double u[3];
-  supine_patient_power_displacement(law, row, u);
+  supine_patient_direction(law, place, supine_patient_force_at(law, place), u);
   centre.size = supine_length(u);
-  memcpy(centre.at, row->place.arm, sizeof centre.at); /* from the box's centre: distances count */
+  memcpy(centre.at, place->arm, sizeof centre.at); /* from the box's centre: distances count */
   return centre;
 }
 
 /* --- the terms ------------------------------------------------------------------------------- */
 
-/* Whether the law keeps its known shape. */
-static bool keeps_shape(const supine_patient_krige_options *options) {
-  return options->shape_kept && options->sill >= 1.0;
+/* Return whether the law keeps its known shape. */
+static bool keeps_shape(const supine_patient_krige *k) {
+  return k->size_only || (k->kind == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
 /* Find the prior standard deviation of a term: 0 known, INFINITY free. */
-static double spread_of(const supine_patient_krige_options *options, size_t term) {
+static double spread_of(const supine_patient_krige *k, size_t term) {
   static const size_t motion[] = {0, 3, 6};
-  const double unit = term < 3 ? fabs(options->mean.linear[term]) : 1.0;
-  const bool kept = keeps_shape(options);
-  return term == SCALE                         ? (kept ? scale_spread : 0.0)
-         : term < LAW                          ? (kept ? 0.0 : options->spread[term / 3] * unit)
-         : term - LAW < motion[options->moved] ? INFINITY
-                                               : 0.0;
+  const double unit = term < 3 ? fabs(k->mean.lengths[term]) : 1.0;
+  const bool kept = keeps_shape(k);
+  return term == SCALE                   ? (k->size_only ? INFINITY
+                                            : kept       ? scale_spread
+                                                         : 0.0)
+         : term < LAW                    ? (kept ? 0.0 : spread[k->kind][term / 3] * unit)
+         : term - LAW < motion[k->moved] ? INFINITY
+                                         : 0.0;
 }
 
 static double offset_of(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
-  const supine_patient_power *mean = &k->options.mean;
-  return term == SCALE ? law->linear[0] / mean->linear[0] - 1.0
-         : term < 3    ? law->linear[term] - mean->linear[term]
+  const supine_patient_power *mean = &k->mean;
+  return term == SCALE ? law->lengths[0] / mean->lengths[0] - 1.0
+         : term < 3    ? law->lengths[term] - mean->lengths[term]
          : term < 6    ? log(law->powers[term - 3] / mean->powers[term - 3])
                        : law->powers[term - 3] - mean->powers[term - 3];
 }
@@ -101,13 +72,11 @@ static double offset_of(const supine_patient_krige *k, size_t term) {
 static supine_patient_power moved_by(const supine_patient_power *law, const double step[TERMS]) {
   supine_patient_power moved = *law;
   for (size_t a = 0; a < 3; ++a) {
-    moved.linear[a] += step[a] + step[SCALE] * law->linear[a];
-    moved.powers[a] = fmin(supine_patient_exponent_most,
-                           fmax(supine_patient_exponent_least, law->powers[a] * exp(step[3 + a])));
-    moved.powers[3 + a] = fmin(supine_patient_slope_most,
-                               fmax(-supine_patient_slope_most, law->powers[3 + a] + step[6 + a]));
-    moved.linear[3 + a] += step[9 + a];
-    moved.linear[6 + a] += step[12 + a];
+    moved.lengths[a] += step[a] + step[SCALE] * law->lengths[a];
+    moved.powers[a] = fmin(exponent_most, fmax(exponent_least, law->powers[a] * exp(step[3 + a])));
+    moved.powers[3 + a] = fmin(slope_most, fmax(-slope_most, law->powers[3 + a] + step[6 + a]));
+    moved.motion[a] += step[9 + a];
+    moved.motion[3 + a] += step[12 + a];
   }
   return moved;
 }
@@ -115,7 +84,7 @@ static supine_patient_power moved_by(const supine_patient_power *law, const doub
 /* --- the rows -------------------------------------------------------------------------------- */
 
 static double noise_of(const supine_patient_krige *k, const supine_patient_row *row) {
-  return k->options.noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
+  return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
 /* Factor the covariance of the rows: noise plus g. If the law keeps its known shape, the size of
@@ -124,21 +93,18 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
-  k->sill = k->options.sill;
-  if (keeps_shape(&k->options)) {
-    k->sill *= fabs(k->options.mean.linear[0] / k->law.linear[0]);
-  }
+  k->scaled_sill = k->sill * (keeps_shape(k) ? fabs(k->mean.lengths[0] / k->law.lengths[0]) : 1.0);
   for (size_t i = 0; i < n; ++i) {
-    k->centre[i] = centre_of(&k->law, &k->rows[i]);
-    logarithm += k->options.sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
+    k->centre[i] = centre_of(&k->law, &k->rows[i].place);
+    logarithm += k->sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
   }
-  if (k->options.sill <= 0.0) {
+  if (k->sill <= 0.0) {
     return logarithm;
   }
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
-      k->factor[i * n + j] = k->sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
-                             supine_patient_krige_covariance(&k->centre[i], &k->centre[j]);
+      k->factor[i * n + j] = k->scaled_sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
+                             supine_patient_covariance(&k->centre[i], &k->centre[j]);
     }
     k->factor[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
   }
@@ -157,11 +123,11 @@ static void look(supine_patient_krige *k) {
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + WIDTH * i;
     row[TERMS] = -supine_patient_power_design(&k->law, &k->rows[i], row);
-    if (k->options.sill <= 0.0) {
+    if (k->sill <= 0.0) {
       cblas_dscal(WIDTH, 1.0 / noise_of(k, &k->rows[i]), row, 1);
     }
   }
-  if (k->options.sill > 0.0) {
+  if (k->sill > 0.0) {
     cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, WIDTH, 1.0,
                 k->factor, n, k->design, WIDTH);
   }
@@ -171,16 +137,16 @@ static void look(supine_patient_krige *k) {
               0.0, k->right, 1);
   k->squares = cblas_ddot(n, k->design + TERMS, WIDTH, k->design + TERMS, WIDTH);
   for (size_t t = 0; t < TERMS; ++t) {
-    const double spread = spread_of(&k->options, t);
-    if (spread == 0.0) { /* known: the row of the identity */
+    const double of = spread_of(k, t);
+    if (of == 0.0) { /* known: the row of the identity */
       k->right[t] = 0.0;
       for (size_t s = 0; s < TERMS; ++s) {
         k->normal[s < t ? t * TERMS + s : s * TERMS + t] = s == t ? 1.0 : 0.0;
       }
-    } else if (isfinite(spread)) {
-      k->normal[t * TERMS + t] += pow(spread, -2.0);
-      k->right[t] -= offset_of(k, t) * pow(spread, -2.0);
-      k->squares += pow(offset_of(k, t) / spread, 2.0);
+    } else if (isfinite(of)) {
+      k->normal[t * TERMS + t] += pow(of, -2.0);
+      k->right[t] -= offset_of(k, t) * pow(of, -2.0);
+      k->squares += pow(offset_of(k, t) / of, 2.0);
     }
   }
 }
@@ -196,8 +162,12 @@ static bool find_step(const supine_patient_krige *k, double damping, double step
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', TERMS, 1, matrix, TERMS, step, TERMS) == 0;
 }
 
-/* Minimise the squares over the law. */
-static supine_status descend(supine_patient_krige *k, supine_error *error) {
+static bool factor_terms(supine_patient_krige *k) {
+  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) == 0;
+}
+
+/* Minimise the squares over the law; false where the rows do not determine it. */
+static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   look(k);
   for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
@@ -205,9 +175,7 @@ static supine_status descend(supine_patient_krige *k, supine_error *error) {
     const double squares = k->squares;
     double step[TERMS];
     if (!isfinite(squares) || !find_step(k, damping, step)) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the points do not determine the law, as if they lay in one plane: "
-                              "give points all over the lungs");
+      return false;
     }
     k->law = moved_by(&before, step);
     look(k);
@@ -221,137 +189,140 @@ static supine_status descend(supine_patient_krige *k, supine_error *error) {
       look(k);
     }
   }
-  return SUPINE_OK;
+  return true;
 }
 
 /* Find the restricted log likelihood of the rows under a sill and a noise, without its constant. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
-  k->options.sill = sill;
-  k->options.noise = noise;
+  k->sill = sill;
+  k->noise = noise;
   double likelihood = -factor(k);
-  if (!isfinite(likelihood) || descend(k, NULL) != SUPINE_OK ||
-      LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) != 0) {
+  if (!isfinite(likelihood) || !descend(k) || !factor_terms(k)) {
     likelihood = -INFINITY;
   }
   for (size_t t = 0; t < TERMS; ++t) {
-    const double spread = spread_of(&k->options, t);
+    const double of = spread_of(k, t);
     likelihood -= log(k->normal[t * TERMS + t]);
-    likelihood -= spread > 0.0 && isfinite(spread) ? log(spread) : 0.0;
+    likelihood -= of > 0.0 && isfinite(of) ? log(of) : 0.0;
   }
   k->law = before;
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the sill, then the noise, of the largest likelihood. */
-static void choose(supine_patient_krige *k) {
-  static const double sills[] = {1.0, 0.03, 0.003, 0.0};
-  static const double noises[] = {1.0, 0.5, 0.25, 1.5, 2.0};
-  static const size_t choices[2] = {sizeof sills / sizeof *sills, sizeof noises / sizeof *noises};
-  const supine_patient_krige_options given = k->options;
-  double best[2] = {given.sill < 0.0 ? sills[0] : given.sill,
-                    given.noise < 0.0 ? noises[0] : given.noise};
+/* Choose the sill, then the noise, of the largest likelihood, where they are not given. */
+static void choose(supine_patient_krige *k, const supine_patient_fit_options *options) {
+  static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
+  static const size_t count[2] = {4, 5};
+  const double given[2] = {options->uncorrected ? 0.0 : options->sill, options->noise};
+  double best[2];
   for (int which = 0; which < 2; ++which) {
+    const bool free = given[which] == 0.0 && !(which == 0 && options->uncorrected);
     double most = -INFINITY;
-    for (size_t i = 0; i < choices[which] && (which == 0 ? given.sill : given.noise) < 0.0; ++i) {
-      const double tried[2] = {which == 0 ? sills[i] : best[0], which == 1 ? noises[i] : best[1]};
-      const double likelihood = likelihood_of(k, tried[0], tried[1]);
+    best[which] = free ? 1.0 : given[which];
+    for (size_t i = 0; i < count[which] && free; ++i) {
+      const double tried = choices[which][i];
+      const double likelihood = which == 0
+                                    ? likelihood_of(k, tried, given[1] > 0.0 ? given[1] : 1.0)
+                                    : likelihood_of(k, best[0], tried);
       if (likelihood > most) {
         most = likelihood;
-        best[which] = tried[which];
+        best[which] = tried;
       }
     }
   }
-  k->options.sill = best[0];
-  k->options.noise = best[1];
+  k->sill = best[0];
+  k->noise = best[1];
 }
 
-/* Fit the law, then the correction of its residual, in units of that law's size. */
-static supine_status fit(supine_patient_krige *k, supine_error *error) {
-  const int n = (int)k->count;
-  choose(k);
-  supine_status status = isnan(factor(k)) ? SUPINE_ERROR_NUMERICAL : descend(k, error);
-  if (status == SUPINE_OK && isnan(factor(k))) {
-    status = SUPINE_ERROR_NUMERICAL;
-  }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status,
-                            "the points do not determine the law, as if they lay in one plane or "
-                            "were not numbers: give points all over the lungs");
-  }
-  look(k);
-  cblas_dcopy(n, k->design + TERMS, WIDTH, k->weight, 1);
-  if (k->options.sill > 0.0) {
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
-  }
-  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) == 0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the points do not determine the law, as if they lay in one plane: "
-                                "give points all over the lungs");
+/* Fit the law without g from the prior's mean. */
+static bool fit_alone(supine_patient_krige *k, bool size_only) {
+  k->sill = 0.0;
+  k->noise = 1.0;
+  k->size_only = size_only;
+  k->law = k->mean;
+  (void)factor(k);
+  const bool right = descend(k);
+  k->size_only = false;
+  k->alone = k->law;
+  return right;
 }
 
-supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
-                                          const supine_patient_row *rows, size_t count,
-                                          supine_patient_krige **krige, supine_error *error) {
-  supine_patient_krige *k = calloc(1, sizeof *k);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (k != NULL) {
-    *k = (supine_patient_krige){
-        .rows = rows, .count = count, .options = *options, .law = options->mean};
-    k->centre = malloc(count * sizeof *k->centre);
-    k->factor = options->sill != 0.0 ? malloc(count * count * sizeof *k->factor) : NULL;
-    k->design = malloc(WIDTH * count * sizeof *k->design);
-    k->weight = malloc(count * sizeof *k->weight);
-  }
-  if (k == NULL || k->centre == NULL || (k->factor == NULL && options->sill != 0.0) ||
-      k->design == NULL || k->weight == NULL) {
-    (void)supine_error_set(error, status, "no memory for %zu rows", count);
-  } else {
-    status = fit(k, error);
-  }
+static supine_status open(supine_patient_krige *k, const supine_patient_fit_options *options,
+                          const supine_patient_row *rows, size_t count, bool corrected,
+                          supine_error *error) {
+  *k = (supine_patient_krige){.rows = rows,
+                              .count = count,
+                              .kind = options->law,
+                              .moved = options->moved,
+                              .mean = supine_patient_deep(options->gravity, options->way),
+                              .centre = malloc(count * sizeof *k->centre),
+                              .factor = corrected ? malloc(count * count * sizeof(double)) : NULL,
+                              .design = malloc(WIDTH * count * sizeof *k->design),
+                              .weight = malloc(count * sizeof *k->weight),
+                              .scratch = malloc(count * sizeof *k->scratch)};
+  return k->centre == NULL || (corrected && k->factor == NULL) || k->design == NULL ||
+                 k->weight == NULL || k->scratch == NULL
+             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count)
+             : SUPINE_OK;
+}
+
+void supine_patient_krige_free(supine_patient_krige *krige) {
+  free(krige->centre);
+  free(krige->factor);
+  free(krige->design);
+  free(krige->weight);
+  free(krige->scratch);
+}
+
+static supine_status undetermined(supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "the points do not determine the law, as if they lay in one plane or "
+                          "were not numbers: give points all over the lungs");
+}
+
+supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
+                                       const supine_patient_row *rows, size_t count,
+                                       supine_patient_krige *krige, supine_error *error) {
+  supine_patient_krige *k = krige;
+  const int n = (int)count;
+  const supine_status status = open(k, options, rows, count, !options->uncorrected, error);
   if (status != SUPINE_OK) {
-    supine_patient_krige_destroy(k);
     return status;
   }
-  *krige = k;
+  bool right = fit_alone(k, true);
+  k->mean = k->law;
+  right = right && (k->kind == SUPINE_PATIENT_DEEP || fit_alone(k, false));
+  if (!right) {
+    return undetermined(error);
+  }
+  k->law = k->mean;
+  choose(k, options);
+  /* Fit the law, then the correction of its residual, in units of that law's size. */
+  right = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
+  look(k);
+  if (!right || !factor_terms(k)) {
+    return undetermined(error);
+  }
+  cblas_dcopy(n, k->design + TERMS, WIDTH, k->weight, 1);
+  if (k->sill > 0.0) {
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
+  }
   return SUPINE_OK;
 }
 
-void supine_patient_krige_destroy(supine_patient_krige *krige) {
-  if (krige != NULL) {
-    free(krige->centre);
-    free(krige->factor);
-    free(krige->design);
-    free(krige->weight);
-    free(krige);
-  }
-}
-
-const supine_patient_power *supine_patient_krige_law(const supine_patient_krige *krige) {
-  return &krige->law;
-}
-
-double supine_patient_krige_sill(const supine_patient_krige *krige) {
-  return krige->options.sill;
-}
-
-double supine_patient_krige_noise(const supine_patient_krige *krige) {
-  return krige->options.noise;
-}
-
-supine_status supine_patient_law_fit(const supine_patient_krige_options *options,
+supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
+                                     const supine_patient_power *mean,
                                      const supine_patient_row *rows, size_t count,
                                      supine_patient_power *law, supine_error *error) {
-  supine_patient_krige_options alone = *options;
-  supine_patient_krige *krige = NULL;
-  alone.sill = 0.0;
-  alone.noise = 1.0;
-  const supine_status status = supine_patient_krige_create(&alone, rows, count, &krige, error);
+  supine_patient_krige k;
+  supine_status status = open(&k, options, rows, count, false, error);
   if (status == SUPINE_OK) {
-    *law = krige->law;
+    k.mean = mean != NULL ? *mean : k.mean;
+    status = fit_alone(&k, mean == NULL) ? SUPINE_OK : undetermined(error);
+    *law = k.law;
   }
-  supine_patient_krige_destroy(krige);
+  supine_patient_krige_free(&k);
   return status;
 }
 
@@ -368,60 +339,61 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
     const size_t c = t < 3 ? 2 * t : exponent ? 2 * (t - 3) + 1 : t;
     double x[TERMS] = {0.0};
     x[t] = exponent ? krige->law.powers[t - 3] : 1.0;
-    error[c] = spread_of(&krige->options, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
+    error[c] = spread_of(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
   }
 }
 
-double supine_patient_krige_predict(const supine_patient_krige *krige,
-                                    const supine_patient_row *row, double *variance,
-                                    double *scratch) {
-  const supine_patient_krige *k = krige;
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
+                                    double *variance) {
+  supine_patient_krige *k = krige;
   const int n = (int)k->count;
   double x[WIDTH];
   double value = supine_patient_power_design(&k->law, row, x) + row->value;
   *variance = 0.0;
-  if (k->options.sill > 0.0) {
-    const supine_patient_centre at = centre_of(&k->law, row);
+  if (k->sill > 0.0) {
+    const supine_patient_centre at = centre_of(&k->law, &row->place);
     for (size_t i = 0; i < k->count; ++i) {
-      scratch[i] = k->sill * supine_dot(row->axis, k->rows[i].axis) *
-                   supine_patient_krige_covariance(&at, &k->centre[i]);
+      k->scratch[i] = k->scaled_sill * supine_dot(row->axis, k->rows[i].axis) *
+                      supine_patient_covariance(&at, &k->centre[i]);
     }
-    value += cblas_ddot(n, scratch, 1, k->weight, 1);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, scratch, 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, WIDTH, scratch, 1, 1.0, x, 1);
-    *variance =
-        k->sill * supine_patient_krige_covariance(&at, &at) - cblas_ddot(n, scratch, 1, scratch, 1);
+    value += cblas_ddot(n, k->scratch, 1, k->weight, 1);
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, k->scratch,
+                1);
+    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, WIDTH, k->scratch, 1, 1.0, x,
+                1);
+    *variance = k->scaled_sill * supine_patient_covariance(&at, &at) -
+                cblas_ddot(n, k->scratch, 1, k->scratch, 1);
   }
   for (size_t t = 0; t < TERMS; ++t) {
-    x[t] = spread_of(&k->options, t) > 0.0 ? x[t] : 0.0;
+    x[t] = spread_of(k, t) > 0.0 ? x[t] : 0.0;
   }
   *variance = fmax(0.0, *variance) + variance_of(k, x);
   return value;
 }
 
-/* Add a row's weight to the last centre where the positions agree, else to a new centre. */
-static void add_centre(const supine_patient_krige *k, size_t i, supine_patient *patient) {
-  supine_patient_correction *c = &patient->correction;
-  const supine_patient_frame *frame = &patient->frame;
-  supine_patient_centre centre = k->centre[i];
-  for (size_t a = 0; a < 3; ++a) {
-    centre.at[a] += 0.5 * (frame->minimum[a] + frame->maximum[a]);
-  }
-  const bool same =
-      c->count > 0 && memcmp(c->centre[c->count - 1].at, centre.at, sizeof centre.at) == 0;
-  if (!same && c->count < SUPINE_PATIENT_CENTRES_MAX) {
-    c->centre[c->count++] = centre;
-  }
-  for (size_t a = 0; a < 3; ++a) {
-    c->centre[c->count - 1].weight[a] += k->sill * k->weight[i] * k->rows[i].axis[a];
-  }
-}
-
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient) {
-  supine_patient_take(&krige->law, patient);
-  for (size_t i = 0; i < krige->count && krige->options.sill > 0.0; ++i) {
-    if (krige->rows[i].weight > 0.0) {
-      add_centre(krige, i, patient);
+  const supine_patient_krige *k = krige;
+  double middle[3];
+  supine_patient_centre_of(&patient->frame, middle);
+  patient->power = k->law;
+  patient->centre_count = 0;
+  for (size_t i = 0; i < k->count && k->sill > 0.0; ++i) {
+    supine_patient_centre centre = k->centre[i];
+    supine_patient_centre *last = patient->centre + patient->centre_count;
+    for (size_t a = 0; a < 3; ++a) {
+      centre.at[a] += middle[a];
+    }
+    if (k->rows[i].weight <= 0.0) {
+      continue;
+    }
+    /* Rows at one place share a centre. */
+    if ((patient->centre_count == 0 || memcmp(last[-1].at, centre.at, sizeof centre.at) != 0) &&
+        patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {
+      ++patient->centre_count;
+      *last++ = centre;
+    }
+    for (size_t a = 0; a < 3; ++a) {
+      last[-1].weight[a] += k->scaled_sill * k->weight[i] * k->rows[i].axis[a];
     }
   }
 }

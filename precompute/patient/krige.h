@@ -11,59 +11,68 @@
 
 #include "precompute/patient/rows.h"
 
-typedef struct supine_patient_krige supine_patient_krige;
+/* Zero-initialised: the deep law, corrected, no motion between the scans. */
+typedef struct supine_patient_fit_options {
+  supine_patient_law law;
+  supine_patient_moved moved;
+  bool uncorrected;  /* leave g out */
+  double gravity[3]; /* of the emptier state; all 0: supine */
+  double way[3];     /* share of full inflation to rest between the states, by axis
+                      * (supine_patient_deep); all 0: 1 */
+  double sill;       /* factor on the covariance of g; 0: the most likely one */
+  double noise;      /* factor on the noise of the rows; 0: the most likely one */
+} supine_patient_fit_options;
 
-/* What is known before the fit. */
-typedef struct supine_patient_krige_options {
-  supine_patient_power mean; /* prior mean of the constants, and start of the search */
-  double spread[3]; /* standard deviations: of lengths, relative; of exponents' logarithms; of
-                       slopes; 0: known */
-  bool shape_kept;  /* if g has its full covariance, fit only the size of the law */
-  supine_patient_moved moved; /* which motion between the scans is fitted */
-  double sill;                /* factor on the covariance of g; 0: no g; below 0: the most likely */
-  double noise;               /* factor on the noise of the rows; below 0: the most likely */
-} supine_patient_krige_options;
+/* A fit. */
+typedef struct supine_patient_krige {
+  const supine_patient_row *rows;
+  size_t count;
+  supine_patient_law kind;
+  supine_patient_moved moved;
+  bool size_only;             /* the law's size and the motion alone are unknown */
+  double sill, noise;         /* factors in use; a sill of 0: no g */
+  supine_patient_power mean;  /* prior mean of the constants */
+  supine_patient_power alone; /* the law fitted without g */
+  supine_patient_power law;
+  double scaled_sill;            /* factor on the covariance of g, for a law of size 1 */
+  supine_patient_centre *centre; /* [count] of each row, with weight 0 */
+  double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
+  double *design;                /* [count, TERMS + 1] whitened derivatives and residual */
+  double *weight;                /* [count] */
+  double *scratch;               /* [count] */
+  double normal[SUPINE_PATIENT_TERMS * SUPINE_PATIENT_TERMS]; /* of the terms, Cholesky-factored */
+  double right[SUPINE_PATIENT_TERMS];
+  double squares; /* squared whitened residual, with the prior's */
+} supine_patient_krige;
 
-/* Give the options for a law whose size is known. `deep` keeps its shape, or varies all
- * constants by 30 % if g is smaller than in other patients; `paper` leaves all constants free. */
-supine_patient_krige_options supine_patient_krige_prior(supine_patient_law law,
-                                                        const supine_patient_power *mean,
-                                                        supine_patient_moved moved);
-
-/* Fit rows; rows of weight 0 are ignored.
- * @param rows  [count], must outlive the fit
+/* Fit the size of the deep law, which is the prior's mean, then the law and g. Where g is smaller
+ * than in other patients, `deep` varies all constants by 30 %; `paper` leaves them free. Rows of
+ * weight 0 are ignored.
+ * @param rows   [count], must outlive the fit
+ * @param krige  freed with supine_patient_krige_free, after a failure too
  * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the law
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_patient_krige_create(const supine_patient_krige_options *options,
-                                          const supine_patient_row *rows, size_t count,
-                                          supine_patient_krige **krige, supine_error *error);
-void supine_patient_krige_destroy(supine_patient_krige *krige);
-
-/* The fitted law, with the given or fitted sill and noise. */
-const supine_patient_power *supine_patient_krige_law(const supine_patient_krige *krige);
-double supine_patient_krige_sill(const supine_patient_krige *krige);
-double supine_patient_krige_noise(const supine_patient_krige *krige);
+supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
+                                       const supine_patient_row *rows, size_t count,
+                                       supine_patient_krige *krige, supine_error *error);
+void supine_patient_krige_free(supine_patient_krige *krige);
 
 /* Compute the standard errors of c1 to c9. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
 /* Predict a row's value, mm.
- * @param variance  of the prediction without noise, mm^2
- * @param scratch   [rows of the fit] */
-double supine_patient_krige_predict(const supine_patient_krige *krige,
-                                    const supine_patient_row *row, double *variance,
-                                    double *scratch);
+ * @param variance  of the prediction without noise, mm^2 */
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
+                                    double *variance);
 
 /* Write law, correction and motion into a patient whose frame is set. */
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
 
-/* Compute the covariance of one axis between two centres, mm^2. */
-double supine_patient_krige_covariance(const supine_patient_centre *a,
-                                       const supine_patient_centre *b);
-
-/* Fit the law alone, without g. */
-supine_status supine_patient_law_fit(const supine_patient_krige_options *options,
+/* Fit a law without g.
+ * @param mean  prior mean of the constants; NULL: fit only the size of the deep law */
+supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
+                                     const supine_patient_power *mean,
                                      const supine_patient_row *rows, size_t count,
                                      supine_patient_power *law, supine_error *error);
 

@@ -5,13 +5,13 @@
 #include <string.h>
 
 #include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics.h>
 
 #include "precompute/patient/matching.h"
 
-#include "precompute/patient/stiffness.h"
-
 #include "precompute/physics/solve.h"
 #include "sh/base/parallel.h"
+#include "sh/base/vec3.h"
 
 enum { GRAIN = 64 };
 
@@ -20,15 +20,6 @@ static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficien
 static const double surface_noise = 0.5; /* mm along the normal */
 static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
 
-/* Find the frame of a surface: its lungs' box and midline. */
-static supine_patient_frame frame_of(const supine_lungs *lungs) {
-  supine_patient_frame frame = {.midline = lungs->midline,
-                                .only_side = lungs->lung_count == 1 ? lungs->side[0] : 0};
-  memcpy(frame.minimum, lungs->minimum, sizeof frame.minimum);
-  memcpy(frame.maximum, lungs->maximum, sizeof frame.maximum);
-  return frame;
-}
-
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   supine_patient_matching *m = context;
@@ -36,26 +27,23 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
     const double *at = m->moved + 3 * i;
     const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
     supine_patient_row *row = &m->rows[i];
-    m->nearest[i] = supine_inside_surface_find(m->tree, at, m->warm ? &m->nearest[i] : NULL);
+    m->nearest[i] = supine_inside_surface_nearest(m->tree, at, m->warm ? &m->nearest[i] : NULL);
     const supine_inside_place *place = &m->nearest[i];
     const uint32_t *corner = m->state->triangles + 3 * place->triangle;
     double normal[3] = {0.0, 0.0, 0.0};
-    double length = 0.0;
     double cosine = 0.0;
-    for (size_t k = 0; k < 3; ++k) {
-      for (size_t v = 0; v < 3; ++v) {
-        normal[k] += place->barycentric[v] * m->state_normals[3 * (size_t)corner[v] + k];
-      }
-      length += normal[k] * normal[k];
+    for (size_t k = 0; k < 9; ++k) {
+      normal[k % 3] +=
+          place->barycentric[k / 3] * m->state_normals[3 * (size_t)corner[k / 3] + k % 3];
     }
-    length = sqrt(length);
+    const double length = supine_length(normal);
     row->value = 0.0;
     m->distance[i] = 0.0;
     for (size_t k = 0; k < 3; ++k) {
       row->axis[k] = length > 0.0 ? normal[k] / length : 0.0;
       row->value += row->axis[k] * (place->nearest[k] - from[k]);
       m->distance[i] += row->axis[k] * (place->nearest[k] - at[k]);
-      cosine += row->axis[k] * m->normals[3 * i + k];
+      cosine += row->axis[k] * m->rest_normals[3 * m->vertex[i] + k];
     }
     row->weight = cosine > compatible ? 1.0 : 0.0;
   }
@@ -92,6 +80,15 @@ double supine_patient_matching_weigh(supine_patient_matching *matching, double s
   return (double)count / (double)m->count;
 }
 
+static void free_chosen(supine_patient_matching *m) {
+  free(m->vertex);
+  free(m->moved);
+  free(m->rows);
+  free(m->distance);
+  free(m->nearest);
+  free(m->space);
+}
+
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const double *stiffness, supine_error *error) {
   supine_patient_matching *m = matching;
@@ -101,30 +98,40 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                               m->caught, NULL, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-    memcpy(m->rows[i].force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
-           sizeof m->rows[i].force);
+    memcpy(m->rows[i].place.force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
+           sizeof m->rows[i].place.force);
   }
   return status;
 }
 
-/* Set up the equilibrium with the model's stiffness, and the columns of the force. */
-static supine_status set_up_forces(supine_patient_matching *m, const supine_model *model,
-                                   supine_error *error) {
+supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
+                                             size_t landmarks, supine_error *error) {
+  supine_patient_matching *m = matching;
   const size_t n = m->rest->mesh.vertex_count;
-  const supine_status status =
-      supine_physics_model_equilibrium(m->rest, model, &m->equilibrium, error);
-  if (status != SUPINE_OK) {
-    return status;
+  m->count = n < most ? n : most;
+  m->landmark_rows_count = 0;
+  m->warm = false;
+  free_chosen(m);
+  m->vertex = malloc(m->count * sizeof *m->vertex);
+  m->moved = malloc(3 * m->count * sizeof(double));
+  m->rows = calloc(m->count + 3 * landmarks, sizeof *m->rows);
+  m->distance = malloc(m->count * sizeof(double));
+  m->nearest = calloc(m->count, sizeof *m->nearest);
+  m->space = malloc(m->count * sizeof(double));
+  if (m->vertex == NULL || m->moved == NULL || m->rows == NULL || m->distance == NULL ||
+      m->nearest == NULL || m->space == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", m->count);
   }
-  for (size_t i = 0; i < n; ++i) {
-    double box[3];
-    supine_lungs_box_coordinates(m->rest, i, box);
-    m->columns[SUPINE_PATIENT_COLUMNS * i] = 1.0;
-    for (size_t k = 0; k < 3; ++k) {
-      m->columns[SUPINE_PATIENT_COLUMNS * i + 1 + k] = box[k] - 0.5;
-    }
+  for (size_t i = 0; i < m->count; ++i) {
+    const size_t v = i * n / m->count;
+    m->vertex[i] = v;
+    m->rows[i].place = supine_patient_find_vertex(m->rest, v);
+    m->rows[i].noise = surface_noise;
+    memcpy(m->rows[i].place.force, m->caught + SUPINE_PATIENT_COLUMNS * v,
+           sizeof m->rows[i].place.force);
+    memcpy(m->moved + 3 * i, m->rest->mesh.vertices + 3 * v, 3 * sizeof(double));
   }
-  return supine_patient_matching_solve(m, model->stiffness, error);
+  return SUPINE_OK;
 }
 
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
@@ -133,39 +140,29 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
                                              supine_error *error) {
   const size_t n = rest->mesh.vertex_count;
   supine_patient_matching *m = matching;
-  double *all = malloc(3 * n * sizeof *all);
   *m = (supine_patient_matching){.rest = rest, .state = state};
-  m->frame = frame_of(rest);
-  m->count = n < most ? n : most;
+  m->frame = supine_patient_frame_of_lungs(rest);
   m->columns = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->caught = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
+  m->rest_normals = malloc(3 * n * sizeof(double));
   m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
-  m->vertex = malloc(m->count * sizeof *m->vertex);
-  m->normals = malloc(3 * m->count * sizeof(double));
-  m->moved = malloc(3 * m->count * sizeof(double));
-  m->rows = calloc(m->count + 3 * landmarks, sizeof *m->rows);
-  m->distance = malloc(m->count * sizeof(double));
-  m->nearest = calloc(m->count, sizeof *m->nearest);
-  m->space = malloc(m->count * sizeof(double));
-  if (all == NULL || m->columns == NULL || m->caught == NULL || m->state_normals == NULL ||
-      m->vertex == NULL || m->normals == NULL || m->moved == NULL || m->rows == NULL ||
-      m->distance == NULL || m->nearest == NULL || m->space == NULL) {
-    free(all);
+  if (m->columns == NULL || m->caught == NULL || m->rest_normals == NULL ||
+      m->state_normals == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  supine_mesh_vertex_normals(&rest->mesh, all);
+  supine_mesh_vertex_normals(&rest->mesh, m->rest_normals);
   supine_mesh_vertex_normals(state, m->state_normals);
-  for (size_t i = 0; i < m->count; ++i) {
-    const size_t v = i * n / m->count;
-    m->vertex[i] = v;
-    memcpy(m->normals + 3 * i, all + 3 * v, 3 * sizeof(double));
-    memcpy(m->moved + 3 * i, rest->mesh.vertices + 3 * v, 3 * sizeof(double));
-    const double side = supine_patient_side_of(rest, v) == 0 ? 1.0 : -1.0;
-    m->rows[i].place = supine_patient_find(&m->frame, rest->mesh.vertices + 3 * v, side);
-    m->rows[i].noise = surface_noise;
+  for (size_t i = 0; i < n; ++i) {
+    const supine_patient_place place = supine_patient_find_vertex(rest, i);
+    memcpy(m->columns + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
   }
-  free(all);
-  const supine_status status = set_up_forces(m, model, error);
+  supine_status status = supine_physics_model_equilibrium(rest, model, &m->equilibrium, error);
+  if (status == SUPINE_OK) {
+    status = supine_patient_matching_solve(m, model->stiffness, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_patient_matching_choose(m, most, landmarks, error);
+  }
   return status != SUPINE_OK ? status
                              : supine_inside_surface_create(state->vertices, state->triangle_count,
                                                             state->triangles, &m->tree, error);
@@ -177,14 +174,9 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_physics_equilibrium_destroy(m->equilibrium);
   free(m->columns);
   free(m->caught);
+  free(m->rest_normals);
   free(m->state_normals);
-  free(m->vertex);
-  free(m->normals);
-  free(m->moved);
-  free(m->rows);
-  free(m->distance);
-  free(m->nearest);
-  free(m->space);
+  free_chosen(m);
 }
 
 void supine_patient_matching_append(supine_patient_matching *matching,
@@ -195,4 +187,36 @@ void supine_patient_matching_append(supine_patient_matching *matching,
   for (size_t i = 0; i < m->landmark_rows_count; ++i) {
     m->rows[m->count + i].weight = (double)m->count / (double)m->landmark_rows_count;
   }
+}
+
+/* Arguments of the pass that moves the vertices. */
+typedef struct placing {
+  supine_patient_matching *m;
+  const supine_patient *patient;
+} placing;
+
+static void place_range(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const placing *w = context;
+  supine_patient_matching *m = w->m;
+  for (size_t i = begin; i < end; ++i) {
+    const supine_patient_place *place = &m->rows[i].place;
+    double u[3];
+    double motion[3];
+    supine_patient_displacement(w->patient, place, u);
+    supine_patient_motion(&w->patient->power, place, motion);
+    m->space[i] = 0.0;
+    for (size_t a = 0; a < 3; ++a) {
+      const double at = m->rest->mesh.vertices[3 * m->vertex[i] + a] + u[a] + motion[a];
+      m->space[i] += pow(at - m->moved[3 * i + a], 2.0);
+      m->moved[3 * i + a] = at;
+    }
+  }
+}
+
+double supine_patient_matching_place(supine_patient_matching *matching,
+                                     const supine_patient *patient) {
+  placing w = {matching, patient};
+  supine_parallel_for(matching->count, GRAIN, 0, place_range, &w);
+  return sqrt(gsl_stats_mean(matching->space, 1, matching->count));
 }

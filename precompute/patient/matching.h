@@ -8,38 +8,40 @@
 #include "precompute/patient/rows.h"
 #include "precompute/physics/model.h"
 
-enum { SUPINE_PATIENT_COLUMNS = 4 }; /* columns of the force: 1, X - 1/2, Y - 1/2, Z - 1/2 */
-
 typedef struct supine_patient_matching {
   const supine_lungs *rest;
   const supine_mesh *state;
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *columns;                 /* [N, SUPINE_PATIENT_COLUMNS] the force before spreading */
-  double *caught;                  /* [N, SUPINE_PATIENT_COLUMNS] the force after spreading */
-  double *state_normals;           /* [state vertices, 3], unit */
-  size_t count;                    /* vertices that take part */
-  size_t *vertex;                  /* [count] indices in the reference surface */
-  double *normals;                 /* [count, 3] of the reference surface */
-  double *moved;                   /* [count, 3] moved by the law */
-  supine_patient_row *rows;        /* [count + 3 landmarks] */
-  double *distance;                /* [count] along the normal, mm */
-  supine_inside_place *nearest;    /* [count] */
-  double *space;                   /* [count] */
-  bool warm;                       /* nearest holds first guesses */
+  double *columns;              /* [N, COLUMNS] of the force before spreading */
+  double *caught;               /* [N, COLUMNS] of the force after spreading */
+  double *rest_normals;         /* [N, 3], unit */
+  double *state_normals;        /* [state vertices, 3], unit */
+  size_t count;                 /* vertices that take part */
+  size_t *vertex;               /* [count] indices in the reference surface */
+  double *moved;                /* [count, 3] moved by the law */
+  supine_patient_row *rows;     /* [count + 3 landmarks] */
+  double *distance;             /* [count] along the normal, mm */
+  supine_inside_place *nearest; /* [count] */
+  double *space;                /* [count] */
+  bool warm;                    /* nearest holds first guesses */
   size_t landmark_rows_count;
 } supine_patient_matching;
 
-/* Set up the vertices of the reference surface, with room for the rows of the landmarks.
- * Zero-initialise before; free even after a failure.
- * @param most  most vertices that take part
+/* Set up the force's columns and `most` vertices of the reference surface, with room for the rows
+ * of the landmarks. Zero-initialise before; free even after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
                                              const supine_model *model, size_t most,
                                              size_t landmarks, supine_patient_matching *matching,
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
+
+/* Let other vertices take part, at most `most`, spread evenly; all rows are new.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
+                                             size_t landmarks, supine_error *error);
 
 /* Spread the force's columns under a stiffness [N] (NULL: 1), into caught and the rows.
  * @retval as the solve */
@@ -49,6 +51,11 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
 /* Append the landmarks' rows, with the same total weight as the surface's rows. */
 void supine_patient_matching_append(supine_patient_matching *matching,
                                     const supine_patient_pairs *landmarks);
+
+/* Move the vertices by the law at their rows, with a correction, and return the RMS change of
+ * their positions, mm. */
+double supine_patient_matching_place(supine_patient_matching *matching,
+                                     const supine_patient *patient);
 
 /* Set row i to the tangent plane of the other surface at the point nearest to the moved vertex
  * i; weight 1, or 0 if the normals are incompatible. */

@@ -28,27 +28,13 @@ static const double part_least = 0.02;
 /* Range of a lung's volume at rest over its full volume. */
 static const double share_least = 0.15, share_most = 0.95;
 
-supine_force_law supine_patient_force(const supine_patient *patient, double gain,
-                                      const double gravity[3]) {
-  supine_force_law law = {.gain = gain, .pair = true};
-  const double *slope = patient->powers + 3;
-  /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
-   * on the side they run along x, opposite in X in the two lungs, so no term of X represents
-   * them. */
-  law.box[0] = slope[0];
-  law.box[1] = slope[1] + gain * gravity[1];
-  law.box[2] = slope[2] + gain * gravity[2];
-  law.base = 1.0 - 0.5 * gain - 0.5 * (law.box[0] + law.box[1] + law.box[2]);
-  return law;
-}
-
 /* --- the path between the states -------------------------------------------------------------- */
 
 /* Find the full volume implied by one of the two states, mL; 0 if unknown. */
-static double full_volume(const supine_patient_record *record, size_t state, double volume,
+static double full_volume(const supine_patient_record *record, size_t state,
                           const supine_resting *resting) {
   const supine_state *of = &record->state[state];
-  const double held = volume > 0.0 ? volume : record->volume[state];
+  const double held = record->volume[state];
   return held <= 0.0 ? 0.0
          : of->volume.kind == SUPINE_VOLUME_FULL
              ? (held - of->volume.ml) / supine_reference_full_share(of->gravity)
@@ -58,8 +44,8 @@ static double full_volume(const supine_patient_record *record, size_t state, dou
 }
 
 static double full_of_either(const supine_patient_record *record, const supine_resting *resting) {
-  const double full = full_volume(record, 0, 0.0, resting);
-  return full > 0.0 ? full : full_volume(record, 1, 0.0, resting);
+  const double full = full_volume(record, 0, resting);
+  return full > 0.0 ? full : full_volume(record, 1, resting);
 }
 
 /* Find each state's part of the way from full inflation (0) to rest (1). */
@@ -108,34 +94,32 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   const work *w = context;
   const supine_patient *patient = &w->record->patient;
   for (size_t i = begin; i < end; ++i) {
-    const size_t lung = i >= w->lungs.lung_begin[1] ? 1 : 0;
     double *at = w->lungs.mesh.vertices + 3 * i;
     double *u = w->moved + 3 * i;
-    double r[3];
     double motion[3];
-    for (int step = 0; step < (w->settle ? SETTLE_STEPS : 1); ++step) {
+    double change = INFINITY;
+    for (int step = 0; step < (w->settle ? SETTLE_STEPS : 1) && change >= settled; ++step) {
       const supine_patient_place place =
-          supine_patient_find(&patient->frame, at, w->lungs.side[lung]);
-      double change = 0.0;
-      supine_patient_law_displacement(patient, &place, u);
-      for (size_t k = 0; k < 3 && w->record->from_surface; ++k) {
-        u[k] *= w->ratio[i];
-      }
-      supine_patient_correct(patient, &place, u, r);
-      supine_patient_motion(patient, at, motion);
-      for (size_t k = 0; k < 3; ++k) {
-        u[k] += r[k];
-        if (w->settle) {
-          const double before = at[k];
-          at[k] = w->scan[3 * i + k] - u[k] - motion[k];
-          change += fabs(at[k] - before);
-        }
-      }
-      if (change < settled) {
-        break;
+          supine_patient_find(&patient->frame, at, supine_patient_side_of(&w->lungs, i));
+      const double spread = w->record->from_surface ? w->ratio[i] : 1.0;
+      supine_patient_direction(&patient->power, &place,
+                               spread * supine_patient_force_at(&patient->power, &place), u);
+      supine_patient_correct(patient, &place, u);
+      supine_patient_motion(&patient->power, &place, motion);
+      change = 0.0;
+      for (size_t k = 0; k < 3 && w->settle; ++k) {
+        const double before = at[k];
+        at[k] = w->scan[3 * i + k] - u[k] - motion[k];
+        change += fabs(at[k] - before);
       }
     }
   }
+}
+
+/* Move the vertices, and the box with them. */
+static void move(work *w) {
+  supine_parallel_for(w->lungs.mesh.vertex_count, GRAIN, 0, move_range, w);
+  supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
 /* Find the force of the fitted posture after spreading over (18), at each vertex. */
@@ -153,10 +137,9 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   const supine_status status =
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
-    supine_patient_place place;
-    supine_lungs_box_coordinates(&w->lungs, i, place.box);
-    ratio[i] =
-        solution.catch_[i] / fmax(force_least, supine_patient_force_at(&record->patient, &place));
+    const supine_patient_place place = supine_patient_find_vertex(&w->lungs, i);
+    ratio[i] = solution.catch_[i] /
+               fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
   }
   supine_physics_solution_free(&solution);
   return status;
@@ -253,14 +236,13 @@ supine_status supine_patient_field_find(const supine_patient_record *record,
   for (size_t i = 0; i < n; ++i) {
     ratio[i] = 1.0;
   }
-  for (int pass = 0; pass < (w.settle ? 3 : 2) && status == SUPINE_OK; ++pass) {
-    if (pass > 0 || w.settle) {
-      supine_parallel_for(n, GRAIN, 0, move_range, &w);
-      supine_mesh_box(&w.lungs.mesh, w.lungs.minimum, w.lungs.maximum);
-    }
-    status = pass < 2 ? find_ratio(&w, stiffness, ratio, error) : SUPINE_OK;
+  if (w.settle) {
+    move(&w);
   }
-
+  for (int pass = 0; pass < (w.settle ? 2 : 1) && status == SUPINE_OK; ++pass) {
+    status = find_ratio(&w, stiffness, ratio, error);
+    move(&w);
+  }
   status = status == SUPINE_OK ? find_way(&w, resting, field->way, error) : status;
   for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
     w.moved[i] /= fmax(force_least, ratio[i / 3]) * field->way[i % 3];
@@ -283,10 +265,9 @@ void supine_patient_field_free(supine_patient_field *field) {
 static void direct(const void *context, const supine_lungs *lungs, double *directions) {
   const supine_patient_field *field = context;
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    supine_patient_place place;
-    supine_lungs_box_coordinates(lungs, i, place.box);
+    const supine_patient_place place = supine_patient_find_vertex(lungs, i);
     const double force =
-        fmax(force_least, supine_patient_force_at(&field->record->patient, &place));
+        fmax(force_least, supine_patient_force_at(&field->record->patient.power, &place));
     for (size_t k = 0; k < 3; ++k) {
       directions[3 * i + k] = -field->moved[3 * i + k] / force;
     }
@@ -300,8 +281,8 @@ void supine_patient_model(const supine_patient_field *field, supine_model *model
   model->direction =
       (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .correct = direct, .context = field};
   for (size_t k = 0; k < 3; ++k) {
-    model->direction.c[2 * k] = -record->patient.lengths[k] / field->way[k];
-    model->direction.c[2 * k + 1] = record->patient.powers[k];
+    model->direction.c[2 * k] = -record->patient.power.lengths[k] / field->way[k];
+    model->direction.c[2 * k + 1] = record->patient.power.powers[k];
   }
 }
 
@@ -355,7 +336,7 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
   for (size_t k = 0; k < 2; ++k) {
     const supine_state *of = &record->state[k];
     const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
-                            ? full_volume(record, 1 - k, 0.0, resting)
+                            ? full_volume(record, 1 - k, resting)
                             : 0.0;
     if (of->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
       continue;
@@ -375,7 +356,7 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
                                 const supine_resting *resting) {
   const supine_state *of = &record->state[state];
   supine_scan scan = {.state = *of};
-  const double full = full_volume(record, 1 - state, 0.0, resting);
+  const double full = full_volume(record, 1 - state, resting);
   scan.known = of->volume.kind == SUPINE_VOLUME_REST || of->volume.kind == SUPINE_VOLUME_FULL;
   if (!scan.known && full > 0.0) {
     scan.known = true;

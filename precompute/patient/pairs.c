@@ -1,58 +1,36 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read matched points. */
-#include <stdint.h>
+/* Read matched points, check whether they can be two states of one chest, and map them. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_statistics.h>
+#include <lapacke.h>
+
 #include "precompute/patient/pairs.h"
 
+#include "mesh/mesh.h"
+#include "runtime/rigid.h"
 #include "sh/base/csv.h"
+#include "sh/base/vec3.h"
 
-enum { COLUMNS = 12, COORDINATES = 6 };
+enum {
+  COLUMNS = 12,
+  COORDINATES = 6,
+  PAIRS_LEAST = 12 /* an affine map needs 4 pairs; three times that */
+};
+
+static const double flattest = 1.0;   /* least RMS distance from the best-fitting plane, mm */
+static const double stillest = 0.05;  /* least RMS motion, mm: below the precision of a landmark */
+static const double size_most = 2.0;  /* largest ratio of sizes: a full breath gives 1.4 */
+static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
+static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
+static const double unmatched = 0.7;  /* largest residual of the affine map over the spread */
+
+/* --- reading --------------------------------------------------------------------------------- */
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
-
-/* A point and its line number, to find duplicates. */
-typedef struct placed {
-  const double *point;
-  size_t line;
-} placed;
-
-static int compare_points(const void *a, const void *b) {
-  const double *p = ((const placed *)a)->point;
-  const double *q = ((const placed *)b)->point;
-  for (int k = 0; k < 3; ++k) {
-    if (p[k] != q[k]) {
-      return p[k] < q[k] ? -1 : 1;
-    }
-  }
-  return 0;
-}
-
-static supine_status refuse_doubles(const char *path, const double *points, const size_t *lines,
-                                    size_t count, supine_error *error) {
-  placed *sorted = malloc(count * sizeof *sorted);
-  if (sorted == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", count);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    sorted[i] = (placed){points + 3 * i, lines[i]};
-  }
-  qsort(sorted, count, sizeof *sorted, compare_points);
-  supine_status status = SUPINE_OK;
-  for (size_t i = 1; i < count && status == SUPINE_OK; ++i) {
-    if (compare_points(&sorted[i - 1], &sorted[i]) == 0) {
-      const double *p = sorted[i].point;
-      status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s: lines %zu and %zu both give the point %g,%g,%g: keep one of them",
-                           path, sorted[i - 1].line, sorted[i].line, p[0], p[1], p[2]);
-    }
-  }
-  free(sorted);
-  return status;
-}
 
 /* Find the six columns of the two points, the one at rest first. */
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
@@ -69,6 +47,27 @@ static supine_status find_columns(const supine_csv *csv, bool reverse, size_t co
     }
   }
   return SUPINE_OK;
+}
+
+/* Append the present row, unless an earlier one gives the same point. */
+static supine_status take_row(const supine_csv *csv, const size_t column[COORDINATES],
+                              supine_patient_pairs *pairs, size_t *lines, supine_error *error) {
+  double *p = pairs->from + 3 * pairs->count;
+  supine_status status = SUPINE_OK;
+  for (size_t k = 0; k < COORDINATES && status == SUPINE_OK; ++k) {
+    double *point = k < 3 ? p : pairs->to + 3 * pairs->count;
+    status = supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error);
+  }
+  for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
+    if (memcmp(pairs->from + 3 * i, p, 3 * sizeof *p) == 0) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "%s: lines %zu and %zu both give the point %g,%g,%g: keep one of them",
+                           csv->path, lines[i], csv->line, p[0], p[1], p[2]);
+    }
+  }
+  lines[pairs->count++] = csv->line;
+  return status;
 }
 
 static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pairs *pairs,
@@ -91,13 +90,12 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
         return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", capacity);
       }
     }
-    for (size_t k = 0; k < COORDINATES && status == SUPINE_OK; ++k) {
-      double *point = (k < 3 ? pairs->from : pairs->to) + 3 * pairs->count;
-      status = supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error);
-    }
-    (*lines)[pairs->count++] = csv->line;
+    status = take_row(csv, column, pairs, *lines, error);
   }
-  return status;
+  return status == SUPINE_OK && pairs->count == 0
+             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: no pairs of points: give one in each line", csv->path)
+             : status;
 }
 
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
@@ -110,19 +108,12 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
     return status;
   }
   status = read_rows(&csv, reverse, &made, &lines, error);
-  if (status == SUPINE_OK && made.count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: no pairs of points: give one in each line", path);
-  }
-  if (status == SUPINE_OK) {
-    status = refuse_doubles(path, made.from, lines, made.count, error);
-  }
   if (status == SUPINE_OK) {
     *pairs = made;
-    made = (supine_patient_pairs){0};
+  } else {
+    supine_patient_pairs_free(&made);
   }
   free(lines);
-  supine_patient_pairs_free(&made);
   supine_csv_close(&csv);
   return status;
 }
@@ -134,8 +125,183 @@ void supine_patient_pairs_free(supine_patient_pairs *pairs) {
   *pairs = (supine_patient_pairs){0};
 }
 
-void supine_patient_pairs_swap(supine_patient_pairs *pairs) {
-  double *from = pairs->from;
-  pairs->from = pairs->to;
-  pairs->to = from;
+/* --- maps ------------------------------------------------------------------------------------ */
+
+void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
+                              double to[3]) {
+  for (int a = 0; a < 3; ++a) {
+    to[a] = map->t[a] + supine_dot(map->m + 3 * a, from);
+  }
+}
+
+bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
+                            const double *to, supine_patient_affinity *map) {
+  double mean[2][3] = {{0.0}};
+  double cross[3][3] = {{0.0}};   /* sum of from_a to_b about the means */
+  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b */
+  double moved[3];
+  bool right = true;
+  *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
+  if (kind == SUPINE_PATIENT_MAP_NONE) {
+    return true;
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    mean[0][k] = gsl_stats_mean(from + k, 3, count);
+    mean[1][k] = gsl_stats_mean(to + k, 3, count);
+  }
+  for (size_t i = 0; i < 9 * count; ++i) {
+    const size_t a = i % 9 / 3;
+    const size_t b = i % 3;
+    const double at = from[i / 9 * 3 + a] - mean[0][a];
+    cross[a][b] += at * (to[i / 9 * 3 + b] - mean[1][b]);
+    scatter[a][b] += at * (from[i / 9 * 3 + b] - mean[0][b]);
+  }
+  if (kind == SUPINE_PATIENT_MAP_SIMILARITY || kind == SUPINE_PATIENT_MAP_RIGID) {
+    const double spread = scatter[0][0] + scatter[1][1] + scatter[2][2];
+    double scale = 0.0;
+    supine_rigid_rotation((const double(*)[3])cross, map->m);
+    for (size_t k = 0; k < 9; ++k) {
+      scale += map->m[k] * cross[k % 3][k / 3] / spread;
+    }
+    for (size_t k = 0; k < 9 && kind == SUPINE_PATIENT_MAP_SIMILARITY; ++k) {
+      map->m[k] *= scale;
+    }
+  } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
+    right = LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 3, scatter[0], 3, cross[0], 3) == 0;
+    for (size_t k = 0; k < 9; ++k) {
+      map->m[k] = cross[k % 3][k / 3];
+    }
+  }
+  supine_patient_map_apply(map, mean[0], moved);
+  for (size_t k = 0; k < 3; ++k) {
+    map->t[k] = mean[1][k] - moved[k];
+  }
+  return right;
+}
+
+double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
+  supine_patient_affinity map;
+  const bool found =
+      supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, pairs->count, pairs->from, pairs->to, &map);
+  const double growth = supine_triple(map.m, map.m + 3, map.m + 6);
+  return found && growth > 0.0 ? growth : 1.0;
+}
+
+/* --- checking -------------------------------------------------------------------------------- */
+
+typedef struct summary {
+  double mean[2][3];
+  double spread[2]; /* RMS distance from the mean, mm */
+  double side[2];   /* longest side of the box, mm */
+  double thinnest;  /* RMS distance of the first points from their best-fitting plane, mm */
+  double turn;      /* best rotation, degrees */
+  double growth;    /* determinant of the best affine map; negative: mirrored */
+  double left;      /* RMS residual of that map, mm */
+  double moved;     /* RMS motion, mm; where it is allowed, less a translation between the scans */
+} summary;
+
+static summary measure(const supine_patient_pairs *pairs, bool moved) {
+  const size_t n = pairs->count;
+  supine_patient_affinity map;
+  double covariance[9];
+  double width[3] = {0.0};
+  summary s = {.left = 0.0};
+  for (size_t i = 0; i < 6; ++i) {
+    const double *points = (i < 3 ? pairs->from : pairs->to) + i % 3;
+    double low;
+    double high;
+    gsl_stats_minmax(&low, &high, points, 3, n);
+    s.side[i / 3] = fmax(s.side[i / 3], high - low);
+    s.mean[i / 3][i % 3] = gsl_stats_mean(points, 3, n);
+    s.spread[i / 3] = hypot(s.spread[i / 3], sqrt(gsl_stats_tss(points, 3, n) / (double)n));
+  }
+  for (size_t k = 0; k < 9; ++k) {
+    covariance[k] = gsl_stats_covariance(pairs->from + k / 3, 3, pairs->from + k % 3, 3, n);
+  }
+  (void)LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'L', 3, covariance, 3, width);
+  s.thinnest = sqrt(fmax(0.0, width[0]));
+  (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_RIGID, n, pairs->from, pairs->to, &map);
+  s.turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (map.m[0] + map.m[4] + map.m[8] - 1.0)))) * 180.0 /
+           3.14159265358979323846;
+  (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, n, pairs->from, pairs->to, &map);
+  s.growth = supine_triple(map.m, map.m + 3, map.m + 6);
+  for (size_t i = 0; i < n; ++i) {
+    double at[3];
+    supine_patient_map_apply(&map, pairs->from + 3 * i, at);
+    for (size_t k = 0; k < 3; ++k) {
+      const double shift = moved ? s.mean[1][k] - s.mean[0][k] : 0.0;
+      s.left += pow(pairs->to[3 * i + k] - at[k], 2.0) / (double)n;
+      s.moved += pow(pairs->to[3 * i + k] - pairs->from[3 * i + k] - shift, 2.0) / (double)n;
+    }
+  }
+  s.left = sqrt(s.left);
+  s.moved = sqrt(s.moved);
+  return s;
+}
+
+/* Over 60 lines: a sequence of independent checks, each with its message. */
+supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
+                                         supine_error *error) {
+  if (pairs->count < PAIRS_LEAST) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%zu pairs of points determine no law: give at least %d, spread over "
+                            "both lungs",
+                            pairs->count, PAIRS_LEAST);
+  }
+  const summary s = measure(pairs, moved);
+  for (int state = 0; state < 2; ++state) {
+    const char *unit = NULL;
+    if (!supine_mesh_unit_is_likely(s.side[state], &unit)) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "the points %s extend over %.3g: no lung in mm%s%s; landmarks are in "
+                              "mm, spread over the lungs",
+                              state == 0 ? "at rest" : "of the other state", s.side[state],
+                              unit == NULL ? "" : ", but one in ", unit == NULL ? "" : unit);
+    }
+  }
+  const double size = s.spread[1] / s.spread[0];
+  if (size > size_most || size < 1.0 / size_most) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the other state is %.3g times as large as rest: are both in mm?",
+                            size);
+  }
+  if (s.thinnest < flattest) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "all points lie within %.2g mm of one plane: landmarks must spread "
+                            "over the lungs",
+                            s.thinnest);
+  }
+  if (s.left > unmatched * s.spread[1]) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the pairs do not match: the best affine map leaves %.0f mm RMS; are "
+                            "both lists in the same order?",
+                            s.left);
+  }
+  if (s.growth < 0.0) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "one state is the mirror image of the other: one of them has an axis "
+                            "reversed (landmarks are LPS: x to the left, y to the back, z to the "
+                            "head)");
+  }
+  if (s.turn > turn_most) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "one state is turned by %.0f degrees against the other: they are in "
+                            "different axes (landmarks are LPS: x to the left, y to the back, z "
+                            "to the head)",
+                            s.turn);
+  }
+  const double apart = supine_distance(s.mean[0], s.mean[1]);
+  if (!moved && apart > apart_most * s.spread[0]) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the two states are %.0f mm apart: different frames? --translation or "
+                            "--rigid finds the motion between two scans",
+                            apart);
+  }
+  if (s.moved < stillest) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the other state is the same as rest (%.2g mm RMS%s): there is "
+                            "nothing to fit",
+                            s.moved, moved ? " beside a translation" : "");
+  }
+  return SUPINE_OK;
 }

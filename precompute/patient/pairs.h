@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Matched points of one person in two states. */
+ * Matched points of one person in two states, and maps without a law between them. */
 #ifndef SUPINE_PATIENT_PAIRS_H
 #define SUPINE_PATIENT_PAIRS_H
 
@@ -25,15 +25,11 @@ typedef struct supine_patient_pairs {
  * @param pairs    zero-initialised; written only on success
  * @retval SUPINE_ERROR_READ    missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  no such columns, a number that is not finite (line named), no
- *   pairs,
- *                              a duplicate point (both lines named)
+ *                              pairs, a duplicate point (both lines named)
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
-
-/** Swap the two states. */
-void supine_patient_pairs_swap(supine_patient_pairs *pairs);
 
 /** Compute the volume ratio of the other state to rest: the determinant of the best affine map.
  * @return 1 if the points determine none */
@@ -42,12 +38,33 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 /** Check by the best affine map that the pairs can be two states of one chest.
  *
  * @param moved  the fit allows a motion between the scans (translation, rotation)
- * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, all in one plane, units that differ or
- *   cannot
+ * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, all in one plane, units that differ or cannot
  *                              be mm, sides or axes that differ, frames that do not overlap (unless
- *                              moved), no motion
- * @retval SUPINE_ERROR_MEMORY */
+ *                              moved), no motion */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
                                          supine_error *error);
+
+/** A prediction, and its baselines: maps of one state fitted to the other. */
+typedef enum supine_patient_map {
+  SUPINE_PATIENT_MAP_PREDICTED = 0,
+  SUPINE_PATIENT_MAP_NONE,
+  SUPINE_PATIENT_MAP_TRANSLATION,
+  SUPINE_PATIENT_MAP_SIMILARITY, /**< rotation, translation and scale */
+  SUPINE_PATIENT_MAP_AFFINE,
+  SUPINE_PATIENT_MAP_COUNT,
+  SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT /**< not among the baselines */
+} supine_patient_map;
+
+/** x -> m x + t, row by row. */
+typedef struct supine_patient_affinity {
+  double m[9], t[3];
+} supine_patient_affinity;
+
+/** Fit the map of a kind that brings points [count, 3] nearest to others, by least squares.
+ * @return false where an affine map is asked for and the points do not determine it */
+bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
+                            const double *to, supine_patient_affinity *map);
+void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
+                              double to[3]);
 
 #endif

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Evaluate a patient's law. */
 #include <math.h>
+#include <string.h>
 
-#include "precompute/patient/krige.h"
 #include "precompute/patient/patient.h"
+
+#include "precompute/physics/model.h"
+#include "runtime/kriging.h"
 #include "sh/base/vec3.h"
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
@@ -12,20 +15,32 @@ const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"dee
  * landmarks are 5 to 15 mm inside. */
 static const double landmark_margin = 10.0;
 
+static double inside(double box) {
+  return fmin(1.0, fmax(0.0, box));
+}
+
+void supine_patient_centre_of(const supine_patient_frame *frame, double centre[3]) {
+  for (int k = 0; k < 3; ++k) {
+    centre[k] = 0.5 * (frame->minimum[k] + frame->maximum[k]);
+  }
+}
+
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side) {
-  supine_patient_place place;
+  supine_patient_place place = {.force = {1.0}};
+  double centre[3];
   place.side = frame->only_side != 0       ? frame->only_side
                : side != 0.0               ? side
                : point[0] > frame->midline ? 1.0
                                            : -1.0;
   const double outer = place.side > 0.0 ? frame->maximum[0] : frame->minimum[0];
-  place.box[0] = (point[0] - frame->midline) / (outer - frame->midline);
-  for (int k = 1; k < 3; ++k) {
-    place.box[k] = (frame->maximum[k] - point[k]) / (frame->maximum[k] - frame->minimum[k]);
-  }
+  supine_patient_centre_of(frame, centre);
   for (int k = 0; k < 3; ++k) {
-    place.arm[k] = point[k] - 0.5 * (frame->minimum[k] + frame->maximum[k]);
+    place.box[k] = k == 0
+                       ? (point[0] - frame->midline) / (outer - frame->midline)
+                       : (frame->maximum[k] - point[k]) / (frame->maximum[k] - frame->minimum[k]);
+    place.arm[k] = point[k] - centre[k];
+    place.force[1 + k] = inside(place.box[k]) - 0.5;
   }
   return place;
 }
@@ -42,79 +57,109 @@ supine_patient_frame supine_patient_frame_of_points(size_t count, const double *
   return frame;
 }
 
-void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]) {
+supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs) {
+  supine_patient_frame frame = {.midline = lungs->midline,
+                                .only_side = lungs->lung_count == 1 ? lungs->side[0] : 0};
+  memcpy(frame.minimum, lungs->minimum, sizeof frame.minimum);
+  memcpy(frame.maximum, lungs->maximum, sizeof frame.maximum);
+  return frame;
+}
+
+int supine_patient_side_of(const supine_lungs *lungs, size_t vertex) {
+  return lungs->side[lungs->lung_count == 2 && vertex >= lungs->lung_begin[1] ? 1 : 0];
+}
+
+supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex) {
+  const supine_patient_frame frame = supine_patient_frame_of_lungs(lungs);
+  return supine_patient_find(&frame, lungs->mesh.vertices + 3 * vertex,
+                             supine_patient_side_of(lungs, vertex));
+}
+
+supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_patient_power law = {.motion = {0.0}};
+  const double *g = supine_length(gravity) > 0.0 ? gravity : supine;
+  for (size_t k = 0; k < 3; ++k) {
+    law.lengths[k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
+    law.powers[k] = model.direction.c[2 * k + 1];
+    /* With gravity along +y the heights fall along Y, along +z they fall along Z (lungs.h). */
+    law.powers[3 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
+  }
+  return law;
+}
+
+void supine_patient_constants(const supine_patient_power *power,
+                              double c[SUPINE_PATIENT_CONSTANTS]) {
   for (size_t a = 0; a < 3; ++a) {
-    c[2 * a] = patient->lengths[a];
-    c[2 * a + 1] = patient->powers[a];
-    c[6 + a] = patient->powers[3 + a];
+    c[2 * a] = power->lengths[a];
+    c[2 * a + 1] = power->powers[a];
+    c[6 + a] = power->powers[3 + a];
   }
 }
 
-static double inside(double box) {
-  return fmin(1.0, fmax(0.0, box));
+double supine_patient_force_at(const supine_patient_power *power,
+                               const supine_patient_place *place) {
+  return place->force[0] + supine_dot(power->powers + 3, place->force + 1); /* (18) */
 }
 
-double supine_patient_force_at(const supine_patient *patient, const supine_patient_place *place) {
-  double force = 1.0;
-  for (int k = 0; k < 3; ++k) {
-    force += patient->powers[3 + k] * (inside(place->box[k]) - 0.5); /* (18) */
-  }
-  return force;
-}
-
-void supine_patient_direction(const supine_patient *patient, const supine_patient_place *place,
-                              double d[3]) {
+void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
+                              double force, double d[3]) {
   for (int k = 0; k < 3; ++k) { /* (15)-(17) */
-    d[k] = (k == 0 ? place->side : -1.0) * patient->lengths[k] *
-           pow(inside(place->box[k]), patient->powers[k]);
+    d[k] = force * (k == 0 ? place->side : -1.0) * power->lengths[k] *
+           pow(inside(place->box[k]), power->powers[k]);
   }
 }
 
-void supine_patient_law_displacement(const supine_patient *patient,
-                                     const supine_patient_place *place, double u[3]) {
-  const double force = supine_patient_force_at(patient, place);
-  supine_patient_direction(patient, place, u);
+void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
+                           double u[3]) {
+  supine_cross(power->motion + 3, place->arm, u);
   for (int k = 0; k < 3; ++k) {
-    u[k] *= force;
+    u[k] += power->motion[k];
   }
+}
+
+double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b) {
+  supine_kriging_point p = {.size = a->size, .lung = a->side > 0.0 ? 0U : 1U};
+  supine_kriging_point q = {.size = b->size, .lung = b->side > 0.0 ? 0U : 1U};
+  memcpy(p.position, a->at, sizeof p.position);
+  memcpy(q.position, b->at, sizeof q.position);
+  return supine_kriging_covariance(&supine_kriging_default, &p, &q);
 }
 
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            const double u[3], double r[3]) {
-  const supine_patient_correction *correction = &patient->correction;
-  const supine_patient_frame *frame = &patient->frame;
+                            double u[3]) {
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
-  r[0] = r[1] = r[2] = 0.0;
+  supine_patient_centre_of(&patient->frame, here.at);
   for (int k = 0; k < 3; ++k) {
-    here.at[k] = place->arm[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
+    here.at[k] += place->arm[k];
   }
-  for (size_t i = 0; i < correction->count; ++i) {
-    const supine_patient_centre *centre = &correction->centre[i];
-    const double covariance = supine_patient_krige_covariance(&here, centre);
+  for (size_t i = 0; i < patient->centre_count; ++i) {
+    const supine_patient_centre *centre = &patient->centre[i];
+    const double covariance = supine_patient_covariance(&here, centre);
     for (int k = 0; k < 3; ++k) {
-      r[k] += covariance * centre->weight[k];
+      u[k] += covariance * centre->weight[k];
     }
   }
 }
 
-void supine_patient_displacement(const supine_patient *patient, const double point[3], double side,
+void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double u[3]) {
-  const supine_patient_place place = supine_patient_find(&patient->frame, point, side);
-  double r[3];
-  supine_patient_law_displacement(patient, &place, u);
-  supine_patient_correct(patient, &place, u, r);
-  for (int k = 0; k < 3; ++k) {
-    u[k] += r[k];
-  }
+  supine_patient_direction(&patient->power, place, supine_patient_force_at(&patient->power, place),
+                           u);
+  supine_patient_correct(patient, place, u);
 }
 
-void supine_patient_motion(const supine_patient *patient, const double point[3], double u[3]) {
-  const double *t = patient->motion;
-  const double *w = patient->motion + 3;
-  const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
-  for (int a = 0; a < 3; ++a) {
-    const int b = (a + 1) % 3;
-    const int c = (a + 2) % 3;
-    u[a] = t[a] + w[b] * place.arm[c] - w[c] * place.arm[b];
-  }
+supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
+                                      const double gravity[3]) {
+  supine_force_law law = {.gain = gain, .pair = true};
+  const double *slope = power->powers + 3;
+  /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
+   * on the side they run along x, opposite in X in the two lungs, so no term of X represents
+   * them. */
+  law.box[0] = slope[0];
+  law.box[1] = slope[1] + gain * gravity[1];
+  law.box[2] = slope[2] + gain * gravity[2];
+  law.base = 1.0 - 0.5 * gain - 0.5 * (law.box[0] + law.box[1] + law.box[2]);
+  return law;
 }

@@ -17,7 +17,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "precompute/patient/pairs.h"
+#include "precompute/lungs/lungs.h"
+#include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
   SUPINE_PATIENT_DEEP = 0,
@@ -28,6 +29,13 @@ typedef enum supine_patient_law {
 /** "deep", "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
+/** Motion between the scans, which is fitted with the law. */
+typedef enum supine_patient_moved {
+  SUPINE_PATIENT_STILL = 0,
+  SUPINE_PATIENT_TRANSLATION,
+  SUPINE_PATIENT_RIGID
+} supine_patient_moved;
+
 /** The box of the fuller state, mm. */
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
@@ -36,10 +44,18 @@ typedef struct supine_patient_frame {
 } supine_patient_frame;
 
 enum {
-  SUPINE_PATIENT_POWERS = 6, /**< c2, c4, c6, c7, c8, c9: nonlinear parameters */
   SUPINE_PATIENT_CONSTANTS = 9,
+  SUPINE_PATIENT_COLUMNS = 4, /**< of the force: 1, X - 1/2, Y - 1/2, Z - 1/2 */
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
+
+/** The constants of a law, and the motion between the scans. */
+typedef struct supine_patient_power {
+  double powers[6];  /**< c2, c4, c6, c7, c8, c9 */
+  double lengths[3]; /**< c1, c3, c5, mm; negative if the lung empties */
+  double motion[6];  /**< translation (mm), small rotation (rad) about the box's centre;
+                        u + motion is what was measured */
+} supine_patient_power;
 
 /** A kernel of the correction. */
 typedef struct supine_patient_centre {
@@ -49,31 +65,30 @@ typedef struct supine_patient_centre {
   double weight[3]; /**< 1/mm */
 } supine_patient_centre;
 
-typedef struct supine_patient_correction {
-  size_t count; /**< 0: none */
-  supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
-} supine_patient_correction;
-
 typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
-  double powers[SUPINE_PATIENT_POWERS]; /**< c2, c4, c6, c7, c8, c9 */
-  double lengths[3];                    /**< c1, c3, c5, mm; negative if the lung empties */
-  double motion[6]; /**< between the scans: translation (mm), small rotation (rad) about the box's
-                       centre; u + motion is what was measured */
-  supine_patient_correction correction;
+  supine_patient_power power;
+  size_t centre_count; /**< 0: no correction */
+  supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
 
 /** A point in the coordinates of the laws. */
 typedef struct supine_patient_place {
-  double box[3]; /**< X, Y, Z; 0 to 1 inside */
-  double side;   /**< +1 left, -1 right */
-  double arm[3]; /**< from the box's centre, mm */
+  double box[3];                        /**< X, Y, Z; 0 to 1 inside */
+  double side;                          /**< +1 left, -1 right */
+  double arm[3];                        /**< from the box's centre, mm */
+  double force[SUPINE_PATIENT_COLUMNS]; /**< the columns here; of a surface, after spreading */
 } supine_patient_place;
 
-/** @param side  of the point's lung, +1 or -1; 0: by the midline */
+/** Find a point's place; its force is not spread, and keeps the value at the nearest face outside
+ * the box.
+ * @param side  of the point's lung, +1 or -1; 0: by the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
+
+/** Compute the centre of a frame, mm. */
+void supine_patient_centre_of(const supine_patient_frame *frame, double centre[3]);
 
 /** Make a frame from points: their box, 10 mm larger on every side, as lungs extend beyond
  * landmarks.
@@ -81,31 +96,50 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline);
 
-/** Compute the nine constants, the force scaled to 1 at the box's centre. */
-void supine_patient_constants(const supine_patient *patient, double c[SUPINE_PATIENT_CONSTANTS]);
+/** Make the frame of a surface: its lungs' box and midline. */
+supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs);
 
-/** Compute (18) of the law at a place; outside the box, the value at the nearest face. */
-double supine_patient_force_at(const supine_patient *patient, const supine_patient_place *place);
+/** Find the side of a vertex: 1 left, -1 right. */
+int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 
-/** Compute (15)-(17) of the law at a place, without the force, mm. */
-void supine_patient_direction(const supine_patient *patient, const supine_patient_place *place,
-                              double d[3]);
+/** Find the place of a vertex in the box of its own lungs. */
+supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
-/** Compute the law's displacement at a place, mm, without the correction and the motion. */
-void supine_patient_law_displacement(const supine_patient *patient,
-                                     const supine_patient_place *place, double u[3]);
+/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine). `way`
+ * scales its lengths along x, y and z by the share of full inflation to rest between the two
+ * states (all 0: 1). */
+supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
 
-/** Compute the correction at a place, mm.
- * @param u  the law's displacement there, mm */
+/** Give the nine constants in their order, the force scaled to 1 at the box's centre. */
+void supine_patient_constants(const supine_patient_power *power,
+                              double c[SUPINE_PATIENT_CONSTANTS]);
+
+/** Compute (18) of the law at a place. */
+double supine_patient_force_at(const supine_patient_power *power,
+                               const supine_patient_place *place);
+
+/** Compute (15)-(17) of the law at a place, mm, times a force. */
+void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
+                              double force, double d[3]);
+
+/** Compute the motion between the scans at a place, mm. */
+void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
+                           double u[3]);
+
+/** Compute the covariance of the correction along one axis between two centres, mm^2. */
+double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b);
+
+/** Add the correction at a place to the law's displacement u there, mm. */
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            const double u[3], double r[3]);
+                            double u[3]);
 
-/** Compute the displacement u of a point, mm, less the motion between the scans.
- * @param side  as supine_patient_find */
-void supine_patient_displacement(const supine_patient *patient, const double point[3], double side,
+/** Compute the displacement u at a place, mm, less the motion between the scans. */
+void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double u[3]);
 
-/** Compute the motion between the scans at a point, mm. */
-void supine_patient_motion(const supine_patient *patient, const double point[3], double u[3]);
+/** Compute the force of a patient's law, whose slopes turn with gravity by the share `gain`. In
+ * the fitted posture the field does not depend on the gain. */
+supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
+                                      const double gravity[3]);
 
 #endif

@@ -12,9 +12,45 @@
 #include "sh/base/output.h"
 
 static const char format[] = "supine-patient";
-enum { VERSION = 2, CENTRE = 8 };
+enum { VERSION = 2, CENTRE = sizeof(supine_patient_centre) / sizeof(double) };
 
-static json_t *numbers(const double *values, size_t count) {
+/* Numbers of a record: the key of their object (NULL: the root), their own, how many, and where. */
+typedef struct numbers {
+  const char *group, *key;
+  size_t count; /* 1: no array */
+  size_t offset;
+} numbers;
+
+#define AT(member) offsetof(supine_patient_record, member)
+
+/* All are written, and must be there when read. */
+static const numbers table[] = {{NULL, "points", 1, AT(points)},
+                                {NULL, "held_out_rms_mm", 1, AT(held_out)},
+                                {NULL, "held_out_baseline_mm", 1, AT(held_out_baseline)},
+                                {NULL, "expected_rms_mm", 1, AT(expected)},
+                                {NULL, "band_95_percent_holds", 1, AT(band)},
+                                {NULL, "fitted_rms_mm", 1, AT(fitted)},
+                                {NULL, "explained_percent", 1, AT(explained)},
+                                {"frame", "minimum_mm", 3, AT(patient.frame.minimum)},
+                                {"frame", "maximum_mm", 3, AT(patient.frame.maximum)},
+                                {"frame", "midline_mm", 1, AT(patient.frame.midline)},
+                                {"emptier_frame", "minimum_mm", 3, AT(emptier[0])},
+                                {"emptier_frame", "maximum_mm", 3, AT(emptier[1])},
+                                {"fuller", "volume_ml", 1, AT(volume[0])},
+                                {"emptier", "volume_ml", 1, AT(volume[1])},
+                                {NULL, "reach_mm", 1, AT(reach)},
+                                {"force", "base", 1, AT(force.base)},
+                                {"force", "gain", 1, AT(force.gain)},
+                                {"force", "box", 3, AT(force.box)},
+                                {"motion", "translation_mm", 3, AT(patient.power.motion[0])},
+                                {"motion", "rotation_rad", 3, AT(patient.power.motion[3])},
+                                {NULL, "lengths_mm", 3, AT(patient.power.lengths)},
+                                {NULL, "powers", 6, AT(patient.power.powers)},
+                                {NULL, "expected_constant_mm", 1, AT(expected_constant)}};
+
+/* --- writing --------------------------------------------------------------------------------- */
+
+static json_t *array_of(const double *values, size_t count) {
   json_t *array = json_array();
   for (size_t i = 0; i < count; ++i) {
     (void)json_array_append_new(array, json_real(values[i]));
@@ -22,64 +58,44 @@ static json_t *numbers(const double *values, size_t count) {
   return array;
 }
 
-static json_t *state(const supine_patient_record *record, size_t k) {
-  char text[SUPINE_PATIENT_STATE_TEXT];
-  (void)supine_state_print(&record->state[k], text, sizeof text);
-  return json_pack("{s:s, s:f}", "state", text, "volume_ml", record->volume[k]);
-}
-
-static const char *side_name(int side) {
-  return side > 0 ? "left" : side < 0 ? "right" : "both";
-}
-
-static json_t *scores(const supine_patient_scores *of) {
-  return json_pack("{s:f, s:f, s:f, s:f, s:f}", "none", of->none, "translation", of->translation,
-                   "affine", of->affine, "law", of->law, "corrected", of->corrected);
-}
-
-/* Encode the centres, seven numbers each: place, side, size and weights. */
-static json_t *correction(const supine_patient_correction *of) {
-  json_t *all = json_array();
-  for (size_t i = 0; i < of->count; ++i) {
-    const supine_patient_centre *c = &of->centre[i];
-    const double values[CENTRE] = {c->at[0], c->at[1],     c->at[2],     c->side,
-                                   c->size,  c->weight[0], c->weight[1], c->weight[2]};
-    (void)json_array_append_new(all, numbers(values, CENTRE));
+/* Find an object of the root, or make it. */
+static json_t *group_of(json_t *root, const char *key) {
+  if (key != NULL && json_object_get(root, key) == NULL) {
+    (void)json_object_set_new(root, key, json_object());
   }
-  return json_pack("{s:o}", "centres", all);
+  return key != NULL ? json_object_get(root, key) : root;
 }
 
-static void add_report(json_t *root, const supine_patient *patient,
-                       const supine_patient_fit_report *report) {
+static json_t *state_text(const supine_state *state) {
+  char text[SUPINE_PATIENT_STATE_TEXT];
+  (void)supine_state_print(state, text, sizeof text);
+  return json_string(text);
+}
+
+static const char *const sides[3] = {"right", "both", "left"};
+
+static void add_report(json_t *root, const supine_patient_record *record) {
   static const char *const names[SUPINE_PATIENT_CONSTANTS] = {"c1", "c2", "c3", "c4", "c5",
                                                               "c6", "c7", "c8", "c9"};
+  const supine_patient_fit_report *report = &record->report;
   double c[SUPINE_PATIENT_CONSTANTS];
-  json_t *constants = json_object();
-  supine_patient_constants(patient, c);
-  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && patient->law == SUPINE_PATIENT_PAPER; ++k) {
+  json_t *constants = group_of(root, "paper_constants");
+  supine_patient_constants(&record->patient.power, c);
+  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && record->patient.law == SUPINE_PATIENT_PAPER;
+       ++k) {
     (void)json_object_set_new(
         constants, names[k],
         json_pack("{s:f, s:f}", "value", c[k], "standard_error", report->error[k]));
   }
-  (void)json_object_set_new(root, "paper_constants", constants);
-  (void)json_object_set_new(root, "fitted", scores(&report->fitted));
-  (void)json_object_set_new(root, "held_out", scores(&report->held_out));
+  for (size_t k = 0; k < SUPINE_PATIENT_SCORES; ++k) {
+    (void)json_object_set_new(group_of(root, "fitted"), supine_patient_score_names[k],
+                              json_real(report->fitted[k]));
+    (void)json_object_set_new(group_of(root, "held_out"), supine_patient_score_names[k],
+                              json_real(report->held_out[k]));
+  }
   (void)json_object_set_new(root, "blocks", json_integer((json_int_t)report->blocks));
   (void)json_object_set_new(root, "explained_fitted_percent",
                             json_real(100.0 * report->explained_fitted));
-}
-
-static const char *const sides[2] = {"left", "right"};
-
-static json_t *modes(const supine_patient_stiffness *stiffness, size_t side) {
-  json_t *all = json_array();
-  for (size_t k = 0; k < stiffness->count[side]; ++k) {
-    const supine_patient_mode *mode = &stiffness->mode[side][k];
-    (void)json_array_append_new(
-        all, json_pack("{s:f, s:f, s:o, s:f}", "expandability", mode->value, "seen", mode->seen,
-                       "centre_mm", numbers(mode->centre, 3), "radius_mm", mode->radius));
-  }
-  return all;
 }
 
 static json_t *expandability(const supine_patient_record *record) {
@@ -88,14 +104,20 @@ static json_t *expandability(const supine_patient_record *record) {
   if (report->tried) {
     (void)json_object_update_new(
         of, json_pack("{s:b, s:o, s:o, s:f, s:f}", "kept", report->kept ? 1 : 0,
-                      "fitted_without_and_with_mm", numbers(report->fitted, 2),
-                      "held_out_without_and_with_mm", numbers(report->held_out, 2), "softest",
+                      "fitted_without_and_with_mm", array_of(report->fitted, 2),
+                      "held_out_without_and_with_mm", array_of(report->held_out, 2), "softest",
                       report->softest, "stiffest", report->stiffest));
   }
-  for (size_t k = 0; k < 2; ++k) {
-    if (record->stiffness.count[k] > 0) {
-      (void)json_object_set_new(of, sides[k], modes(&record->stiffness, k));
+  for (size_t k = 0; k < record->stiffness.count; ++k) {
+    const supine_patient_mode *mode = &record->stiffness.mode[k];
+    const char *side = sides[1 + mode->side];
+    if (json_object_get(of, side) == NULL) {
+      (void)json_object_set_new(of, side, json_array());
     }
+    (void)json_array_append_new(json_object_get(of, side),
+                                json_pack("{s:f, s:f, s:o, s:f}", "expandability", mode->value,
+                                          "seen", mode->seen, "centre_mm",
+                                          array_of(mode->centre, 3), "radius_mm", mode->radius));
   }
   return of;
 }
@@ -103,56 +125,43 @@ static json_t *expandability(const supine_patient_record *record) {
 static json_t *applied(const supine_patient_applied *of) {
   return json_pack("{s:i, s:f, s:f, s:o, s:f, s:f}", "blocks", (int)of->blocks, "matched_percent",
                    100.0 * of->matched, "correlation_with_height", of->correlation, "c7_to_c9",
-                   numbers(of->slopes, 3), "left_rms", of->left, "spread_rms", of->spread);
+                   array_of(of->slopes, 3), "left_rms", of->left, "spread_rms", of->spread);
 }
 
 static json_t *further(const supine_patient_record *record) {
   json_t *all = json_array();
   for (size_t k = 0; k < record->told_count; ++k) {
     const supine_patient_told *told = &record->told[k];
-    char text[SUPINE_PATIENT_STATE_TEXT];
-    (void)supine_state_print(&told->state, text, sizeof text);
-    (void)json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f}", "state", text, "scale",
-                                               told->scale, "left_rms_mm", told->left,
-                                               "left_without_gain_mm", told->left_without));
+    (void)json_array_append_new(all,
+                                json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&told->state),
+                                          "scale", told->scale, "left_rms_mm", told->left,
+                                          "left_without_gain_mm", told->left_without));
   }
   return all;
 }
 
-bool supine_patient_is_uneven(const supine_patient_record *record) {
-  return record->stiffness.count[0] > 0 || record->stiffness.count[1] > 0;
-}
-
-static json_t *encode(const supine_patient_record *record, const supine_patient_fit_report *report,
-                      const char *made_by) {
+static json_t *encode(const supine_patient_record *record, const char *made_by) {
   const supine_patient *patient = &record->patient;
-  const supine_patient_frame *frame = &patient->frame;
-  json_t *root = json_pack(
-      "{s:s, s:i, s:s, s:s, s:i, s:f, s:f, s:f, s:f, s:f, s:f, s:{s:o, s:o, s:f, s:s, s:s}, "
-      "s:{s:o, s:o}, s:o, s:o, s:f}",
-      "format", format, "version", VERSION, "name", record->name, "law",
-      supine_patient_law_names[patient->law], "points", (int)record->points, "held_out_rms_mm",
-      record->held_out, "held_out_baseline_mm", record->held_out_baseline, "expected_rms_mm",
-      record->expected, "band_95_percent_holds", 100.0 * record->band, "fitted_rms_mm",
-      record->fitted, "explained_percent", 100.0 * record->explained, "frame", "minimum_mm",
-      numbers(frame->minimum, 3), "maximum_mm", numbers(frame->maximum, 3), "midline_mm",
-      frame->midline, "lungs", side_name(frame->only_side), "of",
-      record->from_surface ? "surface" : "landmarks", "emptier_frame", "minimum_mm",
-      numbers(record->emptier[0], 3), "maximum_mm", numbers(record->emptier[1], 3), "fuller",
-      state(record, 0), "emptier", state(record, 1), "reach_mm", record->reach);
+  json_t *centres = json_array();
+  json_t *root = json_pack("{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}}",
+                           "format", format, "version", VERSION, "name", record->name, "law",
+                           supine_patient_law_names[patient->law], "frame", "lungs",
+                           sides[1 + patient->frame.only_side], "of",
+                           record->from_surface ? "surface" : "landmarks", "fuller", "state",
+                           state_text(&record->state[0]), "emptier", "state",
+                           state_text(&record->state[1]), "correction", "centres", centres);
   if (root == NULL) {
     return NULL;
   }
-  (void)json_object_set_new(root, "force",
-                            json_pack("{s:f, s:f, s:o}", "base", record->force.base, "gain",
-                                      record->force.gain, "box", numbers(record->force.box, 3)));
-  (void)json_object_set_new(root, "motion",
-                            json_pack("{s:o, s:o}", "translation_mm", numbers(patient->motion, 3),
-                                      "rotation_rad", numbers(patient->motion + 3, 3)));
-  (void)json_object_set_new(root, "lengths_mm", numbers(patient->lengths, 3));
-  (void)json_object_set_new(root, "powers", numbers(patient->powers, SUPINE_PATIENT_POWERS));
-  (void)json_object_set_new(root, "correction", correction(&patient->correction));
-  (void)json_object_set_new(root, "expected_constant_mm", json_real(record->expected_constant));
+  for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {
+    const double *values = (const double *)((const char *)record + table[i].offset);
+    (void)json_object_set_new(group_of(root, table[i].group), table[i].key,
+                              table[i].count == 1 ? json_real(*values)
+                                                  : array_of(values, table[i].count));
+  }
+  for (size_t i = 0; i < patient->centre_count; ++i) {
+    (void)json_array_append_new(centres, array_of((const double *)&patient->centre[i], CENTRE));
+  }
   if (record->told_count > 0) {
     (void)json_object_set_new(root, "further_states", further(record));
   }
@@ -160,14 +169,14 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
     (void)json_object_set_new(root, "gain_determined", json_boolean(!record->gain_open));
     (void)json_object_set_new(root, "gain_standard_error", json_real(record->gain_error));
   }
-  if (record->expand.tried || supine_patient_is_uneven(record)) {
+  if (record->expand.tried || record->stiffness.count > 0) {
     (void)json_object_set_new(root, "expandability", expandability(record));
   }
   if (record->applied.blocks > 0) {
     (void)json_object_set_new(root, "applied_force", applied(&record->applied));
   }
-  if (report != NULL) {
-    add_report(root, patient, report);
+  if (record->report.blocks > 0) {
+    add_report(root, record);
   }
   if (made_by != NULL) {
     (void)json_object_set_new(root, "made_by", json_string(made_by));
@@ -175,19 +184,17 @@ static json_t *encode(const supine_patient_record *record, const supine_patient_
   return root;
 }
 
-char *supine_patient_text(const supine_patient_record *record,
-                          const supine_patient_fit_report *report, const char *made_by) {
-  json_t *root = encode(record, report, made_by);
+char *supine_patient_text(const supine_patient_record *record, const char *made_by) {
+  json_t *root = encode(record, made_by);
   char *text = root == NULL ? NULL : json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
   json_decref(root);
   return text;
 }
 
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
-                                   const supine_patient_fit_report *report, const char *made_by,
-                                   supine_error *error) {
+                                   const char *made_by, supine_error *error) {
   supine_output output = {0};
-  char *text = supine_patient_text(record, report, made_by);
+  char *text = supine_patient_text(record, made_by);
   if (text == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", path);
   }
@@ -202,166 +209,117 @@ supine_status supine_patient_write(const char *path, const supine_patient_record
 
 /* --- reading --------------------------------------------------------------------------------- */
 
-/* Read the finite numbers of an array; false if any is missing. */
-static bool take_numbers(const json_t *array, size_t count, double *values) {
-  bool right = json_array_size(array) == count;
+/* Read finite numbers, one or an array; false if any is missing. */
+static bool take_numbers(const json_t *from, size_t count, double *values) {
+  bool right = count == 1 || json_array_size(from) == count;
   for (size_t i = 0; right && i < count; ++i) {
-    const json_t *value = json_array_get(array, i);
+    const json_t *value = count == 1 ? from : json_array_get(from, i);
     values[i] = json_number_value(value);
     right = json_is_number(value) && isfinite(values[i]);
   }
   return right;
 }
 
-static bool take_state(const json_t *object, supine_state *of, double *volume) {
-  const char *text = json_string_value(json_object_get(object, "state"));
-  *of = (supine_state){0};
-  *volume = json_number_value(json_object_get(object, "volume_ml"));
-  return text != NULL && isfinite(*volume) && supine_state_parse(text, of, NULL) == SUPINE_OK &&
+static const char *text_of(const json_t *root, const char *group, const char *key) {
+  const char *text =
+      json_string_value(json_object_get(group != NULL ? json_object_get(root, group) : root, key));
+  return text != NULL ? text : "";
+}
+
+/* Find a word in a list; `count` if it is not there. */
+static int find_word(const char *word, const char *const *words, int count) {
+  int k = 0;
+  while (k < count && strcmp(word, words[k]) != 0) {
+    ++k;
+  }
+  return k;
+}
+
+static bool take_state(const char *text, supine_state *of) {
+  return supine_state_parse(text, of, NULL) == SUPINE_OK &&
          (of->gravity[0] != 0.0 || of->gravity[1] != 0.0 || of->gravity[2] != 0.0);
 }
 
-static bool take_box(const json_t *object, double low[3], double high[3]) {
-  bool right = take_numbers(json_object_get(object, "minimum_mm"), 3, low) &&
-               take_numbers(json_object_get(object, "maximum_mm"), 3, high);
-  for (int k = 0; k < 3; ++k) {
-    right = right && high[k] > low[k];
-  }
-  return right;
+static bool is_box(const double low[3], const double high[3]) {
+  return low[0] < high[0] && low[1] < high[1] && low[2] < high[2];
 }
 
-static bool take_frame(const json_t *object, supine_patient_record *record) {
+static bool take_frame(const json_t *root, supine_patient_record *record) {
   supine_patient_frame *frame = &record->patient.frame;
-  const char *lungs = json_string_value(json_object_get(object, "lungs"));
-  const char *of = json_string_value(json_object_get(object, "of"));
-  if (lungs == NULL || of == NULL || !take_box(object, frame->minimum, frame->maximum)) {
-    return false;
-  }
-  frame->midline = json_number_value(json_object_get(object, "midline_mm"));
-  frame->only_side = strcmp(lungs, "left") == 0 ? 1 : strcmp(lungs, "right") == 0 ? -1 : 0;
+  const int side = find_word(text_of(root, "frame", "lungs"), sides, 3);
+  const char *of = text_of(root, "frame", "of");
+  frame->only_side = side - 1;
   record->from_surface = strcmp(of, "surface") == 0;
-  return isfinite(frame->midline) &&
+  return side < 3 && of[0] != '\0' && is_box(frame->minimum, frame->maximum) &&
          (frame->only_side != 0 ||
           (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
 }
 
-static bool take_law(const json_t *root, supine_patient *patient) {
-  const char *law = json_string_value(json_object_get(root, "law"));
-  const json_t *motion = json_object_get(root, "motion");
-  int k = 0;
-  while (law != NULL && k < SUPINE_PATIENT_LAW_COUNT &&
-         strcmp(law, supine_patient_law_names[k]) != 0) {
-    ++k;
-  }
-  const bool right =
-      law != NULL && k < SUPINE_PATIENT_LAW_COUNT &&
-      take_numbers(json_object_get(root, "lengths_mm"), 3, patient->lengths) &&
-      take_numbers(json_object_get(root, "powers"), SUPINE_PATIENT_POWERS, patient->powers) &&
-      take_numbers(json_object_get(motion, "translation_mm"), 3, patient->motion) &&
-      take_numbers(json_object_get(motion, "rotation_rad"), 3, patient->motion + 3);
-  patient->law = (supine_patient_law)k;
-  return right;
-}
-
-static bool take_correction(const json_t *object, supine_patient_correction *of) {
-  const json_t *all = json_object_get(object, "centres");
-  of->count = json_array_size(all);
-  bool right = json_is_array(all) && of->count <= SUPINE_PATIENT_CENTRES_MAX;
-  for (size_t i = 0; right && i < of->count; ++i) {
-    double v[CENTRE];
-    right = take_numbers(json_array_get(all, i), CENTRE, v);
-    of->centre[i] = (supine_patient_centre){
-        {v[0], v[1], v[2]}, v[3] < 0.0 ? -1.0 : 1.0, v[4], {v[5], v[6], v[7]}};
-    right = right && v[4] >= 0.0;
+static bool take_correction(const json_t *centres, supine_patient *patient) {
+  patient->centre_count = json_array_size(centres);
+  bool right = json_is_array(centres) && patient->centre_count <= SUPINE_PATIENT_CENTRES_MAX;
+  for (size_t i = 0; right && i < patient->centre_count; ++i) {
+    supine_patient_centre *of = &patient->centre[i];
+    right = take_numbers(json_array_get(centres, i), CENTRE, (double *)of) && of->size >= 0.0;
   }
   return right;
 }
 
-static bool take_force(const json_t *object, supine_force_law *force) {
-  *force = (supine_force_law){.base = json_number_value(json_object_get(object, "base")),
-                              .gain = json_number_value(json_object_get(object, "gain")),
-                              .pair = true};
-  return json_is_number(json_object_get(object, "base")) &&
-         json_is_number(json_object_get(object, "gain")) && isfinite(force->base) &&
-         isfinite(force->gain) && take_numbers(json_object_get(object, "box"), 3, force->box);
-}
-
-/* Read the regions of each side. */
+/* Read the regions, those of the left lung first. */
 static bool take_stiffness(const json_t *object, supine_patient_stiffness *stiffness) {
   bool right = true;
-  for (size_t side = 0; side < 2; ++side) {
-    const json_t *all = json_object_get(object, sides[side]);
-    stiffness->count[side] = json_array_size(all);
-    right = right && stiffness->count[side] <= SUPINE_PATIENT_MODES;
-    for (size_t k = 0; k < stiffness->count[side] && right; ++k) {
+  for (int side = 1; side >= -1; side -= 2) {
+    const json_t *all = json_object_get(object, sides[1 + side]);
+    for (size_t k = 0; k < json_array_size(all) && right; ++k) {
       const json_t *of = json_array_get(all, k);
-      supine_patient_mode *mode = &stiffness->mode[side][k];
-      mode->value = json_number_value(json_object_get(of, "expandability"));
-      mode->seen = json_number_value(json_object_get(of, "seen"));
-      mode->radius = json_number_value(json_object_get(of, "radius_mm"));
-      right = mode->value > 0.0 && isfinite(mode->value) && isfinite(mode->radius) &&
-              mode->radius > 0.0 && take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre);
+      if (stiffness->count == SUPINE_PATIENT_MODES) {
+        return false;
+      }
+      supine_patient_mode *mode = &stiffness->mode[stiffness->count++];
+      mode->side = side;
+      right = take_numbers(json_object_get(of, "expandability"), 1, &mode->value) &&
+              take_numbers(json_object_get(of, "seen"), 1, &mode->seen) &&
+              take_numbers(json_object_get(of, "radius_mm"), 1, &mode->radius) &&
+              take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre) &&
+              mode->value > 0.0 && mode->radius > 0.0;
     }
   }
   return right;
 }
 
-static double number(const json_t *root, const char *key) {
-  return json_number_value(json_object_get(root, key));
-}
-
-static supine_status decode(const char *name, const json_t *root, supine_patient_record *record,
-                            supine_error *error) {
-  const char *found = json_string_value(json_object_get(root, "format"));
-  const char *wrong = NULL;
-  if (found == NULL || strcmp(found, format) != 0 || number(root, "version") != VERSION) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: not a patient file of version %d: make a new one with 'supine fit'", name, VERSION);
+/* Read a record; return the key of what is missing or wrong, or NULL. */
+static const char *take(const json_t *root, supine_patient_record *record) {
+  supine_patient *patient = &record->patient;
+  for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {
+    const numbers *of = &table[i];
+    const json_t *group = of->group != NULL ? json_object_get(root, of->group) : root;
+    if (!take_numbers(json_object_get(group, of->key), of->count,
+                      (double *)((char *)record + of->offset))) {
+      return of->group != NULL ? of->group : of->key;
+    }
   }
-  memset(record, 0, sizeof *record);
-  if (!take_frame(json_object_get(root, "frame"), record)) {
-    wrong = "frame";
-  } else if (!take_law(root, &record->patient)) {
-    wrong = "law";
-  } else if (!take_force(json_object_get(root, "force"), &record->force)) {
-    wrong = "force";
-  } else if (!take_correction(json_object_get(root, "correction"), &record->patient.correction)) {
-    wrong = "correction";
-  } else if (!take_state(json_object_get(root, "fuller"), &record->state[0], &record->volume[0]) ||
-             !take_state(json_object_get(root, "emptier"), &record->state[1], &record->volume[1])) {
-    wrong = "fuller or emptier";
-  } else if (!take_box(json_object_get(root, "emptier_frame"), record->emptier[0],
-                       record->emptier[1])) {
-    wrong = "emptier_frame";
-  } else if (!json_is_number(json_object_get(root, "reach_mm")) ||
-             !(number(root, "reach_mm") >= 0.0)) {
-    wrong = "reach_mm";
-  } else if (!take_stiffness(json_object_get(root, "expandability"), &record->stiffness)) {
-    wrong = "expandability";
-  }
-  if (wrong != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: \"%s\" is missing or invalid: make a new file with 'supine fit'",
-                            name, wrong);
-  }
-  const char *whose = json_string_value(json_object_get(root, "name"));
-  (void)snprintf(record->name, sizeof record->name, "%s", whose != NULL ? whose : "unnamed");
-  record->reach = number(root, "reach_mm");
-  record->points = (size_t)fmax(0.0, number(root, "points"));
-  record->held_out = number(root, "held_out_rms_mm");
-  record->held_out_baseline = number(root, "held_out_baseline_mm");
-  record->expected = number(root, "expected_rms_mm");
-  record->band = number(root, "band_95_percent_holds") / 100.0;
-  record->expected_constant = number(root, "expected_constant_mm");
-  record->fitted = number(root, "fitted_rms_mm");
-  record->explained = number(root, "explained_percent") / 100.0;
-  return SUPINE_OK;
+  patient->law = (supine_patient_law)find_word(text_of(root, NULL, "law"), supine_patient_law_names,
+                                               SUPINE_PATIENT_LAW_COUNT);
+  record->force.pair = true;
+  (void)snprintf(record->name, sizeof record->name, "%s", text_of(root, NULL, "name"));
+  return patient->law == SUPINE_PATIENT_LAW_COUNT                            ? "law"
+         : !take_frame(root, record)                                         ? "frame"
+         : !take_state(text_of(root, "fuller", "state"), &record->state[0])  ? "fuller"
+         : !take_state(text_of(root, "emptier", "state"), &record->state[1]) ? "emptier"
+         : !is_box(record->emptier[0], record->emptier[1])                   ? "emptier_frame"
+         : !(record->reach >= 0.0)                                           ? "reach_mm"
+         : !take_correction(json_object_get(json_object_get(root, "correction"), "centres"),
+                            patient)
+             ? "correction"
+         : !take_stiffness(json_object_get(root, "expandability"), &record->stiffness)
+             ? "expandability"
+             : NULL;
 }
 
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error) {
   json_error_t where;
+  double version = 0.0;
   FILE *file = fopen(path, "rb");
   if (file == NULL) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
@@ -371,7 +329,20 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
   if (root == NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%d: %s", path, where.line, where.text);
   }
-  const supine_status status = decode(path, root, record, error);
+  memset(record, 0, sizeof *record);
+  const bool known = strcmp(text_of(root, NULL, "format"), format) == 0 &&
+                     take_numbers(json_object_get(root, "version"), 1, &version) &&
+                     version == VERSION;
+  const char *wrong = known ? take(root, record) : NULL;
   json_decref(root);
-  return status;
+  return !known ? supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                   "%s: not a patient file of version %d: make a new one with "
+                                   "'supine fit'",
+                                   path, VERSION)
+         : wrong != NULL
+             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: \"%s\" is missing or invalid: make a new file with "
+                                "'supine fit'",
+                                path, wrong)
+             : SUPINE_OK;
 }

@@ -14,14 +14,21 @@
 
 enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
-/** Fit of a further state. */
+/** Fit of a further state; not read. */
 typedef struct supine_patient_told {
   supine_state state;
   double scale;              /**< 1 if it is as far from the fuller state as the emptier one */
   double left, left_without; /**< RMS residual, mm, with the gain and without */
 } supine_patient_told;
 
-/** What patient.json holds. */
+/** Result of the matching of surfaces. */
+typedef struct supine_patient_surface_report {
+  size_t vertices;      /**< vertices that took part */
+  double matched;       /**< share of them with a compatible point */
+  double before, after; /**< RMS distance, point to plane, before and after the fit, mm */
+} supine_patient_surface_report;
+
+/** What is known of a person; patient.json holds most of it. */
 typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT]; /**< name of the patient */
   supine_patient patient;
@@ -31,39 +38,33 @@ typedef struct supine_patient_record {
   double volume[2];       /**< mL; 0: unknown */
   double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
   bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
-  size_t points;
-  double held_out, held_out_baseline, fitted, explained; /**< mm RMS; explained: share */
-  double expected_constant;            /**< mm: expected square error per mm of displacement */
-  double expected, band;               /**< held out: expected mm RMS; share in the 95 % band */
-  supine_patient_stiffness stiffness;  /**< counts are 0: even tissue */
-  supine_patient_expand_report expand; /**< written if it was tried; not read */
-  supine_patient_applied applied;      /**< written if there are blocks; not read */
-  size_t told_count;                   /**< further states; written, not read */
+  double points;
+  double held_out, held_out_baseline, fitted; /**< mm RMS */
+  double explained;                           /**< % of the squared displacement */
+  double expected_constant;           /**< mm: expected square error per mm of displacement */
+  double expected;                    /**< of held-out points, mm RMS */
+  double band;                        /**< % of held-out points in the 95 % band */
+  supine_patient_stiffness stiffness; /**< no regions: even tissue */
+  size_t told_count;                  /**< further states */
   supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_told;    /**< some further state was in another posture */
   bool gain_open;    /**< the further states do not determine the gain */
   double gain_error; /**< standard error of the gain */
+  /* Not in a record that was read: */
+  supine_patient_fit_report report; /**< written if it has blocks */
+  supine_patient_surface_report surface;
+  supine_patient_expand_report expand; /**< written if it was tried */
+  supine_patient_applied applied;      /**< written if it has blocks */
 } supine_patient_record;
 
-/** Report whether the record has its own stiffness. */
-bool supine_patient_is_uneven(const supine_patient_record *record);
-
-/** Compute the force of a patient's law, whose slopes turn with gravity by the share `gain`. In
- * the fitted posture the field does not depend on the gain. */
-supine_force_law supine_patient_force(const supine_patient *patient, double gain,
-                                      const double gravity[3]);
-
 /** Write the record whole or not at all.
- * @param report   optional: scores, starts, constants and their intervals
- * @param made_by  command line
+ * @param made_by  command line, or NULL
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
-                                   const supine_patient_fit_report *report, const char *made_by,
-                                   supine_error *error);
+                                   const char *made_by, supine_error *error);
 
 /** Print the same as text, for standard output; free() it; NULL: no memory. */
-char *supine_patient_text(const supine_patient_record *record,
-                          const supine_patient_fit_report *report, const char *made_by);
+char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
 /** @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (names what is missing or wrong) */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,

@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Rows of landmarks, and the blocks that are held out together. */
+/* Rows of landmarks, the blocks that are held out together, and what laws and maps say of a row. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include <cblas.h>
 #include <gsl/gsl_rng.h>
 #include <lapacke.h>
 
 #include "precompute/patient/rows.h"
+
+#include "sh/base/vec3.h"
 
 /* Side of a block, mm: neighbours within it are left out together. Landmarks a third of that
  * apart move alike to a few mm, so leaving out single ones would understate the error. */
@@ -17,42 +21,21 @@ static const double landmark_noise = 2.0;
 
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows) {
-  for (size_t i = 0; i < pairs->count; ++i) {
-    const double *from = pairs->from + 3 * i;
-    const double side = pairs->side != NULL ? pairs->side[i] : 0.0;
-    const supine_patient_place place = supine_patient_find(frame, from, side);
-    for (size_t a = 0; a < 3; ++a) {
-      supine_patient_row *row = &rows[3 * i + a];
-      *row = (supine_patient_row){
-          .place = place,
-          .force = {1.0, place.box[0] - 0.5, place.box[1] - 0.5, place.box[2] - 0.5},
-          .value = pairs->to[3 * i + a] - from[a],
-          .weight = 1.0,
-          .noise = landmark_noise};
-      row->axis[a] = 1.0;
-    }
-  }
-}
-
-void supine_patient_row_displacement(const supine_patient *patient, const supine_patient_row *row,
-                                     double u[3]) {
-  const double *c = patient->powers + 3;
-  const double force =
-      row->force[0] + c[0] * row->force[1] + c[1] * row->force[2] + c[2] * row->force[3]; /* (18) */
-  double r[3];
-  supine_patient_direction(patient, &row->place, u);
-  for (size_t k = 0; k < 3; ++k) {
-    u[k] *= force;
-  }
-  supine_patient_correct(patient, &row->place, u, r);
-  for (size_t k = 0; k < 3; ++k) {
-    u[k] += r[k];
+  for (size_t i = 0; i < 3 * pairs->count; ++i) {
+    rows[i] = (supine_patient_row){
+        .place = supine_patient_find(frame, pairs->from + i / 3 * 3,
+                                     pairs->side != NULL ? pairs->side[i / 3] : 0.0),
+        .value = pairs->to[i] - pairs->from[i],
+        .weight = 1.0,
+        .noise = landmark_noise};
+    rows[i].axis[i % 3] = 1.0;
   }
 }
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
   enum { CELLS = 64 }; /* cells of the grid on a side: 2.5 m */
+  static const size_t numbered = (size_t)1 << 40;
   size_t blocks = 0;
   double origin[3];
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -66,16 +49,13 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   }
   gsl_rng_free(random);
   for (size_t i = 0; i < count; ++i) {
-    size_t cell = 0;
+    rows[i].block = 0;
     for (int k = 0; k < 3; ++k) {
       const double at = floor((rows[i].place.arm[k] - origin[k]) / block_side);
-      cell = cell * CELLS + (size_t)fmin(CELLS - 1, fmax(0.0, at));
+      rows[i].block = rows[i].block * CELLS + (size_t)fmin(CELLS - 1, fmax(0.0, at));
     }
-    rows[i].block = cell;
   }
-  /* Marks cells that have a block number, in order of first appearance. */
-  static const size_t numbered = (size_t)1 << 40;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; ++i) { /* number the cells in order of first appearance */
     if (rows[i].block < numbered) {
       const size_t cell = rows[i].block;
       for (size_t j = i; j < count; ++j) {
@@ -90,20 +70,60 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   return blocks;
 }
 
-supine_status supine_patient_rows_deal(size_t blocks, size_t folds, unsigned long seed,
-                                       size_t *fold_of) {
+size_t supine_patient_rows_fold(const supine_patient_frame *frame, supine_patient_row *rows,
+                                size_t count, unsigned long seed, size_t *fold) {
+  const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
+  size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  if (random == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  gsl_rng_set(random, seed);
-  for (size_t b = 0; b < blocks; ++b) {
-    const size_t other = gsl_rng_uniform_int(random, b + 1);
-    fold_of[b] = fold_of[other];
-    fold_of[other] = b % folds;
+  const bool able = fold_of != NULL && random != NULL;
+  if (able) {
+    gsl_rng_set(random, 1000 + seed);
+    for (size_t b = 0; b < blocks; ++b) { /* shuffle */
+      const size_t other = gsl_rng_uniform_int(random, b + 1);
+      fold_of[b] = fold_of[other];
+      fold_of[other] = b % SUPINE_PATIENT_FOLDS;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      fold[i] = fold_of[rows[i].block];
+    }
   }
   gsl_rng_free(random);
-  return SUPINE_OK;
+  free(fold_of);
+  return able ? blocks : 0;
+}
+
+double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
+                                   double x[SUPINE_PATIENT_TERMS]) {
+  const double force = supine_patient_force_at(law, &row->place);
+  double along[3]; /* displacement for a force of 1 and lengths of 1 mm */
+  double motion[3];
+  double turned[3];
+  double even = 0.0; /* along the row, for a force of 1 */
+  supine_patient_power unit = *law;
+  unit.lengths[0] = unit.lengths[1] = unit.lengths[2] = 1.0;
+  supine_patient_direction(&unit, &row->place, 1.0, along);
+  supine_patient_motion(law, &row->place, motion);
+  supine_cross(row->place.arm, row->axis, turned);
+  for (size_t a = 0; a < 3; ++a) {
+    along[a] *= row->axis[a];
+    even += law->lengths[a] * along[a];
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    const double box = fmin(1.0, fmax(1e-12, row->place.box[a]));
+    x[a] = force * along[a];
+    x[3 + a] = law->lengths[a] * x[a] * law->powers[a] * log(box);
+    x[6 + a] = even * row->place.force[1 + a];
+    x[9 + a] = row->axis[a];
+    x[12 + a] = turned[a];
+  }
+  x[15] = even * force;
+  return x[15] + supine_dot(motion, row->axis) - row->value;
+}
+
+double supine_patient_power_residual(const supine_patient_power *law,
+                                     const supine_patient_row *row) {
+  double x[SUPINE_PATIENT_TERMS];
+  return supine_patient_power_design(law, row, x);
 }
 
 /* axis . (t + M arm), arm in units of 100 mm. */
@@ -116,42 +136,31 @@ static void affine_design(const supine_patient_row *row, double x[SUPINE_PATIENT
   }
 }
 
-bool supine_patient_affine_fit(const supine_patient_row *rows, size_t count, const size_t *fold_of,
-                               size_t without, bool translation,
+void supine_patient_affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                                double map[SUPINE_PATIENT_AFFINE]) {
   enum { N = SUPINE_PATIENT_AFFINE };
   double matrix[N * N] = {0.0};
   double trace = 0.0;
+  const lapack_int size = translation ? 3 : N;
   memset(map, 0, N * sizeof *map);
   for (size_t i = 0; i < count; ++i) {
     double x[N];
-    if (fold_of != NULL && fold_of[i] == without) {
-      continue;
-    }
     affine_design(&rows[i], x);
-    for (size_t a = 0; a < N; ++a) {
-      for (size_t b = 0; b < N; ++b) {
-        matrix[a * N + b] += rows[i].weight * x[a] * x[b];
-      }
-      map[a] += rows[i].weight * x[a] * rows[i].value;
-      trace += rows[i].weight * x[a] * x[a];
-    }
+    cblas_dsyr(CblasColMajor, CblasUpper, N, rows[i].weight, x, 1, matrix, N);
+    cblas_daxpy(size, rows[i].weight * rows[i].value, x, 1, map, 1);
+    trace += rows[i].weight * cblas_ddot(N, x, 1, x, 1);
   }
-  const lapack_int size = translation ? 3 : N;
   for (size_t a = 0; a < N; ++a) {
     matrix[a * N + a] += 1e-9 * trace; /* regular where rows leave a term undetermined */
-    map[a] = a < (size_t)size ? map[a] : 0.0;
   }
-  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, N, map, N) == 0;
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, N, map, N) != 0) {
+    memset(map, 0, N * sizeof *map);
+  }
 }
 
 double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
                                       const supine_patient_row *row) {
   double x[SUPINE_PATIENT_AFFINE];
-  double left = -row->value;
   affine_design(row, x);
-  for (size_t a = 0; a < SUPINE_PATIENT_AFFINE; ++a) {
-    left += x[a] * map[a];
-  }
-  return left;
+  return cblas_ddot(SUPINE_PATIENT_AFFINE, x, 1, map, 1) - row->value;
 }

@@ -2,17 +2,19 @@
 /** @file A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
  * regions of each lung, independent of the mesh:
  *
- *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k / sum over k of w(|p - centre_k| /
- * radius_k) w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
+ *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k
+ *            / sum over k of w(|p - centre_k| / radius_k)
+ *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
 #ifndef SUPINE_PATIENT_STIFFNESS_H
 #define SUPINE_PATIENT_STIFFNESS_H
 
 #include "precompute/lungs/lungs.h"
 
-/** Most regions of a lung. */
-enum { SUPINE_PATIENT_MODES = 128 };
+/** Most regions of both lungs. */
+enum { SUPINE_PATIENT_MODES = 256 };
 
 typedef struct supine_patient_mode {
+  int side;         /**< of its lung: 1 left, -1 right */
   double value;     /**< a_k > 0 */
   double centre[3]; /**< mm, in the reference surface */
   double radius;    /**< mm, > 0 */
@@ -20,22 +22,19 @@ typedef struct supine_patient_mode {
                      * neighbouring regions */
 } supine_patient_mode;
 
-/** The regions of the left lung and of the right. Both counts 0: even tissue. */
+/** The regions, those of the left lung first; none: even tissue. */
 typedef struct supine_patient_stiffness {
-  size_t count[2];
-  supine_patient_mode mode[2][SUPINE_PATIENT_MODES];
+  size_t count;
+  supine_patient_mode mode[SUPINE_PATIENT_MODES];
 } supine_patient_stiffness;
 
 /** Spread regions over the lungs' surface, some 45 mm apart, of a = 1. */
 void supine_patient_stiffness_spread(const supine_lungs *lungs,
                                      supine_patient_stiffness *stiffness);
 
-/** Find the weights [count of the side] of a side's regions at a point: they sum to 1. */
-void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness, size_t side,
-                                     const double point[3], double *shares);
-
-/** Find the side of a vertex: 0 left, 1 right. */
-size_t supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
+/** Find the weights [count] of the regions at a vertex; they sum to 1. */
+void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
+                                     const supine_lungs *lungs, size_t vertex, double *shares);
 
 /** Find E [N] of every vertex, relative. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,

@@ -11,17 +11,7 @@
 #ifndef SUPINE_PATIENT_SURFACES_H
 #define SUPINE_PATIENT_SURFACES_H
 
-#include "precompute/patient/applied.h"
-#include "precompute/patient/expand.h"
-#include "precompute/patient/fit.h"
-
-/** Result of the matching. */
-typedef struct supine_patient_surface_report {
-  size_t rounds;
-  size_t vertices;      /**< vertices that took part */
-  double matched;       /**< share of them with a compatible point */
-  double before, after; /**< RMS distance, point to plane, before and after the fit, mm */
-} supine_patient_surface_report;
+#include "precompute/patient/patient_file.h"
 
 /** Data and options of a fit to surfaces. */
 typedef struct supine_patient_surface_task {
@@ -29,30 +19,17 @@ typedef struct supine_patient_surface_task {
   const supine_mesh *state;  /**< the same lungs, mm, same frame */
   const supine_model *model; /**< stiffness and spreading of the force; with expandability its
                               * force is held fixed */
-  const supine_patient_pairs *landmarks; /**< optional, fitted as well */
-  supine_patient_fit_options options;    /**< its gravity is ignored: see below */
-  double gravity[3];                     /**< of the emptier state */
+  const supine_patient_pairs *landmarks; /**< optional, fitted as well; not with expandability */
+  supine_patient_fit_options options;
   bool expandability; /**< fit it too (expand.h), with the paper's law, uncorrected */
-  supine_patient_progress *progress; /**< optional */
-  void *progress_context;
 } supine_patient_surface_task;
 
-/** Result of a fit to surfaces. */
-typedef struct supine_patient_surface_fit {
-  supine_patient patient;
-  supine_patient_fit_report report;
-  supine_patient_surface_report surface;
-  supine_patient_stiffness stiffness; /**< counts are 0: even tissue */
-  supine_patient_expand_report expand;
-  supine_patient_applied applied;
-} supine_patient_surface_fit;
-
-/** Fit a law to a surface in another state.
- * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), axes reversed, equal
- *   surfaces, or too few compatible points
- * @retval SUPINE_ERROR_INTERRUPTED  stopped by progress
+/** Fit a law to a surface in another state; write patient, reports, stiffness and applied force
+ * into the record.
+ * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too
+ *   few compatible points
  * @retval those of supine_patient_fit */
 supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
-                                         supine_patient_surface_fit *fit, supine_error *error);
+                                         supine_patient_record *record, supine_error *error);
 
 #endif

@@ -1,25 +1,21 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Error of a prediction against another state of the same lungs, beside maps that need no
- * model. */
+/** @file Error of a prediction against another state of the same lungs, beside maps that are fitted
+ * to that state itself. */
 #ifndef SUPINE_PATIENT_VALIDATE_H
 #define SUPINE_PATIENT_VALIDATE_H
 
 #include "mesh/mesh.h"
-#include "precompute/patient/rows.h"
-
-/** The prediction, and its baselines: maps of the state at rest fitted to the other state
- * itself. */
-typedef enum supine_patient_map {
-  SUPINE_PATIENT_MAP_PREDICTED = 0,
-  SUPINE_PATIENT_MAP_NONE,
-  SUPINE_PATIENT_MAP_TRANSLATION,
-  SUPINE_PATIENT_MAP_SIMILARITY, /**< rotation, translation and scale */
-  SUPINE_PATIENT_MAP_AFFINE,
-  SUPINE_PATIENT_MAP_COUNT
-} supine_patient_map;
+#include "precompute/patient/pairs.h"
+#include "precompute/patient/patient.h"
 
 /** "predicted", "none", "translation", "rigid+scale", "affine". */
 extern const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT];
+
+/** Check by their boxes that two surfaces can be two states of the same lungs.
+ * @retval SUPINE_ERROR_MESH  sizes that differ by more than 1.6 times, or boxes that hardly overlap
+ */
+supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
+                                         supine_error *error);
 
 /** Distances, mm. */
 typedef struct supine_patient_distance {
@@ -43,7 +39,7 @@ supine_status supine_patient_validate_points(
  * @param moved      motion between the scans that is taken out of the prediction
  * @param predicted  [rest vertices, 3]; the motion is added to it
  * @param nearest    optional [rest vertices, 3]: the state's point nearest to each predicted one
- * @retval SUPINE_ERROR_MESH  boxes that do not overlap
+ * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status
 supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved moved,
