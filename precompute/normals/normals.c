@@ -338,6 +338,7 @@ SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, s
     const float(*steer)[LANES] = (const float(*)[LANES])planes->steer[lung_of(s, row / 3)][row % 3];
     float sum[LANES] = {0.0f};
     for (size_t k = 0; k < s->mode_count; ++k) {
+#pragma GCC unroll 1 /* else it is taken apart before it is made a vector */
       for (size_t l = 0; l < LANES; ++l) {
         sum[l] += c[k] * steer[k][l];
       }

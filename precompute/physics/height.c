@@ -2,22 +2,19 @@
 /* Extent of the lungs along many directions: the min and max of the heights in (18). */
 #include <math.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "precompute/physics/force.h"
+#include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Group the vertices into blocks with bounding boxes, and the blocks into groups. The bounds
- * leave few blocks that can hold an extreme, so the exact search is fast. Blocks hold neighbours
- * in space: vertices are sorted along a curve through 32 x 32 x 32 cells (Morton 1966). */
-enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS) };
-
-/* Directions searched together, most candidate vertices of such a run, and least cosine of the
- * angle to its first direction. */
-enum { RUN = 8, CANDIDATES = 4096 };
-static const double run_cosine = 0.985;
+/* Vertices stand in blocks of neighbours with bounding boxes, and blocks in groups, so that few of
+ * them can hold an extreme: sorted along a curve through 32 x 32 x 32 cells (Morton 1966). LANES
+ * directions are searched together. */
+enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
   double centre[3];
@@ -26,13 +23,22 @@ typedef struct block_box {
 
 typedef struct range_work {
   size_t count;            /* vertices */
-  const double *vertices;  /* [count, 3] */
+  const double *vertices;  /* [count, 3] sorted */
   const block_box *boxes;  /* [box_count] */
   const block_box *groups; /* of GROUP boxes each */
   size_t box_count;
+  size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
 } range_work;
+
+/* Directions side by side, the absolute values of their components, and the greatest height along
+ * each so far. */
+typedef struct lanes {
+  double g[3][LANES];
+  double size[3][LANES];
+  double best[LANES];
+} lanes;
 
 static block_box box_of(const double *vertices, size_t count) {
   block_box box;
@@ -40,8 +46,9 @@ static block_box box_of(const double *vertices, size_t count) {
     double low = vertices[k];
     double high = vertices[k];
     for (size_t i = 1; i < count; ++i) {
-      low = fmin(low, vertices[3 * i + k]);
-      high = fmax(high, vertices[3 * i + k]);
+      const double x = vertices[3 * i + k];
+      low = x < low ? x : low;
+      high = x > high ? x : high;
     }
     box.centre[k] = 0.5 * (low + high);
     box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* wide enough for rounding */
@@ -49,132 +56,73 @@ static block_box box_of(const double *vertices, size_t count) {
   return box;
 }
 
-static size_t block_size(const range_work *work, size_t block) {
-  const size_t left = work->count - block * BLOCK;
-  return left < BLOCK ? left : BLOCK;
+/* Report whether a box rises above the best of any lane. */
+static inline bool rises(const block_box *box, const lanes *at) {
+  const block_box b = *box;
+  int64_t any = 0;
+#pragma GCC unroll 1 /* else it is taken apart before it is made a vector */
+  for (size_t l = 0; l < LANES; ++l) {
+    const double bound = at->g[0][l] * b.centre[0] + at->size[0][l] * b.half[0] +
+                         at->g[1][l] * b.centre[1] + at->size[1][l] * b.half[1] +
+                         at->g[2][l] * b.centre[2] + at->size[2][l] * b.half[2];
+    any |= bound > at->best[l] ? 1 : 0;
+  }
+  return any != 0;
 }
 
-static double bound_of(const block_box *box, const double *g, const double *size) {
-  return supine_dot(g, box->centre) + supine_dot(size, box->half);
-}
-
-/* The highest vertex found along a direction, and its block. */
-typedef struct summit {
-  double height;
-  const double *point;
-  size_t block;
-} summit;
-
-static void look_into(const range_work *work, const double *g, size_t block, summit *best) {
-  const double *p = work->vertices + 3 * block * BLOCK;
-  for (size_t i = 0; i < block_size(work, block); ++i) {
-    const double h = supine_dot(g, p + 3 * i);
-    if (h > best->height) {
-      *best = (summit){h, p + 3 * i, block};
+/* Raise the lanes' best to the vertices of a block. */
+static inline void look_into(const range_work *work, size_t block, lanes *at) {
+  const size_t end = (block + 1) * BLOCK < work->count ? (block + 1) * BLOCK : work->count;
+  for (size_t i = block * BLOCK; i < end; ++i) {
+    const double x = work->vertices[3 * i];
+    const double y = work->vertices[3 * i + 1];
+    const double z = work->vertices[3 * i + 2];
+#pragma GCC unroll 1 /* likewise */
+    for (size_t l = 0; l < LANES; ++l) {
+      const double h = at->g[0][l] * x + at->g[1][l] * y + at->g[2][l] * z;
+      at->best[l] = h > at->best[l] ? h : at->best[l];
     }
   }
 }
 
-/* Find the largest g.p, starting from block `seed`, the result for a similar direction. */
-static summit highest(const range_work *work, const double *g, size_t seed) {
-  const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
-  summit best = {.height = -INFINITY};
-  look_into(work, g, seed, &best);
+/* Find the greatest heights, beginning in block `seed`; return a block that was looked into. */
+static inline size_t search(const range_work *work, size_t seed, lanes *at) {
+  look_into(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
-    if (bound_of(&work->groups[first / GROUP], g, size) <= best.height) {
-      continue;
-    }
-    for (size_t block = first; block < first + GROUP && block < work->box_count; ++block) {
-      if (bound_of(&work->boxes[block], g, size) > best.height) {
-        look_into(work, g, block, &best);
+    for (size_t block = first; rises(&work->groups[first / GROUP], at) && block < first + GROUP &&
+                               block < work->box_count;
+         ++block) {
+      if (rises(&work->boxes[block], at)) {
+        look_into(work, block, at);
+        seed = block;
       }
     }
   }
-  return best;
+  return seed;
 }
 
-/* Bound how far a box rises above the highest vertex along any direction in a cone of tangent
- * `slope` about the given one, negative if it holds no highest vertex. */
-static double margin_of(const block_box *box, const double *g, const double *size,
-                        const summit *top, double slope) {
-  const double far = supine_distance(box->centre, top->point) + supine_length(box->half);
-  return bound_of(box, g, size) - top->height + slope * far;
-}
-
-/* Copy the vertices that may be highest along some direction within an angle of g, whose tangent
- * is `slope`: with p the highest along g, q rises above it only if g.(p - q) <= slope |p - q|.
- * Return their number; CANDIDATES + 1: too many. */
-static size_t find_candidates(const range_work *work, const double *g, double slope,
-                              const summit *top, double *points) {
-  const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
-  size_t count = 0;
-  for (size_t first = 0; first < work->box_count; first += GROUP) {
-    if (margin_of(&work->groups[first / GROUP], g, size, top, slope) < 0.0) {
-      continue;
-    }
-    for (size_t block = first; block < first + GROUP && block < work->box_count; ++block) {
-      if (margin_of(&work->boxes[block], g, size, top, slope) < 0.0) {
-        continue;
-      }
-      for (size_t i = 0; i < block_size(work, block); ++i) {
-        const double *q = work->vertices + 3 * (block * BLOCK + i);
-        if (top->height - supine_dot(g, q) > slope * supine_distance(top->point, q) + 1e-9) {
-          continue;
-        }
-        if (count == CANDIDATES) {
-          return CANDIDATES + 1;
-        }
-        memcpy(points + 3 * count++, q, 3 * sizeof *q);
-      }
-    }
-  }
-  return count;
-}
-
-/* Find the largest sign g.p for a run of neighbouring directions, which share candidates. */
-static void search_run(const range_work *work, size_t begin, size_t end, double sign, size_t *seed,
-                       double *out) {
-  const double *centre = work->directions + 3 * (begin + (end - begin) / 2);
-  const double g[3] = {sign * centre[0], sign * centre[1], sign * centre[2]};
-  const summit top = highest(work, g, *seed);
-  double points[3 * CANDIDATES];
-  double least = 1.0; /* cosine to the centre */
-  *seed = top.block;
-  for (size_t d = begin; d < end; ++d) {
-    least = fmin(least, supine_dot(centre, work->directions + 3 * d));
-  }
-  const double slope = sqrt(fmax(0.0, 1.0 - least * least)) / least + 1e-7; /* margin for
-                                                                             * rounding */
-  const size_t count = end - begin == 1 ? 0 : find_candidates(work, g, slope, &top, points);
-  for (size_t d = begin; d < end; ++d) {
-    const double *at = work->directions + 3 * d;
-    const double seen[3] = {sign * at[0], sign * at[1], sign * at[2]};
-    double best = end - begin == 1 ? top.height : -INFINITY;
-    if (count > CANDIDATES) {
-      best = highest(work, seen, *seed).height;
-    }
-    for (size_t i = 0; i < count && count <= CANDIDATES; ++i) {
-      const double h = supine_dot(seen, points + 3 * i);
-      best = h > best ? h : best;
-    }
-    out[d] = sign * best;
-  }
-}
-
-static void height_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
+SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, size_t thread) {
   const range_work *work = context;
-  size_t top = 0;
-  size_t bottom = 0;
-  for (size_t d = begin; d < end;) {
-    size_t last = d + 1;
-    while (last < end && last < d + RUN &&
-           supine_dot(work->directions + 3 * d, work->directions + 3 * last) > run_cosine) {
-      ++last;
+  size_t seed[2] = {0, 0};
+  (void)thread;
+  for (size_t d = begin; d < end; ++d) {
+    const size_t left = work->direction_count - d * LANES;
+    for (size_t up = 0; up < 2; ++up) {
+      lanes at;
+      for (size_t l = 0; l < LANES; ++l) {
+        const double *g = work->directions + 3 * (d * LANES + (l < left ? l : 0));
+        for (size_t k = 0; k < 3; ++k) {
+          at.g[k][l] = up ? g[k] : -g[k];
+          at.size[k][l] = fabs(g[k]);
+        }
+        at.best[l] = -INFINITY;
+      }
+      seed[up] = search(work, seed[up], &at);
+      for (size_t l = 0; l < LANES && l < left; ++l) {
+        *(up ? &work->maximum[d * LANES + l] : &work->minimum[d * LANES + l]) =
+            up ? at.best[l] : -at.best[l];
+      }
     }
-    search_run(work, d, last, 1.0, &top, work->maximum);
-    search_run(work, d, last, -1.0, &bottom, work->minimum);
-    d = last;
   }
 }
 
@@ -206,27 +154,28 @@ static void sort_vertices(const supine_mesh *mesh, size_t *begin, double *sorted
   }
 }
 
+/* Find the boxes of every `size` vertices. */
+static void find_boxes(const double *vertices, size_t count, size_t size, block_box *boxes) {
+  for (size_t i = 0; i < count; i += size) {
+    boxes[i / size] = box_of(vertices + 3 * i, count - i < size ? count - i : size);
+  }
+}
+
 static supine_status range_of(const supine_mesh *mesh, size_t count, const double *directions,
                               double *minimum, double *maximum) {
-  const size_t box_count = (mesh->vertex_count + BLOCK - 1) / BLOCK;
+  const size_t n = mesh->vertex_count;
+  const size_t box_count = (n + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
   block_box *groups = malloc((box_count / GROUP + 1) * sizeof *groups);
-  double *sorted = malloc((3 * mesh->vertex_count + 1) * sizeof *sorted);
+  double *sorted = malloc((3 * n + 1) * sizeof *sorted);
   size_t *begin = calloc(CELLS + 1, sizeof *begin);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (boxes != NULL && groups != NULL && sorted != NULL && begin != NULL) {
-    range_work work = {mesh->vertex_count, sorted,     boxes,   groups,
-                       box_count,          directions, minimum, maximum};
+    range_work work = {n, sorted, boxes, groups, box_count, count, directions, minimum, maximum};
     sort_vertices(mesh, begin, sorted);
-    for (size_t b = 0; b < box_count; ++b) {
-      boxes[b] = box_of(sorted + 3 * b * BLOCK, block_size(&work, b));
-    }
-    for (size_t b = 0; b < box_count; b += GROUP) {
-      const size_t left = mesh->vertex_count - b * BLOCK;
-      groups[b / GROUP] =
-          box_of(sorted + 3 * b * BLOCK, left < GROUP * BLOCK ? left : GROUP * BLOCK);
-    }
-    supine_parallel_for(count, 16, 0, height_range, &work);
+    find_boxes(sorted, n, BLOCK, boxes);
+    find_boxes(sorted, n, GROUP * BLOCK, groups);
+    supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
     status = SUPINE_OK;
   }
   free(boxes);

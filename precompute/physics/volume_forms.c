@@ -93,12 +93,45 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
+/* Add the cubic terms of a block: det(u0, u1, u2), symmetric in the first two columns. Where one
+ * direction moves a vertex, that is det(d0, d1, d2) c0 c1 c2. */
+SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
+                                    double *x, double *sums) {
+  const size_t count = work->count;
+  const size_t pairs = count * (count + 1) / 2;
+  const size_t plane = 3 * n * count;
+  double *third = x + n * pairs;
+  for (size_t axis = 0; axis < (work->directions == NULL ? 3 : 1); ++axis) {
+    const double *y = u + (axis + 1) % 3 * plane;
+    const double *z = u + (axis + 2) % 3 * plane;
+    memset(x, 0, n * pairs * sizeof *x);
+    for (size_t t = 0; t < n; ++t) {
+      if (work->directions != NULL) {
+        const uint32_t *corner = work->lungs->mesh.triangles + 3 * (begin + t);
+        const double *c[3];
+        const double *d[3];
+        for (size_t v = 0; v < 3; ++v) {
+          c[v] = work->columns + corner[v] * count;
+          d[v] = work->directions + 3 * (size_t)corner[v];
+        }
+        add_pairs(count, 0.5 * supine_triple(d[0], d[1], d[2]), c[0], c[1], x + t * pairs);
+        memcpy(third + t * count, c[2], count * sizeof *third);
+      } else {
+        add_pairs(count, 0.5, y + t * count, z + (n + t) * count, x + t * pairs);
+        add_pairs(count, -0.5, z + t * count, y + (n + t) * count, x + t * pairs);
+        memcpy(third + t * count, u + axis * plane + (2 * n + t) * count, count * sizeof *third);
+      }
+    }
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)pairs, (int)count, (int)n, 1.0, x,
+                (int)pairs, third, (int)count, 1.0, sums, (int)count);
+  }
+}
+
 /* Add up to BLOCK triangles: det(p0 + u0, p1 + u1, p2 + u2) by powers of u and by axis, linear by
  * that of u, quadratic by that of p. Rows of u, area and at are corner by corner. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
-  const size_t pairs = count * (count + 1) / 2;
   const size_t plane = 3 * n * count;
   const int k = (int)count;
   double *w = u + 3 * plane;
@@ -140,14 +173,8 @@ SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t 
     }
     cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, k, k, (int)(3 * n), 1.0, y, k, w, k, 1.0,
                 sums + (3 + axis * count) * count, k);
-    memset(x, 0, n * pairs * sizeof *x);
-    for (size_t t = 0; t < n; ++t) {
-      add_pairs(count, 0.5, y + t * count, z + (n + t) * count, x + t * pairs);
-      add_pairs(count, -0.5, z + t * count, y + (n + t) * count, x + t * pairs);
-    }
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)pairs, k, (int)n, 1.0, x, (int)pairs,
-                u + axis * plane + 2 * n * count, k, 1.0, sums + 3 * (1 + count) * count, k);
   }
+  add_cubic(work, begin, n, u, x, sums + 3 * (1 + count) * count);
 }
 
 static void forms_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -195,7 +222,7 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
                                                  supine_error *error) {
   const size_t pairs = count * (count + 1) / 2;
   const size_t size = 3 * count + 3 * count * count + pairs * count;
-  const size_t room = BLOCK * (12 * count + pairs);
+  const size_t room = BLOCK * (13 * count + pairs);
   double *sums = malloc(PARTS * size * sizeof *sums);
   double *space = malloc(supine_thread_count() * room * sizeof *space);
   supine_status status = forms_allocate(lungs->lung_count, count, forms);
