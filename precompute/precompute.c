@@ -125,26 +125,17 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   if (!p->reference.known || lungs->scanned == NULL) {
     return SUPINE_OK;
   }
-  double *y = malloc(supine_sh_count(field->band) * sizeof *y);
   double *amounts = malloc(n * sizeof *amounts);
   if (p->anchored.mesh.vertices == NULL) {
     p->anchored = *lungs;
     p->anchored.mesh.vertices = malloc(3 * n * sizeof(double));
   }
-  if (y == NULL || amounts == NULL || p->anchored.mesh.vertices == NULL) {
-    free(y);
+  if (amounts == NULL || p->anchored.mesh.vertices == NULL) {
     free(amounts);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  (void)supine_sh_evaluate(field->band, p->reference.scan.state.gravity, y); /* of unit length */
-  supine_projection_compression_weights(field, y, weights);
-  free(y);
-  for (size_t i = 0; i < n; ++i) {
-    amounts[i] = 0.0;
-    for (size_t k = 0; k < field->mode_count; ++k) {
-      amounts[i] += weights[k] * (double)field->coefficients[i * field->mode_count + k];
-    }
-  }
+  supine_projection_compression_weights(field, p->reference.scan.state.gravity, weights);
+  supine_projection_compression_field(field, weights, amounts);
   memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
   const supine_status status = supine_reference_find_gains(
       &p->anchored, p->options->model.bend, p->directions, amounts, &p->reference, error);

@@ -14,13 +14,7 @@ static supine_status check_rest(const supine_compression *compression,
                                 const double *volume, supine_error *error) {
   double weights[SUPINE_MODES_MADE_MAX];
   supine_error inner = {0};
-  double *y = malloc(supine_sh_count(compression->band) * sizeof *y);
-  if (y == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for rest");
-  }
-  (void)supine_sh_evaluate(compression->band, g, y); /* of unit length */
-  supine_projection_compression_weights(compression, y, weights);
-  free(y);
+  supine_projection_compression_weights(compression, g, weights);
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
     static const double straight[3] = {0.0, 0.0, 0.0};
     supine_volume_form form;

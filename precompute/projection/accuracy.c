@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Error of a compressed field against the full solve on held-out directions. */
+#include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,14 +15,14 @@
 #include "precompute/projection/compression.h"
 #include "precompute/projection/tally.h"
 
-/* Sums are of so many parts of the vertices, whatever the number of threads. */
-enum { BLOCK = 512, PARTS = 16, VOLUME_HALVINGS = 10 };
+/* Vertices are summed in PARTS, whatever the number of threads, BLOCK at a time. */
+enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
-/* What is seen of one part of the vertices. */
+/* Sums over one part of the vertices. */
 typedef struct tally {
   double field2;
-  supine_tally error;    /* at one breath scale */
-  supine_tally error_mm; /* at one volume */
+  supine_tally error;    /* at equal gains */
+  supine_tally error_mm; /* at equal volumes */
 } tally;
 
 typedef struct accuracy_work {
@@ -29,87 +30,50 @@ typedef struct accuracy_work {
   const supine_compression *compression;
   const double *directions; /* [N, 3] */
   const double *weights;    /* [D, K] */
-  const double *scales;     /* [D, 2] true and compressed breath scale; NULL: open */
+  const double *scales;     /* [D, 2] true and compressed gain; NULL: open */
   tally *tallies;           /* [PARTS] */
-  struct transposed *blocks;
+  double *space;            /* [threads, BLOCK, K + 2 D] */
 } accuracy_work;
 
-/* A block of vertices, transposed so that vertices run along the rows: [rank or modes][BLOCK]. */
-typedef struct transposed {
-  size_t count;
-  double length[BLOCK]; /* |d| */
-  double columns[SUPINE_SPAN_MAX][BLOCK];
-  float coefficients[SUPINE_MODES_MADE_MAX][BLOCK];
-} transposed;
+/* out = |a is - b should| length */
+SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
+                                      const double *length, double a, double b, double *out) {
+  for (size_t i = 0; i < n; ++i) {
+    out[i] = fabs(a * is[i] - b * should[i]) * length[i];
+  }
+}
 
-static void transpose(const accuracy_work *work, size_t begin, size_t count, transposed *block) {
+static void compare_block(const accuracy_work *work, size_t begin, size_t n, double *space,
+                          tally *sums) {
   const supine_truth *truth = work->truth;
+  const int rank = (int)truth->rank;
+  const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
-  block->count = count;
-  for (size_t i = 0; i < count; ++i) {
-    const double *u = work->directions + 3 * (begin + i);
-    const float *c = work->compression->coefficients + (begin + i) * modes;
-    block->length[i] = supine_length(u);
-    for (size_t k = 0; k < modes; ++k) {
-      block->coefficients[k][i] = c[k];
-    }
-    for (size_t r = 0; r < truth->rank; ++r) {
-      block->columns[r][i] = truth->columns[(begin + i) * truth->rank + r];
-    }
+  double *coefficients = space;
+  double *is = coefficients + modes * BLOCK; /* [D, n] */
+  double *should = is + truth->direction_count * BLOCK;
+  double length[BLOCK];
+  double misses[BLOCK];
+  for (size_t i = 0; i < n; ++i) {
+    length[i] = supine_length(work->directions + 3 * (begin + i));
   }
-}
-
-/* F of the compression at one direction for the whole block. */
-SUPINE_CLONES static void compressed_block(const transposed *block, size_t modes,
-                                           const double *weights, double *out) {
-  for (size_t i = 0; i < BLOCK; ++i) {
-    out[i] = 0.0;
+  for (size_t i = 0; i < n * modes; ++i) {
+    coefficients[i] = (double)work->compression->coefficients[begin * modes + i];
   }
-  for (size_t k = 0; k < modes; ++k) {
-    for (size_t i = 0; i < BLOCK; ++i) {
-      out[i] += weights[k] * (double)block->coefficients[k][i];
-    }
-  }
-}
-
-SUPINE_CLONES static void true_block(const transposed *block, size_t rank, const double *functions,
-                                     double *out) {
-  for (size_t i = 0; i < BLOCK; ++i) {
-    out[i] = 0.0;
-  }
-  for (size_t r = 0; r < rank; ++r) {
-    for (size_t i = 0; i < BLOCK; ++i) {
-      out[i] += functions[r] * block->columns[r][i];
-    }
-  }
-}
-
-/* out = |s1 is - s0 should| length */
-SUPINE_CLONES static void miss_block(const double *is, const double *should, const double *length,
-                                     double s1, double s0, double *out) {
-  for (size_t i = 0; i < BLOCK; ++i) {
-    out[i] = fabs(s1 * is[i] - s0 * should[i]) * length[i];
-  }
-}
-
-static void compare_block(const accuracy_work *work, tally *sums, const transposed *block) {
-  const supine_truth *truth = work->truth;
-  const size_t modes = work->compression->mode_count;
-  double is[BLOCK];
-  double should[BLOCK];
-  double miss[BLOCK];
-  for (size_t d = 0; d < truth->direction_count; ++d) {
-    compressed_block(block, modes, work->weights + d * modes, is);
-    true_block(block, truth->rank, truth->functions + d * truth->rank, should);
-    for (size_t i = 0; i < block->count; ++i) {
-      const double field = should[i] * block->length[i];
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, (int)modes, 1.0,
+              work->weights, (int)modes, coefficients, (int)modes, 0.0, is, (int)n);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, rank, 1.0, truth->functions,
+              rank, truth->columns + begin * truth->rank, rank, 0.0, should, (int)n);
+  for (size_t d = 0; d < truth->direction_count; ++d, is += n, should += n) {
+    for (size_t i = 0; i < n; ++i) {
+      const double field = should[i] * length[i];
       sums->field2 += field * field;
     }
-    miss_block(is, should, block->length, 1.0, 1.0, miss);
-    supine_accuracy_tally_add(&sums->error, block->count, miss);
+    find_misses(n, is, should, length, 1.0, 1.0, misses);
+    supine_accuracy_tally_add(&sums->error, n, misses);
     if (work->scales != NULL) {
-      miss_block(is, should, block->length, work->scales[2 * d + 1], work->scales[2 * d], miss);
-      supine_accuracy_tally_add(&sums->error_mm, block->count, miss);
+      find_misses(n, is, should, length, work->scales[2 * d + 1], work->scales[2 * d], misses);
+      supine_accuracy_tally_add(&sums->error_mm, n, misses);
     }
   }
 }
@@ -117,19 +81,18 @@ static void compare_block(const accuracy_work *work, tally *sums, const transpos
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
   const size_t n = work->compression->vertex_count;
-  const size_t blocks = (n + BLOCK - 1) / BLOCK;
-  transposed *block = &work->blocks[thread];
+  const size_t room = BLOCK * (work->compression->mode_count + 2 * work->truth->direction_count);
   for (size_t part = begin; part < end; ++part) {
-    for (size_t b = blocks * part / PARTS; b < blocks * (part + 1) / PARTS; ++b) {
-      const size_t left = n - b * BLOCK;
-      transpose(work, b * BLOCK, left < BLOCK ? left : BLOCK, block);
-      compare_block(work, &work->tallies[part], block);
+    const size_t last = n * (part + 1) / PARTS;
+    for (size_t i = n * part / PARTS; i < last; i += BLOCK) {
+      compare_block(work, i, last - i < BLOCK ? last - i : BLOCK, work->space + thread * room,
+                    &work->tallies[part]);
     }
   }
 }
 
-/* Breath scales at which both sides gain a part of their volumes [D]; false where some direction
- * does not reach it. */
+/* Find the gains at which both sides hold a part of the volumes [D]; return false if some
+ * direction does not reach it. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
@@ -144,104 +107,93 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
   return true;
 }
 
-double supine_accuracy_state_volume(const supine_accuracy_state *state, const double *y) {
-  double volume = state->resting == NULL ? state->volume : 0.0;
-  for (size_t t = 0; state->resting != NULL && t < supine_sh_count(2); ++t) {
+double supine_accuracy_state_volume(const supine_accuracy_state *state, const double g[3]) {
+  double y[9];
+  double volume = 0.0;
+  if (state->resting == NULL) {
+    return state->volume;
+  }
+  (void)supine_sh_evaluate(2, g, y); /* of unit length */
+  for (size_t t = 0; t < 9; ++t) {
     volume += state->resting[t] * y[t];
   }
   return volume;
 }
 
-/* Weights of the modes at every direction, [D, K] = Y [D, P] modes^T, and the state's volumes [D].
- */
-static supine_status find_weights(const supine_truth *truth, const supine_compression *compression,
-                                  const supine_accuracy_state *state, double *weights,
-                                  double *volumes) {
-  const size_t band = compression->band < 2 ? 2 : compression->band;
-  double *y = malloc(supine_sh_count(band) * sizeof *y);
-  if (y == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  supine_status status = SUPINE_OK;
-  for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
-    status = supine_sh_evaluate(band, truth->directions + 3 * d, y);
-    if (status == SUPINE_OK) {
-      volumes[d] = supine_accuracy_state_volume(state, y);
-      supine_projection_compression_weights(compression, y, weights + d * compression->mode_count);
+/* Find the gains at which both sides hold the state's volumes, or half of them, a quarter, ...: the
+ * largest part that every direction reaches. Return that part; 0: there is none. */
+static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
+                        const double *volumes, double *scales) {
+  double part = 1.0;
+  for (int i = 0; i <= VOLUME_HALVINGS; ++i, part *= 0.5) {
+    if (find_scales(work->truth, forms, work->weights, volumes, part, scales)) {
+      return part;
     }
   }
-  free(y);
-  return status;
+  return 0.0;
 }
 
-/* Over 60 lines: what is measured shares one walk over the held-out directions. */
+/* State the error from the sums over all parts. */
+static void conclude(const accuracy_work *work, supine_accuracy *made) {
+  const double samples =
+      (double)work->compression->vertex_count * (double)work->truth->direction_count;
+  tally *all = &work->tallies[0];
+  for (size_t t = 1; t < PARTS; ++t) {
+    all->field2 += work->tallies[t].field2;
+    supine_accuracy_tally_merge(&all->error, &work->tallies[t].error);
+    supine_accuracy_tally_merge(&all->error_mm, &work->tallies[t].error_mm);
+  }
+  const double field = sqrt(all->field2 / samples);
+  made->relative_rms = sqrt(all->error.square_sum / samples) / field;
+  made->relative_p95 = supine_accuracy_tally_percentile(&all->error, 0.95) / field;
+  made->relative_max = all->error.largest / field;
+  made->rms_mm = sqrt(all->error_mm.square_sum / samples);
+  made->p95_mm = supine_accuracy_tally_percentile(&all->error_mm, 0.95);
+  made->max_mm = all->error_mm.largest;
+}
+
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
                                       const supine_accuracy_state *state, supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
-  const size_t n = compression->vertex_count;
+  const size_t modes = compression->mode_count;
   const size_t threads = supine_thread_count();
-  const bool closed = forms != NULL && truth->cubic != NULL;
-  double *weights = malloc(count * compression->mode_count * sizeof *weights);
-  double *scales = malloc(3 * count * sizeof *scales);
+  double *weights = malloc(count * (modes + 3) * sizeof *weights);
   tally *tallies = calloc(PARTS, sizeof *tallies);
-  transposed *blocks = calloc(threads, sizeof *blocks);
-  supine_accuracy made = {.direction_count = count};
+  double *space = malloc(threads * BLOCK * (modes + 2 * count) * sizeof *space);
   supine_status status = SUPINE_OK;
-  if (compression->mode_count > SUPINE_MODES_MADE_MAX || truth->rank > SUPINE_SPAN_MAX) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%zu modes against %zu columns: at most %d and %d can be compared",
-                              compression->mode_count, truth->rank, SUPINE_MODES_MADE_MAX,
-                              SUPINE_SPAN_MAX);
-    goto cleanup;
-  }
-  if (weights == NULL || scales == NULL || tallies == NULL || blocks == NULL) {
+  *accuracy = (supine_accuracy){.direction_count = count};
+  if (weights == NULL || tallies == NULL || space == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
   }
-  double *volumes = scales == NULL ? NULL : scales + 2 * count;
-  status = find_weights(truth, compression, state, weights, volumes);
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "held-out directions: %s", supine_status_string(status));
-    goto cleanup;
+  double *scales = weights + count * modes;
+  double *volumes = scales + 2 * count;
+  accuracy_work work = {truth, compression, directions, weights, NULL, tallies, space};
+  for (size_t d = 0; d < count; ++d) {
+    const double *g = truth->directions + 3 * d;
+    volumes[d] = supine_accuracy_state_volume(state, g);
+    supine_projection_compression_weights(compression, g, weights + d * modes);
   }
-  if (closed) {
-    double part = 1.0;
-    for (int i = 0; !find_scales(truth, forms, weights, volumes, part, scales); ++i) {
-      if (i == VOLUME_HALVINGS) {
-        status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                  "the lungs do not reach even %g mL before the surface folds",
-                                  part * volumes[0]);
-        goto cleanup;
-      }
-      part *= 0.5;
+  if (forms != NULL && truth->cubic != NULL) {
+    const double part = find_part(&work, forms, volumes, scales);
+    if (part == 0.0) {
+      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the lungs do not reach even a thousandth of the %g mL that their "
+                                "error is stated at: the surface folds before",
+                                volumes[0]);
+      goto cleanup;
     }
-    made.volume = state->resting != NULL ? part : part * state->volume;
+    accuracy->volume = state->resting != NULL ? part : part * state->volume;
+    work.scales = scales;
   }
-  accuracy_work work = {truth,   compression, directions, weights, closed ? scales : NULL,
-                        tallies, blocks};
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
-  tally *all = &tallies[0];
-  for (size_t t = 1; t < PARTS; ++t) {
-    all->field2 += tallies[t].field2;
-    supine_accuracy_tally_merge(&all->error, &tallies[t].error);
-    supine_accuracy_tally_merge(&all->error_mm, &tallies[t].error_mm);
-  }
-  const double samples = (double)n * (double)count;
-  const double field = sqrt(all->field2 / samples);
-  made.relative_rms = sqrt(all->error.square_sum / samples) / field;
-  made.relative_p95 = supine_accuracy_tally_percentile(&all->error, 0.95) / field;
-  made.relative_max = all->error.largest / field;
-  made.rms_mm = sqrt(all->error_mm.square_sum / samples);
-  made.p95_mm = supine_accuracy_tally_percentile(&all->error_mm, 0.95);
-  made.max_mm = all->error_mm.largest;
-  *accuracy = made;
+  conclude(&work, accuracy);
 cleanup:
   free(weights);
-  free(scales);
   free(tallies);
-  free(blocks);
+  free(space);
   return status;
 }

@@ -117,15 +117,27 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   }
 }
 
-void supine_projection_compression_weights(const supine_compression *compression, const double *y,
+void supine_projection_compression_weights(const supine_compression *compression, const double g[3],
                                            double *weights) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
   const size_t terms = supine_sh_count(compression->band);
+  (void)supine_sh_evaluate(compression->band, g, y); /* of unit length */
   for (size_t k = 0; k < compression->mode_count; ++k) {
-    double sum = 0.0;
+    weights[k] = 0.0;
     for (size_t t = 0; t < terms; ++t) {
-      sum += compression->modes[k * terms + t] * y[t];
+      weights[k] += compression->modes[k * terms + t] * y[t];
     }
-    weights[k] = sum;
+  }
+}
+
+void supine_projection_compression_field(const supine_compression *compression,
+                                         const double *weights, double *field) {
+  for (size_t i = 0; i < compression->vertex_count; ++i) {
+    const float *c = compression->coefficients + i * compression->mode_count;
+    field[i] = 0.0;
+    for (size_t k = 0; k < compression->mode_count; ++k) {
+      field[i] += weights[k] * (double)c[k];
+    }
   }
 }
 

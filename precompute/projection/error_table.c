@@ -73,7 +73,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
     const double *functions = truth->functions + d * rank;
     status = supine_sh_evaluate(projection->band, truth->directions + 3 * d, y);
-    supine_projection_compression_weights(compression, y, weights);
+    supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(left, functions, rank * sizeof *left);
     for (size_t l = 0; l < bands; ++l) {
