@@ -3,14 +3,18 @@
 """Compare two versions of the program: each command in turn by the old and by the new one.
 
     bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
+                      [--stream path/to/bench_stream]
 
 Inputs are made by the old one. Prints the least wall and processor seconds and the most memory of
-the rounds, and new over old. Outputs that differ in a byte are named, but for compressed VTP."""
+the rounds, and new over old. Outputs that differ in a byte are named, but for compressed VTP. The
+library that a program was built with is found beside it, as runtime/libsupine_runtime.so; --stream
+adds the least median time from a pose sent to the last point received."""
 import argparse
 import filecmp
 import os
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -75,6 +79,31 @@ def compare(name, programs, arguments, rounds, output=None):
           f"{'   other bytes' if differs else ''}", flush=True)
 
 
+# Opens a basis a few times, which `info` does and more: prints the least processor seconds.
+OPEN = """
+import ctypes, sys, time
+library, basis = ctypes.CDLL(sys.argv[1]), ctypes.c_void_p()
+least = 1e9
+for _ in range(5):
+    start = time.process_time()
+    if library.supine_basis_open(sys.argv[2].encode(), ctypes.byref(basis), None) != 0:
+        raise SystemExit("cannot open " + sys.argv[2])
+    least = min(least, time.process_time() - start)
+    library.supine_basis_close(basis)
+print(least)
+"""
+
+
+def compare_numbers(name, commands, rounds, number):
+    """Run a command of each program in turn; print the least number in what they say."""
+    best = [float("inf"), float("inf")]
+    for _ in range(rounds):
+        for which, command in enumerate(commands):
+            said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+            best[which] = min(best[which], number(said))
+    print(f"{name:28} {best[0]:8.4f} {best[1]:8.4f} {best[1] / best[0]:6.2f}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("old")
@@ -82,8 +111,10 @@ def main():
     parser.add_argument("--vertices", default="508000")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--folder")
+    parser.add_argument("--stream")
     chosen = parser.parse_args()
     programs = [os.path.abspath(chosen.old), os.path.abspath(chosen.new)]
+    stream = None if chosen.stream is None else os.path.abspath(chosen.stream)
     with tempfile.TemporaryDirectory(dir=chosen.folder) as folder:
         os.chdir(folder)
 
@@ -105,9 +136,19 @@ def main():
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")
         print(f"{'':28}" + 3 * f" {'old':>8} {'new':>8} {'ratio':>6}  ")
+        libraries = [os.path.join(os.path.dirname(program), "runtime", "libsupine_runtime.so")
+                     for program in programs]
+        compare_numbers("opening, processor s",
+                        [[sys.executable, "-c", OPEN, library, "large.safetensors"]
+                         for library in libraries], chosen.rounds, float)
+        if stream is not None:
+            compare_numbers("stream of points, median ms",
+                            [[stream, program, "large.safetensors", "3", "points"]
+                             for program in programs], chosen.rounds,
+                            lambda said: float(said.splitlines()[1].split()[5]))
         rows = [
             ("--help", ["--help"], None),
-            ("opening (info)", ["info", "large.safetensors"], None),
+            ("info", ["info", "large.safetensors"], None),
             ("deform --image, 65 M voxels",
              ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii", "-o",
               "moved.nii"], "moved.nii"),
