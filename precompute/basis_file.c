@@ -14,6 +14,7 @@
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normals.h"
 #include "precompute/writer.h"
+#include "sh/base/text.h"
 
 /* Metadata under construction. */
 typedef struct entries {
@@ -43,7 +44,7 @@ static void add(entries *list, const char *key, const char *format, ...) {
     }
     list->metadata = grown;
   }
-  list->metadata[list->count++] = (supine_metadata){key, text};
+  list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
 }
 
 static void entries_free(entries *list) {

@@ -105,12 +105,12 @@ SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *fil
 
 /** Write a file to a stream, and add the metadata "checksum". Tensors are laid out by descending
  * element size, in the given order within one size, so that each begins at a multiple of its
- * element size; the header is padded with spaces to a multiple of 8. Bytes of a name, key or value
- * that are not UTF-8 are written as '?'. Errors of writing stay in the stream: see ferror, fclose.
+ * element size; the header is padded with spaces to a multiple of 8. Errors of writing stay in the
+ * stream: see ferror, fclose.
  * @param name  of the file, for messages
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
- *                                range, or the key "checksum", which is the writer's
- * @retval SUPINE_ERROR_MEMORY */
+ *                                range, text that is not UTF-8, or the key "checksum", which is the
+ *                                writer's */
 SUPINE_API supine_status supine_safetensors_write(FILE *file, const char *name,
                                                   const supine_tensor *tensors, size_t tensor_count,
                                                   const supine_metadata *metadata,
