@@ -7,7 +7,7 @@
 #include <supine/safetensors.h>
 
 #include "precompute/writer.h"
-#include "runtime/safetensors/checksum.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 #include "runtime_fixture.h"
 

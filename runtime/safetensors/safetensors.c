@@ -1,46 +1,31 @@
 /* SPDX-License-Identifier: MIT */
-/* Opening safetensors files, and checking them against their checksum. */
+/* Open safetensors files, and check them against their checksum. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/safetensors_file.h"
 
-static char *copy_text(const char *text) {
-  const size_t size = strlen(text) + 1;
-  char *copy = malloc(size);
-  if (copy != NULL) {
-    memcpy(copy, text, size);
-  }
-  return copy;
-}
-
-/* Takes the mapping, if there is one, whatever comes of it. */
+/* Open bytes, which the file owns from here on if they are a mapping. */
 static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
                                 const char *name, supine_safetensors **result,
                                 supine_error *error) {
+  supine_safetensors *file = calloc(1, sizeof *file + strlen(name) + 1);
   supine_status status = SUPINE_ERROR_MEMORY;
-  supine_safetensors *file = calloc(1, sizeof *file);
-  char *copy = copy_text(name);
-  if (file == NULL || copy == NULL) {
-    (void)supine_error_set(error, status, "%s: out of memory", name);
+  *result = NULL;
+  if (file == NULL) {
     supine_platform_unmap(&mapping);
-    free(copy);
-    goto cleanup;
+    return supine_error_set(error, status, "%s: out of memory", name);
   }
-  *file = (supine_safetensors){
-      .name = copy, .bytes = bytes, .size = size, .mapping = mapping, .error = error};
-  status = supine_safetensors_parse(file);
-  free(file->entries);
-  file->entries = NULL;
-  file->error = NULL;
-
-cleanup:
-  if (status != SUPINE_OK) {
+  strcpy(file->name, name);
+  file->bytes = bytes;
+  file->size = size;
+  file->mapping = mapping;
+  status = supine_safetensors_parse(file, error);
+  if (status == SUPINE_OK) {
+    *result = file;
+  } else {
     supine_safetensors_close(file);
-    file = NULL;
   }
-  *result = file;
   return status;
 }
 
@@ -55,8 +40,22 @@ supine_status supine_safetensors_open(const char *path, supine_safetensors **fil
   *file = NULL;
   const supine_status status = supine_platform_map(path, &mapping, error);
   return status != SUPINE_OK ? status
-                             : open_bytes(mapping.bytes == NULL ? "" : mapping.bytes, mapping.size,
-                                          mapping, path, file, error);
+                             : open_bytes(mapping.bytes, mapping.size, mapping, path, file, error);
+}
+
+void supine_safetensors_close(supine_safetensors *file) {
+  if (file == NULL) {
+    return;
+  }
+  supine_platform_unmap(&file->mapping);
+  for (size_t i = 0; i < file->tensor_count; ++i) {
+    free(file->copies[i]);
+  }
+  free(file->copies);
+  free(file->tensors);
+  free(file->metadata);
+  free(file->header);
+  free(file);
 }
 
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {

@@ -1,36 +1,48 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * What an open safetensors file holds, for the files of this folder. */
+ * Safetensors files inside this folder: element types, an open file, checksums. */
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 
-#include "runtime/safetensors/dtype.h"
+#include <stdbool.h>
+
+#include <supine/safetensors.h>
+
 #include "runtime/safetensors/platform.h"
 
-/** A tensor and where the header says that it lies. */
-typedef struct safetensors_entry {
-  supine_tensor tensor;
-  size_t begin, end;
-} safetensors_entry;
+/** Characters of a stated checksum, with the NUL. */
+enum { CHECKSUM_SIZE = 23 };
 
 struct supine_safetensors {
-  char *name;
   const unsigned char *bytes;
   size_t size;
-  supine_platform_file mapping; /**< the same bytes where they are mapped */
+  supine_platform_file mapping; /**< the same bytes if they are mapped */
   char *header;                 /**< a copy, in which strings are decoded */
-  supine_tensor *tensors;
-  void **copies; /**< of tensors that lie misaligned; NULL elsewhere */
+  supine_tensor *tensors;       /**< in the order of their data */
+  void **copies;                /**< of misaligned tensors; NULL for the others */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;
-  /* While parsing: */
-  safetensors_entry *entries;
-  supine_error *error;
+  char name[]; /**< for messages */
 };
 
-/** Parses and checks the header of file->bytes, and places the tensors.
- * @retval SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY  with file->error filled in */
-supine_status supine_safetensors_parse(supine_safetensors *file);
+/** Return the name of an element type in the header, "F32"; `dtype` must be in range. */
+const char *supine_safetensors_dtype_name(supine_dtype dtype);
+
+/** Return the bytes of one element. */
+size_t supine_safetensors_dtype_size(supine_dtype dtype);
+
+/** Compute the bytes of a tensor; false if that overflows. */
+bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
+
+/** Parse and check the header of file->bytes, and place the tensors.
+ * @retval SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
+supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error);
+
+/** Compute the text that metadata "checksum" must hold, of the same kind as `stated`: "xxh64:" and
+ * 16 hexadecimal digits, also if it is NULL, or the 16 digits alone of a file of version 1. */
+void supine_safetensors_checksum_text(const char *stated, const supine_tensor *tensors,
+                                      size_t tensor_count, const supine_metadata *metadata,
+                                      size_t metadata_count, char text[CHECKSUM_SIZE]);
 
 #endif

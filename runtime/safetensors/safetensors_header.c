@@ -1,259 +1,367 @@
 /* SPDX-License-Identifier: MIT */
-/* The header of a safetensors file: parse, and believe nothing that is not checked. */
+/* The header of a safetensors file: strict JSON (RFC 8259), of which every number is checked. */
 #include <inttypes.h>
+#include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/safetensors/json.h"
 #include "runtime/safetensors/safetensors_file.h"
+#include "sh/base/utf8.h"
 
 enum { PREFIX = 8, HEADER_MAX = 1 << 24, TENSORS_MAX = 1024, METADATA_MAX = 4096 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "tensors are little-endian");
 
-#define FORMAT_ERROR(file, ...) format_error((file)->error, (file)->name, __VA_ARGS__)
+/* The header being parsed, which ends with a NUL. After the first failure nothing is taken any
+ * more. */
+typedef struct parser {
+  supine_safetensors *file;
+  char *at, *end;
+  supine_status status;
+  supine_error *error;
+} parser;
 
-static supine_status SUPINE_PRINTF(3, 4)
-    format_error(supine_error *error, const char *name, const char *format, ...) {
+static void SUPINE_PRINTF(2, 3) fail(parser *p, const char *format, ...) {
   char detail[256];
   va_list arguments;
   va_start(arguments, format);
   (void)vsnprintf(detail, sizeof detail, format, arguments);
   va_end(arguments);
-  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", name, detail);
+  if (p->status == SUPINE_OK) {
+    p->status = supine_error_set(p->error, SUPINE_ERROR_FORMAT, "%s: %s", p->file->name, detail);
+  }
 }
 
-static supine_status bad_json(const supine_safetensors *file, const json_cursor *cursor) {
-  return FORMAT_ERROR(file, "the header is not safetensors JSON at its byte %td",
-                      cursor->at - file->header);
+static void fail_json(parser *p) {
+  fail(p, "the header is not safetensors JSON at its byte %td", p->at - p->file->header);
 }
 
-/* Room for one more item in an array that doubles. */
-static bool grow(void **items, size_t count, size_t item_size) {
-  if (count != 0 && (count & (count - 1)) != 0) {
+/* Skip white space, then take a character if it is next; report whether it was. */
+static bool take(parser *p, char character) {
+  p->at += p->status == SUPINE_OK ? strspn(p->at, " \t\n\r") : 0;
+  if (p->status == SUPINE_OK && p->at < p->end && *p->at == character) {
+    ++p->at;
     return true;
-  }
-  void *grown = realloc(*items, (count == 0 ? 1 : 2 * count) * item_size);
-  if (grown == NULL) {
-    return false;
-  }
-  *items = grown;
-  return true;
-}
-
-static supine_status no_memory(const supine_safetensors *file) {
-  return supine_error_set(file->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
-}
-
-static supine_status parse_metadata(supine_safetensors *file, json_cursor *cursor) {
-  if (!supine_safetensors_json_take(cursor, '{')) {
-    return bad_json(file, cursor);
-  }
-  if (supine_safetensors_json_take(cursor, '}')) {
-    return SUPINE_OK;
-  }
-  do {
-    const char *key = supine_safetensors_json_string(cursor);
-    const char *value = key != NULL && supine_safetensors_json_take(cursor, ':')
-                            ? supine_safetensors_json_string(cursor)
-                            : NULL;
-    if (value == NULL) {
-      return bad_json(file, cursor);
-    }
-    if (supine_safetensors_metadata(file, key) != NULL) {
-      return FORMAT_ERROR(file, "two metadata strings are named '%.64s'", key);
-    }
-    if (file->metadata_count == METADATA_MAX) {
-      return FORMAT_ERROR(file, "more than %d metadata strings", METADATA_MAX);
-    }
-    if (!grow((void **)&file->metadata, file->metadata_count, sizeof *file->metadata)) {
-      return no_memory(file);
-    }
-    file->metadata[file->metadata_count++] = (supine_metadata){key, value};
-  } while (supine_safetensors_json_take(cursor, ','));
-  return supine_safetensors_json_take(cursor, '}') ? SUPINE_OK : bad_json(file, cursor);
-}
-
-static bool parse_dtype(const char *name, supine_dtype *dtype) {
-  for (int i = 0; i < (int)SUPINE_DTYPE_COUNT; ++i) {
-    if (strcmp(name, supine_safetensors_dtype_name((supine_dtype)i)) == 0) {
-      *dtype = (supine_dtype)i;
-      return true;
-    }
   }
   return false;
 }
 
-/* {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, members in any order. */
-static supine_status parse_tensor(supine_safetensors *file, json_cursor *cursor,
-                                  safetensors_entry *item) {
-  bool has_dtype = false;
-  bool has_shape = false;
-  bool has_offsets = false;
-  const char *name = item->tensor.name;
-  if (!supine_safetensors_json_take(cursor, '{')) {
-    return bad_json(file, cursor);
+static void expect(parser *p, char character) {
+  if (!take(p, character)) {
+    fail_json(p);
+  }
+}
+
+static uint32_t take_hex(parser *p) {
+  char digits[5] = "";
+  if (strspn(p->at, "0123456789abcdefABCDEF") < 4) {
+    fail_json(p);
+    return 0;
+  }
+  memcpy(digits, p->at, 4);
+  p->at += 4;
+  return (uint32_t)strtoul(digits, NULL, 16);
+}
+
+static char *put_utf8(char *to, uint32_t code) {
+  static const unsigned lead[] = {0, 0xC0, 0xE0, 0xF0};
+  const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+  *to++ = (char)(lead[more] | code >> 6 * more);
+  for (int i = more - 1; i >= 0; --i) {
+    *to++ = (char)(0x80U | (code >> 6 * i & 0x3FU));
+  }
+  return to;
+}
+
+/* Decode an escape: \n, \uXXXX or a surrogate pair; return the end of what it stands for. */
+static char *take_escape(parser *p, char *to) {
+  static const char names[] = "\"\\/bfnrt";
+  static const char meanings[] = "\"\\/\b\f\n\r\t";
+  const char name = p->at[1];
+  const char *found = name == '\0' ? NULL : strchr(names, name);
+  p->at += found != NULL || name == 'u' ? 2 : 0;
+  if (found != NULL) {
+    *to = meanings[found - names];
+    return to + 1;
+  }
+  uint32_t code = name == 'u' ? take_hex(p) : 0;
+  if (code >= 0xD800 && code < 0xDC00 && strncmp(p->at, "\\u", 2) == 0) {
+    p->at += 2;
+    const uint32_t low = take_hex(p);
+    code = low >= 0xDC00 && low < 0xE000 ? 0x10000 + ((code - 0xD800) << 10) + (low - 0xDC00) : 0;
+  }
+  if (code == 0 || (code >= 0xD800 && code < 0xE000)) {
+    fail_json(p);
+    return to;
+  }
+  return put_utf8(to, code);
+}
+
+/* Decode a string where it stands, as UTF-8 that ends with a NUL; "" after a failure. */
+static const char *take_string(parser *p) {
+  expect(p, '"');
+  char *const begin = p->at;
+  char *to = begin; /* never ahead of p->at: an escape is longer than what it stands for */
+  while (p->status == SUPINE_OK && *p->at != '"') {
+    const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
+    if (*p->at == '\\') {
+      to = take_escape(p, to);
+    } else if (length == 0 || (unsigned char)*p->at < 0x20) {
+      fail_json(p);
+    } else {
+      memmove(to, p->at, length);
+      to += length;
+      p->at += length;
+    }
+  }
+  if (p->status != SUPINE_OK) {
+    return "";
+  }
+  ++p->at;
+  *to = '\0';
+  return begin;
+}
+
+/* Take an array of at most `capacity` counts, without sign, fraction, exponent or leading zeros;
+ * return how many there are. ULLONG_MAX is refused, as it also stands for what overflows. */
+static size_t take_counts(parser *p, size_t *values, size_t capacity) {
+  size_t count = 0;
+  expect(p, '[');
+  if (take(p, ']')) {
+    return 0;
   }
   do {
-    const char *key = supine_safetensors_json_string(cursor);
-    bool good = key != NULL && supine_safetensors_json_take(cursor, ':');
-    if (good && !has_dtype && strcmp(key, "dtype") == 0) {
-      const char *dtype = supine_safetensors_json_string(cursor);
-      good = has_dtype = dtype != NULL;
-      if (good && !parse_dtype(dtype, &item->tensor.dtype)) {
-        return FORMAT_ERROR(file, "tensor '%.64s': dtype '%.16s' is none of U8, I16, U32, F32, F64",
-                            name, dtype);
-      }
-    } else if (good && !has_shape && strcmp(key, "shape") == 0) {
-      good = has_shape = supine_safetensors_json_counts(cursor, item->tensor.shape,
-                                                        SUPINE_TENSOR_RANK_MAX, &item->tensor.rank);
-    } else if (good && !has_offsets && strcmp(key, "data_offsets") == 0) {
-      size_t offsets[2] = {0, 0};
-      size_t count = 0;
-      good = has_offsets = supine_safetensors_json_counts(cursor, offsets, 2, &count) && count == 2;
-      item->begin = offsets[0];
-      item->end = offsets[1];
-    } else {
-      good = false;
+    p->at += strspn(p->at, " \t\n\r");
+    const size_t digits = strspn(p->at, "0123456789");
+    const unsigned long long value = strtoull(p->at, NULL, 10);
+    if (count == capacity || digits == 0 || (digits > 1 && *p->at == '0') || value > SIZE_MAX ||
+        value == ULLONG_MAX) {
+      fail_json(p);
+      return 0;
     }
-    if (!good) {
-      return bad_json(file, cursor);
-    }
-  } while (supine_safetensors_json_take(cursor, ','));
-  if (!supine_safetensors_json_take(cursor, '}')) {
-    return bad_json(file, cursor);
+    p->at += digits;
+    values[count++] = (size_t)value;
+  } while (take(p, ','));
+  expect(p, ']');
+  return count;
+}
+
+static void parse_metadata(parser *p) {
+  supine_safetensors *file = p->file;
+  expect(p, '{');
+  if (take(p, '}')) {
+    return;
   }
+  do {
+    const char *key = take_string(p);
+    expect(p, ':');
+    const char *value = take_string(p);
+    if (supine_safetensors_metadata(file, key) != NULL) {
+      fail(p, "two metadata strings are named '%.64s'", key);
+    } else if (file->metadata_count == METADATA_MAX) {
+      fail(p, "more than %d metadata strings", METADATA_MAX);
+    } else if (p->status == SUPINE_OK) {
+      file->metadata[file->metadata_count++] = (supine_metadata){key, value};
+    }
+  } while (take(p, ','));
+  expect(p, '}');
+}
+
+static supine_dtype take_dtype(parser *p, const char *tensor) {
+  const char *name = take_string(p);
+  int dtype = 0;
+  while (dtype < SUPINE_DTYPE_COUNT &&
+         strcmp(name, supine_safetensors_dtype_name((supine_dtype)dtype)) != 0) {
+    ++dtype;
+  }
+  if (dtype == SUPINE_DTYPE_COUNT) {
+    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I16, U32, F32, F64", tensor, name);
+  }
+  return (supine_dtype)dtype;
+}
+
+/* Parse {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, members in any order. `data` is
+ * the first offset until the tensor is placed. */
+static void parse_tensor(parser *p, const char *name) {
+  static const char *const members[] = {"dtype", "shape", "data_offsets"};
+  supine_safetensors *file = p->file;
+  supine_tensor tensor = {.name = name};
+  size_t offsets[2] = {0, 0};
   size_t size = 0;
-  if (!has_dtype || !has_shape || !has_offsets || item->tensor.rank < 1) {
-    return FORMAT_ERROR(file, "tensor '%.64s' lacks a dtype, a shape of 1 to %d axes or offsets",
-                        name, SUPINE_TENSOR_RANK_MAX);
+  bool seen[3] = {false};
+  expect(p, '{');
+  do {
+    const char *key = take_string(p);
+    size_t member = 0;
+    while (member < 3 && strcmp(key, members[member]) != 0) {
+      ++member;
+    }
+    expect(p, ':');
+    if (member == 3 || seen[member]) {
+      fail_json(p);
+      return;
+    }
+    seen[member] = true;
+    if (member == 0) {
+      tensor.dtype = take_dtype(p, name);
+    } else if (member == 1) {
+      tensor.rank = take_counts(p, tensor.shape, SUPINE_TENSOR_RANK_MAX);
+    } else if (take_counts(p, offsets, 2) != 2) {
+      fail_json(p);
+    }
+  } while (take(p, ','));
+  expect(p, '}');
+  if (p->status != SUPINE_OK) {
+    return;
   }
-  if (!supine_safetensors_tensor_size(&item->tensor, &size) || item->begin > item->end ||
-      item->end - item->begin != size) {
-    return FORMAT_ERROR(file, "tensor '%.64s': its shape and its offsets disagree", name);
+  if (!seen[0] || !seen[1] || !seen[2] || tensor.rank < 1) {
+    fail(p, "tensor '%.64s' lacks a dtype, a shape of 1 to %d axes or offsets", name,
+         SUPINE_TENSOR_RANK_MAX);
+  } else if (!supine_safetensors_tensor_size(&tensor, &size) || offsets[0] > offsets[1] ||
+             offsets[1] - offsets[0] != size) {
+    fail(p, "tensor '%.64s': its shape and its offsets disagree", name);
+  } else if (supine_safetensors_find(file, name) != NULL) {
+    fail(p, "two tensors are named '%.64s'", name);
+  } else if (file->tensor_count == TENSORS_MAX) {
+    fail(p, "more than %d tensors", TENSORS_MAX);
+  } else {
+    tensor.data = (const void *)(uintptr_t)offsets[0];
+    file->tensors[file->tensor_count++] = tensor;
   }
-  return SUPINE_OK;
 }
 
-static supine_status parse_header(supine_safetensors *file, size_t length) {
-  json_cursor cursor = {file->header, file->header + length};
+static void parse_header(parser *p) {
   bool has_metadata = false;
-  if (file->header[0] != '{') {
-    return FORMAT_ERROR(file, "not a safetensors file");
-  }
-  (void)supine_safetensors_json_take(&cursor, '{');
-  if (!supine_safetensors_json_take(&cursor, '}')) {
+  expect(p, '{');
+  if (!take(p, '}')) {
     do {
-      const char *name = supine_safetensors_json_string(&cursor);
-      if (name == NULL || !supine_safetensors_json_take(&cursor, ':')) {
-        return bad_json(file, &cursor);
-      }
-      if (strcmp(name, "__metadata__") == 0) {
-        if (has_metadata) {
-          return FORMAT_ERROR(file, "two __metadata__ objects");
-        }
+      const char *name = take_string(p);
+      expect(p, ':');
+      if (strcmp(name, "__metadata__") != 0) {
+        parse_tensor(p, name);
+      } else if (has_metadata) {
+        fail(p, "two __metadata__ objects");
+      } else {
         has_metadata = true;
-        const supine_status status = parse_metadata(file, &cursor);
-        if (status != SUPINE_OK) {
-          return status;
-        }
-        continue;
+        parse_metadata(p);
       }
-      for (size_t i = 0; i < file->tensor_count; ++i) {
-        if (strcmp(name, file->entries[i].tensor.name) == 0) {
-          return FORMAT_ERROR(file, "two tensors are named '%.64s'", name);
-        }
-      }
-      if (file->tensor_count == TENSORS_MAX) {
-        return FORMAT_ERROR(file, "more than %d tensors", TENSORS_MAX);
-      }
-      if (!grow((void **)&file->entries, file->tensor_count, sizeof *file->entries)) {
-        return no_memory(file);
-      }
-      safetensors_entry *item = &file->entries[file->tensor_count++];
-      *item = (safetensors_entry){.tensor = {.name = name}};
-      const supine_status status = parse_tensor(file, &cursor, item);
-      if (status != SUPINE_OK) {
-        return status;
-      }
-    } while (supine_safetensors_json_take(&cursor, ','));
-    if (!supine_safetensors_json_take(&cursor, '}')) {
-      return bad_json(file, &cursor);
-    }
+    } while (take(p, ','));
+    expect(p, '}');
   }
-  return supine_safetensors_json_at_end(&cursor) ? SUPINE_OK : bad_json(file, &cursor);
+  if (take(p, '\0') || p->at != p->end) { /* white space alone may follow */
+    fail_json(p);
+  }
 }
 
-static int entry_compare(const void *left, const void *right) {
-  const safetensors_entry *a = left;
-  const safetensors_entry *b = right;
-  if (a->begin != b->begin) {
-    return a->begin < b->begin ? -1 : 1;
-  }
-  return a->end < b->end ? -1 : a->end > b->end;
+static size_t size_of(const supine_tensor *tensor) {
+  size_t size = 0;
+  (void)supine_safetensors_tensor_size(tensor, &size);
+  return size;
 }
 
-/* The tensors must tile the data exactly; then each gets its address, or an aligned copy. */
-static supine_status place_tensors(supine_safetensors *file, size_t data_begin) {
+static int compare_places(const void *left, const void *right) {
+  const supine_tensor *a = left;
+  const supine_tensor *b = right;
+  const uintptr_t places[2][2] = {{(uintptr_t)a->data, size_of(a)},
+                                  {(uintptr_t)b->data, size_of(b)}};
+  const int key = places[0][0] == places[1][0];
+  return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
+}
+
+/* Check that the tensors fill the data exactly, and give each its address, or an aligned copy. */
+static supine_status place_tensors(parser *p, size_t data_begin) {
+  supine_safetensors *file = p->file;
   const size_t data_size = file->size - data_begin;
-  if (file->tensor_count > 0) {
-    qsort(file->entries, file->tensor_count, sizeof *file->entries, entry_compare);
-  }
   size_t at = 0;
+  qsort(file->tensors, file->tensor_count, sizeof *file->tensors, compare_places);
   for (size_t i = 0; i < file->tensor_count; ++i) {
-    const safetensors_entry *item = &file->entries[i];
-    if (item->begin != at) {
-      return FORMAT_ERROR(file, "tensor '%.64s' begins at byte %zu of the data instead of %zu",
-                          item->tensor.name, item->begin, at);
+    const size_t begin = (size_t)(uintptr_t)file->tensors[i].data;
+    if (begin != at) {
+      fail(p, "tensor '%.64s' begins at byte %zu of the data instead of %zu", file->tensors[i].name,
+           begin, at);
+      return p->status;
     }
-    at = item->end;
+    at += size_of(&file->tensors[i]);
   }
   if (at != data_size) {
-    return FORMAT_ERROR(file, "%s: the tensors need %zu bytes, the file has %zu",
-                        at > data_size ? "truncated" : "trailing bytes", at, data_size);
-  }
-  file->tensors = calloc(file->tensor_count + 1, sizeof *file->tensors);
-  file->copies = calloc(file->tensor_count + 1, sizeof *file->copies);
-  if (file->tensors == NULL || file->copies == NULL) {
-    return no_memory(file);
+    fail(p, "%s: the tensors need %zu bytes, the file has %zu",
+         at > data_size ? "truncated" : "trailing bytes", at, data_size);
+    return p->status;
   }
   for (size_t i = 0; i < file->tensor_count; ++i) {
-    const safetensors_entry *item = &file->entries[i];
-    const unsigned char *data = file->bytes + data_begin + item->begin;
-    file->tensors[i] = item->tensor;
-    file->tensors[i].data = data;
-    if ((uintptr_t)data % supine_safetensors_dtype_size(item->tensor.dtype) != 0) {
-      const size_t size = item->end - item->begin;
+    supine_tensor *tensor = &file->tensors[i];
+    const size_t size = size_of(tensor);
+    tensor->data = file->bytes + data_begin + (uintptr_t)tensor->data;
+    if ((uintptr_t)tensor->data % supine_safetensors_dtype_size(tensor->dtype) != 0) {
       file->copies[i] = malloc(size + 1);
       if (file->copies[i] == NULL) {
-        return no_memory(file);
+        return supine_error_set(p->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
       }
-      memcpy(file->copies[i], data, size);
-      file->tensors[i].data = file->copies[i];
+      tensor->data = memcpy(file->copies[i], tensor->data, size);
     }
   }
   return SUPINE_OK;
 }
 
-supine_status supine_safetensors_parse(supine_safetensors *file) {
-  if (file->size < PREFIX + 2) {
-    return FORMAT_ERROR(file, file->size == 0 ? "empty file" : "too short for a safetensors file");
-  }
+supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error) {
+  parser p = {.file = file, .error = error};
   uint64_t length = 0;
+  if (file->size < PREFIX + 2) {
+    fail(&p, file->size == 0 ? "empty file" : "too short for a safetensors file");
+    return p.status;
+  }
   memcpy(&length, file->bytes, PREFIX);
   if (length > file->size - PREFIX || length > HEADER_MAX || length < 2) {
-    return FORMAT_ERROR(file,
-                        "not a safetensors file, or truncated: a header of %" PRIu64
-                        " bytes in a file of %zu",
-                        length, file->size);
+    fail(&p, "not a safetensors file, or truncated: a header of %" PRIu64 " bytes in a file of %zu",
+         length, file->size);
+    return p.status;
   }
-  file->header = malloc((size_t)length);
-  if (file->header == NULL) {
-    return no_memory(file);
+  if (file->bytes[PREFIX] != '{') {
+    fail(&p, "not a safetensors file");
+    return p.status;
+  }
+  size_t members = 1; /* at most, of all objects */
+  for (size_t i = 0; i < length; ++i) {
+    members += file->bytes[PREFIX + i] == ':';
+  }
+  file->header = malloc((size_t)length + 1);
+  file->tensors = calloc(members < TENSORS_MAX ? members : TENSORS_MAX, sizeof *file->tensors);
+  file->copies = calloc(members < TENSORS_MAX ? members : TENSORS_MAX, sizeof *file->copies);
+  file->metadata = calloc(members < METADATA_MAX ? members : METADATA_MAX, sizeof *file->metadata);
+  if (file->header == NULL || file->tensors == NULL || file->copies == NULL ||
+      file->metadata == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
   }
   memcpy(file->header, file->bytes + PREFIX, (size_t)length);
-  const supine_status status = parse_header(file, (size_t)length);
-  return status != SUPINE_OK ? status : place_tensors(file, PREFIX + (size_t)length);
+  file->header[length] = '\0';
+  p.at = file->header;
+  p.end = file->header + length;
+  parse_header(&p);
+  return p.status != SUPINE_OK ? p.status : place_tensors(&p, PREFIX + (size_t)length);
+}
+
+const supine_tensor *supine_safetensors_find(const supine_safetensors *file, const char *name) {
+  for (size_t i = 0; i < file->tensor_count; ++i) {
+    if (strcmp(file->tensors[i].name, name) == 0) {
+      return &file->tensors[i];
+    }
+  }
+  return NULL;
+}
+
+const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key) {
+  for (size_t i = 0; i < file->metadata_count; ++i) {
+    if (strcmp(file->metadata[i].key, key) == 0) {
+      return file->metadata[i].value;
+    }
+  }
+  return NULL;
+}
+
+const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
+                                                       size_t *count) {
+  *count = file->metadata_count;
+  return file->metadata;
 }

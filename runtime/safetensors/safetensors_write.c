@@ -5,10 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "runtime/safetensors/checksum.h"
-#include "runtime/safetensors/dtype.h"
-#include "runtime/safetensors/json.h"
-#include <supine/safetensors.h>
+#include "runtime/safetensors/safetensors_file.h"
+#include "sh/base/utf8.h"
 
 /* What is to be written. Tensors are laid out by descending element size, which keeps each aligned.
  */
@@ -23,7 +21,7 @@ typedef struct content {
 static bool is_utf8(const char *text) {
   size_t left = strlen(text);
   while (left > 0) {
-    const size_t length = supine_safetensors_utf8_length(text, left);
+    const size_t length = supine_utf8_length(text, left);
     if (length == 0) {
       return false;
     }

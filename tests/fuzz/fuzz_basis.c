@@ -7,7 +7,6 @@
 
 #include <supine/runtime.h>
 
-#include "runtime/safetensors/checksum.h"
 #include "runtime/safetensors/safetensors_file.h"
 #include "tests/runtime_fixture.h"
 
