@@ -60,7 +60,7 @@ static const supine_option table[] = {
     {"inhale", 0, "SHARE", "share of the breath that is inhalation, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
      .wants = "a share between 0 and 1", .more = true},
-    {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
+    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O", .more = true},
@@ -74,7 +74,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
-    {"fps", 0, "N", "frames a second, one every 15 ms", SUPINE_FILLS(request, fps),
+    {"fps", 0, "N", "frames per second; the default is one every 15 ms", SUPINE_FILLS(request, fps),
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
     {"seconds", 0, "S", "duration; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
@@ -303,12 +303,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_breathe = {
     name,
-    "let a basis breathe, in one posture or turning",
+    "compute a breath, in one posture or during a turn",
     .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
     .about =
         "Computes breathing lungs from a basis file, in one posture or during a turn, and "
-        "writes the surface of each frame. The volume follows the pressure-volume relation and "
-        "is exact in each frame. Prints the time per frame; a smooth display allows 15 ms.",
+        "writes the surface of each frame. The volume follows the pressure-volume relation and is "
+        "exact in each frame. The time per frame is printed; a smooth display allows 15 ms.",
     .options = table,
     .notes = "Examples:\n"
              "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"

@@ -34,18 +34,18 @@ typedef struct request {
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error; what is "
-                         "inside also goes into .csv, images into .nrrd, .nii, .nii.gz or .mha",
+     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error. Embedded "
+                         "points also go into .csv, images into .nrrd, .nii, .nii.gz or .mha",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
      .rivals = "output"},
     {"states", 0, "LIST",
-     "many states in one call, for which the basis and the image are read once: a CSV file with "
-     "the columns posture, volume and output, a file beside the list: surface, points, field, or "
-     "what --image or --labels moves",
+     "compute many states in one call, reading the basis and the image once: a CSV file with the "
+     "columns posture, volume and output. An output is a file beside the list: a surface, points, "
+     "a field, or the moved image of --image or --labels",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "MM", "largest displacement instead, mm: for open surfaces",
+    {"scale", 0, "MM", "largest displacement, instead of a volume: for open surfaces",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},

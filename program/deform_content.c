@@ -18,24 +18,26 @@
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
-    {.help =
-         "What is inside ('supine embed'): -o FILE.csv writes moved points by name; of a grid:"},
+    {.help = "Embedded structures ('supine embed'): -o FILE.csv writes the moved points by name. "
+             "With a grid:"},
     {"field-out", 0, "FILE",
-     ".nrrd, .nii, .nii.gz or .mha: displacements in mm, LPS (in NIfTI too, as ITK and ANTs have "
-     "it; NiftyReg wants x and y negated), from each node of the scan (or of "
-     "--from) to where its tissue goes; they fade out within 60 mm of the lungs",
+     "displacement field to write, .nrrd, .nii, .nii.gz or .mha: from each node of the scan (or of "
+     "--from) to where its tissue moves, in mm and LPS (also in NIfTI, as in ITK and ANTs; for "
+     "NiftyReg, negate x and y). It fades out within 60 mm of the lungs",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
-     "from each node of the moved lungs to where its tissue was, as resampling an image takes it",
+     "let --field-out write the inverse: from each node of the moved lungs to where its tissue "
+     "was, as needed to resample images",
      SUPINE_FILLS(supine_deform_content, inverse)},
-    {"image", 0, "FILE", "image to move, into -o: .nrrd, .nii, .nii.gz or .mha, linear",
+    {"image", 0, "FILE",
+     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {"density", 0, NULL,
-     "of --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
-     "of volume, so that mass is kept; the file's header says so",
+     "with --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
+     "of volume, which keeps their mass; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
-    {"labels", 0, "FILE", "label map to move, into -o: nearest voxel",
+    {"labels", 0, "FILE", "label map to move and write to -o, by nearest voxels",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {.name = NULL}};
 

@@ -72,22 +72,22 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", "basis of the structures (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"grid", 0, "MM",
-     "nodes this far apart over the lungs, for displacement fields; with an image as CONTENT, "
-     "about as far, every n-th of its voxels",
+     "spacing of the nodes of a grid over the lungs, for displacement fields; with an image as "
+     "CONTENT, its voxels at about that spacing",
      SUPINE_FILLS(request, grid), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
      SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",
-     "images as CONTENT are label maps: the surface of each of these labels is a part, by name, "
+     "take images as label maps, and embed the surface of each of these labels under its name, "
      "beside points and meshes",
      SUPINE_FILLS(request, labels), .read = read_labels,
      .wants = "all, or at most 64 labels with names of up to 31 letters, as 7=nodule,8=vessels"},
     {"rigid", 0, "all|NAME,...",
-     "these parts keep their size and shape and turn with the tissue, as nodules and tumours do; "
-     "others are deformed with it",
+     "parts that keep their size and shape and turn with the tissue, as nodules and tumours do; "
+     "other parts deform",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
-     "move structures outside the lungs as the nearest point of the surface; default: "
-     "extrapolate the motion inside",
+     "move structures outside the lungs as the nearest point of the surface; default: extrapolate "
+     "the motion",
      SUPINE_FILLS(request, clamp)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
@@ -259,16 +259,16 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_embed = {
     name,
-    "let points, meshes or a grid inside move with the lungs",
+    "make points, meshes or a grid move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about = "Makes a basis of structures inside the lungs of a basis: points (.mrk.json or .fcsv "
-             "of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
-             "nodules), the parts of a label map, or the nodes of a grid, regular or of an image "
-             "(.nrrd, .nii, .nii.gz). They move with the weights and breath of the lungs, in every "
-             "command that reads a basis.\n\nTheir displacements are the biharmonic interpolation "
-             "of the surface's, lung by lung: points on the surface move with it, and an affine "
-             "motion continues inside.",
+    .about =
+        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json or .fcsv "
+        "of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+        "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels of an "
+        "image (.nrrd, .nii, .nii.gz). Every command that reads a basis takes it.\n\nDisplacements "
+        "inside are interpolated from those of each lung's surface by biharmonic splines, which "
+        "are exact on the surface and for affine motion.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
@@ -279,6 +279,6 @@ const supine_command supine_command_embed = {
              "  supine deform grid.safetensors --posture prone --image ct.nii.gz -o prone.nii.gz",
     .operands_least = 1,
     .operands_most = SIZE_MAX,
-    .operands_missing = "name a basis file (made by 'supine precompute'), then what is inside",
+    .operands_missing = "name a basis file (made by 'supine precompute'), then what to embed",
     .request_size = sizeof(request),
     .run = run};

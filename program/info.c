@@ -337,15 +337,15 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_info = {
     "info",
-    "say what a basis file holds and how exact it is",
+    "describe a basis file and its accuracy",
     .usage = "BASIS [--json]",
     .about =
-        "Says what a basis file holds: lungs, functions of orientation, the model it was made "
-        "with, and its error, measured against the full solve on directions that no grid used.\n"
+        "Describes a basis file: lungs, functions of orientation, the model it was made with, and "
+        "its error against the full solve, measured on held-out directions.\n"
         "\n"
         "Energy per band is the share of the squared displacement, over the surface and all "
         "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity "
-        "does; the even bands beyond l = 0 are what makes prone more than the reverse of supine.",
+        "does; the even bands beyond l = 0 make prone differ from the exact reverse of supine.",
     .options = table,
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

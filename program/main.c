@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The program: picks the command. */
+/* The program: find the command and run it. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ static void print_help(void) {
     (void)printf("  %-11s %s\n", supine_command_list[i]->name, supine_command_list[i]->summary);
   }
   (void)puts("\n"
-             "'supine COMMAND --help' teaches each. A first round, without any data:\n"
+             "'supine COMMAND --help' explains each. To try it without data:\n"
              "\n"
              "  supine phantom -o lungs.ply\n"
              "  supine precompute lungs.ply -o lungs.safetensors\n"
@@ -76,8 +76,8 @@ static void *allocate_json(size_t size) {
   return memory;
 }
 
-/* Functions return every other error. */
-static void hear_gsl(const char *reason, const char *file, int line, int code) {
+/* Handle an error of GSL; all but a lack of memory are also returned by its functions. */
+static void handle_gsl(const char *reason, const char *file, int line, int code) {
   (void)reason;
   (void)file;
   (void)line;
@@ -87,7 +87,7 @@ static void hear_gsl(const char *reason, const char *file, int line, int code) {
 }
 
 int main(int argc, char **argv) {
-  (void)gsl_set_error_handler(hear_gsl);
+  (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
   openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own */
   supine_options_signals_catch(false);

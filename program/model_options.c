@@ -157,8 +157,9 @@ const supine_option supine_command_model_options[] = {
      "state of the lungs in the scan: full (TLC, a breath-hold at full inflation; the default), "
      "POSTURE:rest (FRC, the end of a quiet expiration), either with +ML or -ML for both lungs "
      "together (supine:rest+300, full-2000), or none (unknown: breaths are added to the scan, and "
-     "a change of posture alone moves nothing). The model counts from full inflation, where the "
-     "shape is the same in every posture; from another state it is computed first",
+     "a change of posture alone moves nothing). The model starts from full inflation, where the "
+     "shape is the same in every posture; for a scan in another state, that shape is computed "
+     "first",
      FILLS(choice), .read = read_scan,
      .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
@@ -191,7 +192,7 @@ const supine_option supine_command_model_options[] = {
      FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
      "make dependent tissue more expandable: a is multiplied by exp(S (h - mean h)); default "
-     "0. Not with the spread over links of the paper law: give --reach",
+     "0. With the paper law, give --reach as well",
      FILLS(choice.model.force.soften), .more = true},
     {.help = "Direction of displacement:", .more = true},
     {"direction", 0, "WHAT",
@@ -228,8 +229,8 @@ const supine_option supine_command_model_options[] = {
      "are multiplied by SHARE (0 to 1); the other lung takes the rest of the breath's volume",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {"reach", 0, "MM",
-     "length over which a force spreads along the surface, about exp(-r/MM); default 10; "
-     "paper: over a few links of the mesh, so that finer meshes spread less and may tear",
+     "length over which a force spreads along the surface, about exp(-r/MM); default 10. The paper "
+     "law spreads it over a few links of the mesh instead: less on finer meshes, which may tear",
      FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 

@@ -11,12 +11,12 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", SUPINE_MESH_ENDINGS, SUPINE_FILLS(request, path), .required = true,
-     .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
+    {"output", 'o', "FILE", "surface to write: " SUPINE_MESH_ENDINGS, SUPINE_FILLS(request, path),
+     .required = true, .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
     {"vertices", 0, "N", "approximate number of vertices of both lungs, up to 20 million",
      SUPINE_FILLS(request, vertices), .standard = "20000"},
-    {"volume", 0, "ML", "volume of both lungs; the default is an adult's at full inflation",
-     SUPINE_FILLS(request, volume), .standard = "6000", .wants = "millilitres"},
+    {"volume", 0, "ML", "volume of both lungs at full inflation", SUPINE_FILLS(request, volume),
+     .standard = "6000", .wants = "millilitres"},
     {.name = NULL}};
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -40,7 +40,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_phantom = {
     "phantom",
-    "make a pair of lungs, at any resolution",
+    "make a synthetic pair of lungs",
     .usage = "-o FILE [OPTIONS]",
     .about = "Makes synthetic lungs for trials without a scan: two closed, smooth surfaces of "
              "the shape of an adult's.",

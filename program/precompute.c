@@ -40,8 +40,8 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
      .more = true},
     {"modes", 0, "K|harmonics",
-     "number of functions of orientation, and so of multiplications per vertex at run time: "
-     "the best K of the band (or all, where the band has fewer), or its (L+1)^2 harmonics. "
+     "number of functions of orientation, which is the number of multiplications per vertex at run "
+     "time: the best K of the band (all, where it has fewer), or its (L+1)^2 harmonics. "
      "Santhanam 2008 used --band 3 --modes harmonics",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
@@ -283,7 +283,7 @@ const supine_command supine_command_precompute = {
     .about = "Solves the physics of one or two lungs for all directions of gravity and writes a "
              "basis file, from which 'supine deform' and the run-time library compute deformed "
              "lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, OFF, ...), "
-             "with both lungs in one file or one lung a file; LABELS is the label map of a "
+             "with both lungs in one file or a file for each; LABELS is the label map of a "
              "segmentation (NRRD, NIfTI, MetaImage). Only closed surfaces have a volume.",
     .options = table,
     .notes = "Examples:\n"

@@ -20,9 +20,9 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "write the parameters (CSV, one row a limb)",
+    {"output", 'o', "FILE", "write the parameters (CSV, one row per limb)",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
-    {"confidence", 'c', "SHARE", "of the intervals printed, between 0 and 1",
+    {"confidence", 'c', "SHARE", "confidence level of the intervals, between 0 and 1",
      SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
      .wants = "a number between 0 and 1"},
     {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
@@ -169,17 +169,15 @@ const supine_command supine_command_pv = {
     .usage = "fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
              "show [FILE] [--step CMH2O]",
     .about =
-        "The lung's pressure-volume relation, measured or built in, as `supine breathe --pv FILE` "
-        "uses it.\n"
-        "\n"
-        "fit finds the five control parameters of each limb from samples, and says how sure they "
-        "are and how far the curve misses the samples (RMS, in mL and as a percentage of the "
-        "volume range; Venegas' and Salazar-Knowles' curves are followed to under 1 %).\n"
+        "Fits the lung's pressure-volume relation, which 'supine breathe --pv FILE' uses, to "
+        "samples, or shows one.\n"
+        "\nfit determines the five control parameters of each limb, their confidence intervals, "
+        "and the residual of the samples (RMS, in mL and as a percentage of the range of volumes; "
+        "below 1 % for Venegas' and Salazar-Knowles' curves).\n"
         "\n"
         "show prints volume and compliance against pressure as CSV; without FILE, of the built-in "
         "normal adult lung.\n"
-        "\n"
-        "SAMPLES.csv has one sample a line, in order of pressure within each limb:\n"
+        "\nSAMPLES.csv has one sample per line, in order of pressure within each limb:\n"
         "\n"
         "      # static manoeuvre; lines like this one are comments\n"
         "      pressure_cmH2O,volume_mL,limb\n"
@@ -187,11 +185,10 @@ const supine_command supine_command_pv = {
         "      2.5,2390,inhale\n"
         "      ...\n"
         "      30,5980,exhale\n"
-        "\n"
-        "Without the column limb all samples are inhale. A limb needs at least 8 samples; where "
-        "one limb has none it takes the other's curve. With much noise, 1 % of the volume range "
-        "say, take 20 or more. Volumes may be absolute or above any reference: breathing uses "
-        "differences alone.",
+        "\nWithout the column limb all samples are of the inhale limb. A limb needs at least 8 "
+        "samples, or 20 where their noise is 1 % of the range of volumes; a limb without samples "
+        "takes the other's curve. Volumes may be absolute or above any reference: breathing uses "
+        "only differences.",
     .options = table,
     .notes =
         "The model, each limb on its own: V'' = u V' over the pressures of its samples, mapped to "
@@ -206,6 +203,6 @@ const supine_command supine_command_pv = {
         "  supine pv show patient.pv.csv --step 0.5 > curve.csv",
     .operands_least = 1,
     .operands_most = 2,
-    .operands_missing = "fit or show what? One file at most",
+    .operands_missing = "give 'fit FILE' or 'show [FILE]'",
     .request_size = sizeof(request),
     .run = run};

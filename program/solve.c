@@ -317,7 +317,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_solve = {
     name,
-    "full physics for one posture: the reference",
+    "solve the full physics for one posture",
     .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
              "LABELS... --posture NAME -o FILE [OPTIONS]",
     .about = "Solves the full physics for one direction of gravity, without harmonics, and "

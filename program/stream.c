@@ -41,8 +41,8 @@ static const char *const spaces[] = {"lps", "ras", NULL};
 
 static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
-     "waits for peers there; a port alone is reached from this machine only; 0: any that is free. "
-     "18944, the protocol's own, unless --connect is given",
+     "address at which to wait for peers; a port alone can be reached from this machine only; 0: "
+     "any free port. Default: 18944, the port of the protocol, unless --connect is given",
      SUPINE_FILLS(request, listen)},
     {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
      SUPINE_FILLS(request, connect)},
@@ -56,7 +56,7 @@ static const supine_option table[] = {
      "0,0,0,1 where the marker's axes are right, front, head",
      SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
     {"smooth", 0, "MS",
-     "time constant of smoothing, for a noisy tracker; a turning body is shown later by as much",
+     "time constant of smoothing, for a noisy tracker; turns are shown late by as much",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
      .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
@@ -79,7 +79,7 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
-    {"pv", 0, "FILE", "pressure-volume relation, of 'supine pv fit'; default: a normal adult's",
+    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
@@ -94,12 +94,12 @@ static const supine_option table[] = {
      .standard = "SUPINE", .more = true},
     {"fps", 0, "N", "largest number of frames a second", SUPINE_FILLS(request, fps),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
-    {"peers", 0, "N", "largest number of peers, and of viewers of the page, at a time",
+    {"peers", 0, "N", "largest number of peers, and of viewers of the page",
      SUPINE_FILLS(request, peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live, to any number of viewers; a phone that shows it "
-     "can send its own tilt. A port without an address is reached from this machine only",
+     "can send its own tilt. A port without an address can be reached from this machine only",
      SUPINE_FILLS(request, web)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
@@ -109,7 +109,7 @@ static const supine_option table[] = {
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
      .file = SUPINE_FILE_IN, .more = true},
     {.help = "Recording:"},
-    {"record", 0, "POSES.csv", "write the poses followed, at the end of the run",
+    {"record", 0, "POSES.csv", "write the received poses, at the end of the run",
      SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
     {"replay", 0, "POSES.csv",
      "follow recorded poses instead, from the first peer or viewer on, then stop",
@@ -358,13 +358,12 @@ const supine_command supine_command_stream = {
     name,
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
-    .about =
-        "A tracker says how the patient lies; the lungs for each pose are sent on as they come, to "
-        "any number of peers, by OpenIGTLink (headers of version 1 and 2). Poses are TRANSFORM, "
-        "QTDATA or POSITION messages, or a tilt sensor's: an NDARRAY [3], where things fall, or a "
-        "SENSOR [3], an accelerometer at rest. The newest pose wins: nothing queues, and a slow "
-        "peer misses frames instead of holding up the others. In the end it says how long it took "
-        "from pose received to frame sent.",
+    .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
+             "and sends the lungs in that pose to any number of peers. Poses are TRANSFORM, QTDATA "
+             "or POSITION messages, or those of a tilt sensor: an NDARRAY [3], the direction of "
+             "gravity, or a SENSOR [3], an accelerometer at rest. Only the newest pose counts: "
+             "nothing queues, and a slow peer misses frames without delaying the others. At the "
+             "end the time from a pose received to its frame sent is printed.",
     .options = table,
     .notes =
         "Examples:\n"
