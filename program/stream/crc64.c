@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* CRC-64 by carry-less multiplication, 64 bytes a step, where the processor has it; else by bytes.
+/* CRC-64 by carry-less multiplication, 64 bytes per step, where the processor has it; else by
+ * bytes.
  */
 #include <pthread.h>
 
@@ -45,7 +46,7 @@ uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t powe
   return multiply(first, power) ^ second;
 }
 
-static void work_out(void) {
+static void make_tables(void) {
   for (unsigned b = 0; b < 256; ++b) {
     uint64_t value = (uint64_t)b << 56;
     for (int bit = 0; bit < 8; ++bit) {
@@ -108,7 +109,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
 #endif
 
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size) {
-  (void)pthread_once(&once, work_out);
+  (void)pthread_once(&once, make_tables);
   const unsigned char *at = bytes;
 #ifdef CRC64_CARRY_LESS
   if (size >= 64 && __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("ssse3")) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Frames as messages. */
+/* Make messages of frames. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,8 +9,8 @@
 #include "program/stream/strips.h"
 #include "sh/base/parallel.h"
 
-/* Positions, their bytes and their checksum are done while a piece is in the first cache. A thread
- * is worth starting for 64 pieces. */
+/* Vertices whose positions, bytes and checksum are computed together, in the first cache. A thread
+ * is worth starting for 64 such pieces. */
 enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256 };
 
 struct supine_stream_frames {
@@ -96,8 +96,8 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
   }
 }
 
-/* Positions and errors of located lungs, all at once: they want a pass over the whole surface.
- * @retval false  memory is short; lungs that cannot be had keep the law's positions */
+/* Compute positions and errors of lungs located from observed points. Where they cannot be
+ * computed, the positions of the law remain. Return false where memory is short. */
 static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *xyz = malloc(3 * count * sizeof *xyz + 1);
@@ -125,7 +125,7 @@ static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   return good;
 }
 
-/* Checksums of the parts that threads place. */
+/* The parts of the points that threads compute, and their checksums. */
 typedef struct placing {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
@@ -146,7 +146,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* The points of a frame, once for all peers. */
+/* Compute the points of a frame, once for all peers. */
 static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   if (frame->points == NULL) {
@@ -170,7 +170,7 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   return true;
 }
 
-/* Put weights and gains as floats of the wire; returns their bytes. */
+/* Write weights and gains as an array of floats; return its size in bytes. */
 static size_t put_weights(const supine_stream_frames *f, const supine_stream_moment *moment,
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;
@@ -192,24 +192,19 @@ static void add_piece(supine_stream_parcel *parcel, void *bytes, size_t size) {
 }
 
 bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame *frame,
-                              supine_stream_what what, bool triangles, unsigned version,
+                              supine_stream_what what, bool triangles,
                               supine_stream_parcel *parcel) {
-  static unsigned char metadata[SUPINE_STREAM_METADATA];
   const bool weights = what == SUPINE_STREAM_WEIGHTS;
   if (!weights && !place_points(frames, frame)) {
     return false;
   }
   const bool located = !weights && frame->moment.location != NULL;
   unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
-  size_t size = 0;
-  if (version == 2) {
-    supine_stream_extension((uint32_t)frame->number, body);
-    size += SUPINE_STREAM_EXTENSION;
-  }
-  size += weights ? put_weights(frames, &frame->moment, body + size)
-                  : supine_stream_polydata_head(
-                        frames->info->vertex_count, triangles ? frames->triangles.count : 0,
-                        triangles ? frames->triangles.size : 0, located ? 1 : 0, body + size);
+  const size_t size = weights ? put_weights(frames, &frame->moment, body)
+                              : supine_stream_polydata_head(frames->info->vertex_count,
+                                                            triangles ? frames->triangles.count : 0,
+                                                            triangles ? frames->triangles.size : 0,
+                                                            located ? 1 : 0, body);
   parcel->count = 0;
   parcel->size = 0;
   add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
@@ -227,11 +222,7 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
     add_piece(parcel, frame->errors, bytes);
     crc = supine_stream_crc64(crc, frame->errors, bytes);
   }
-  if (version == 2) {
-    add_piece(parcel, metadata, sizeof metadata);
-    crc = supine_stream_crc64(crc, metadata, sizeof metadata);
-  }
-  supine_stream_header header = {.version = version,
+  supine_stream_header header = {.version = 1,
                                  .stamp = frame->moment.stamp,
                                  .size = parcel->size - SUPINE_STREAM_HEADER,
                                  .crc = crc};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The exported page, allowed to open a socket to where it came from, and with live.js in it. */
+/* Add live.js to the exported page, and allow it to open a socket to its server. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,8 @@ extern const supine_asset supine_stream_assets[]; /* live.js, put in by the buil
 static const char silent[] = "default-src 'none';";
 static const char talking[] = "default-src 'none'; connect-src 'self' ws: wss:;";
 
-/* `page` with the first `from` replaced by `to`. */
+/* Replace the first `from` in a page, which is freed, and return the result; NULL: not found, or no
+ * memory. */
 static char *replace(char *page, size_t *size, const char *from, const void *to, size_t to_size) {
   const size_t from_size = strlen(from);
   char *at = page == NULL ? NULL : memmem(page, *size, from, from_size);
@@ -75,7 +76,7 @@ supine_status supine_stream_live_page(const char *basis, const export_page *show
     *page = replace(*page, size, end, script, length < 0 ? 0 : (size_t)length);
     free(script);
     if (*page == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "the page cannot be made to follow");
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
     }
   }
   return status;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Bytes of messages: headers, heads of contents, points. */
+/* Read and write headers; write the beginnings of contents, and points. */
 #include <ctype.h>
 #include <string.h>
 
@@ -36,7 +36,7 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
   for (const char *c = header->type; *c != '\0'; ++c) {
     if (!isprint((unsigned char)*c)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "the type of a message is not text: send OpenIGTLink");
+                              "the type of a message is not text: send OpenIGTLink messages");
     }
   }
   return SUPINE_OK;
@@ -82,14 +82,7 @@ size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
   return SUPINE_STREAM_ATTRIBUTE;
 }
 
-void supine_stream_extension(uint32_t message, unsigned char bytes[SUPINE_STREAM_EXTENSION]) {
-  put(bytes, 2, SUPINE_STREAM_EXTENSION);
-  put(bytes + 2, 2, SUPINE_STREAM_METADATA);
-  put(bytes + 4, 4, 0);
-  put(bytes + 8, 4, message);
-}
-
-/* Points converted to big-endian together, in vectors. */
+/* Points that are converted to big-endian together, by vector instructions. */
 enum { BUNCH = 16 };
 
 SUPINE_CLONES static void put_bunch(const float *xyz, const uint32_t *sign, unsigned char *bytes) {

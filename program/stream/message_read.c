@@ -6,7 +6,7 @@
 #include "program/stream/crc64.h"
 #include "program/stream/message.h"
 
-/* The unread part of a body. Reading past its end gives zeros and sets `short_of`. */
+/* The unread part of a body. Reading beyond its end returns zeros and sets `short_of`. */
 typedef struct cursor {
   const unsigned char *at;
   size_t left;
@@ -92,7 +92,7 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
   }
 }
 
-/* Of 12 bytes there is no orientation; of 24 the fourth element is left out, and not negative. */
+/* A position of 12 bytes has no orientation; one of 24 omits W, which is then not negative. */
 static void position(cursor *c, supine_stream_message *m) {
   const size_t size = c->left;
   if (size == 12) {
@@ -128,7 +128,7 @@ static void instruments(cursor *c, const char *device, const supine_stream_heade
   }
 }
 
-/* One or three floats; nothing else is expected in an array. */
+/* Read an array of `expected` numbers, and ignore any other. */
 static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, uint64_t expected) {
   const uint64_t type = whole(c, 1);
   const uint64_t dimension = whole(c, 1);
@@ -184,7 +184,7 @@ int supine_stream_message_wanted(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Cuts extension and metadata off a body of version 2. */
+/* Remove extension and metadata from a body of version 2. */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);
@@ -216,7 +216,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   if (strcmp(header->device, "VOLUME") == 0 || strcmp(header->device, "SEND") == 0) {
     const int volume = header->device[0] == 'V';
     if (type == STRING) {
-      string(&c, message, volume ? SUPINE_STREAM_VOLUME_TEXT : SUPINE_STREAM_WISH);
+      string(&c, message, volume ? SUPINE_STREAM_VOLUME_TEXT : SUPINE_STREAM_REQUEST);
     } else if (type == NDARRAY && volume) {
       array(&c, message, SUPINE_STREAM_VOLUME, 1);
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute posture and volume from messages, and from these the state of the lungs. */
+/* Take posture and volume from messages, and compute the state of the lungs. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -42,8 +42,8 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   patient->options->warn(patient->options->context, text);
 }
 
-static void take(supine_stream_patient *p, const double gravity[3], double received,
-                 uint64_t stamp) {
+static void take_pose(supine_stream_patient *p, const double gravity[3], double received,
+                      uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
   if (!p->posed) { /* first pose: nothing to smooth from */
     memcpy(p->smooth, gravity, sizeof p->smooth);
@@ -70,9 +70,9 @@ static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const
   }
   if (verdict == SUPINE_STREAM_REPAIRED) {
     ++p->counts->repaired;
-    supine_stream_patient_warn(p, received, "a pose is no rotation, its nearest is taken: %s", why);
+    supine_stream_patient_warn(p, received, "a pose is not a rotation, but used: %s", why);
   }
-  take(p, gravity, received, stamp);
+  take_pose(p, gravity, received, stamp);
 }
 
 /* Store the position of a sensor; false where no sensor has that name. */
@@ -101,9 +101,9 @@ static void place_all(supine_stream_patient *p, const supine_stream_message *mes
   }
 }
 
-void supine_stream_patient_hear(supine_stream_patient *patient,
-                                const supine_stream_message *message, double received,
-                                uint64_t stamp) {
+void supine_stream_patient_receive(supine_stream_patient *patient,
+                                   const supine_stream_message *message, double received,
+                                   uint64_t stamp) {
   const supine_stream_setup *setup = &patient->options->setup;
   supine_stream_volume *volume = patient->options->volume;
   supine_stream_verdict verdict = SUPINE_STREAM_EXACT;
@@ -149,7 +149,7 @@ void supine_stream_patient_hear(supine_stream_patient *patient,
     }
     break;
   case SUPINE_STREAM_NOTHING:
-  case SUPINE_STREAM_WISH:
+  case SUPINE_STREAM_REQUEST:
     break;
   }
 }
@@ -224,7 +224,7 @@ static void find_location(supine_stream_patient *patient, double now,
   }
   if (status != SUPINE_OK) {
     moment->location = NULL;
-    supine_stream_patient_warn(patient, now, "the points show no lungs: %s", error.message);
+    supine_stream_patient_warn(patient, now, "no lungs fit the points: %s", error.message);
   } else if (moment->location != NULL) {
     moment->pose = pose;
     moment->above += moment->location->volume - moment->volume;

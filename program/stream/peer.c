@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A peer's socket, read and written without waiting. */
+/* Read and write the socket of a peer without waiting. */
 #include <errno.h>
 #include <linux/sockios.h>
 #include <netinet/in.h>
@@ -12,8 +12,8 @@
 
 #include "program/stream/peer.h"
 
-static const uint64_t body_most =
-    256u << 20; /* largest message skipped, such as an image; more is no message */
+/* Largest message that is skipped, such as an image; anything larger is taken for an error. */
+static const uint64_t body_most = 256u << 20;
 
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error) {
@@ -30,7 +30,6 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
   peer->took = peer->said = peer->heard = now;
   peer->body = body;
   peer->what = what;
-  peer->version = 1;
   return SUPINE_OK;
 }
 
@@ -45,8 +44,9 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
   peer->body = NULL;
 }
 
-/* Up to `size` bytes into `bytes`: what came, 0 where nothing has, -1 where the peer is gone. */
-static ssize_t receive(int socket, void *bytes, size_t size) {
+/* Receive up to `size` bytes; return their number, 0 where none have come, -1 where the peer is
+ * gone. */
+static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
   for (;;) {
     const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
     if (got > 0) {
@@ -61,18 +61,17 @@ static ssize_t receive(int socket, void *bytes, size_t size) {
   }
 }
 
-/* Read the body of a complete header, or skip it. */
+/* Parse a complete header, and choose whether to read or skip its body. */
 static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
   if (supine_stream_header_read(peer->raw, &peer->header, error) != SUPINE_OK) {
     return false;
   }
   const uint64_t size = peer->header.size;
   if (size > body_most) {
-    (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "a message of %llu bytes",
+    (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "it sent a message of %llu bytes",
                            (unsigned long long)size);
     return false;
   }
-  peer->version = peer->header.version;
   peer->got = 0;
   peer->in_body = supine_stream_message_wanted(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
   if (!peer->in_body) {
@@ -83,7 +82,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
 }
 
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
-                                              supine_stream_hear *hear, void *context,
+                                              supine_stream_receive *receive, void *context,
                                               uint64_t *skipped, supine_error *error) {
   unsigned char waste[4096];
   size_t share = 65536;
@@ -96,7 +95,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
     }
     ssize_t got = 0;
     if (size > 0) {
-      got = receive(peer->socket, into, size < share ? size : share);
+      got = receive_bytes(peer->socket, into, size < share ? size : share);
       if (got < 0) {
         return SUPINE_STREAM_LOST;
       }
@@ -123,7 +122,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
     }
     peer->in_body = false;
     peer->got = 0;
-    hear(context, peer);
+    receive(context, peer);
   }
   return SUPINE_STREAM_MORE;
 }
@@ -138,8 +137,7 @@ bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *fra
                              supine_stream_frame *frame, double now) {
   const bool triangles = peer->what == SUPINE_STREAM_SURFACE ||
                          (peer->what == SUPINE_STREAM_POINTS && !peer->knows_triangles);
-  if (!supine_stream_frame_wrap(frames, frame, peer->what, triangles, peer->version,
-                                &peer->parcel)) {
+  if (!supine_stream_frame_wrap(frames, frame, peer->what, triangles, &peer->parcel)) {
     return false;
   }
   peer->knows_triangles = peer->what == SUPINE_STREAM_POINTS;

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * One peer: what it says, and the frame that is on its way to it. Nothing here waits.
+ * One peer: messages received from it, and the frame being sent to it. Nothing here waits.
  *
- * A peer that is slow misses frames: the next one it gets is the newest there is when the last has
- * left, never one of a queue. */
+ * A slow peer misses frames: after each frame it is sent the newest one, never one of a queue. */
 #ifndef SUPINE_STREAM_PEER_H
 #define SUPINE_STREAM_PEER_H
 
@@ -12,7 +11,7 @@
 
 typedef struct supine_stream_peer {
   int socket;        /**< socket; -1: no peer */
-  bool connecting;   /**< not yet there */
+  bool connecting;   /**< not yet connected */
   double took, said; /**< when the peer last took data, and last sent some, s */
   /* received data */
   unsigned char raw[SUPINE_STREAM_HEADER];
@@ -21,52 +20,51 @@ typedef struct supine_stream_peer {
   supine_stream_header header;
   uint64_t skip;       /**< bytes of a body that is not read */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
-  double heard;        /**< s, when everything it had sent had been read */
+  double heard;        /**< s, when the socket was last found empty */
   /* data to send */
   supine_stream_what what;
-  unsigned version; /**< version of headers: that of the peer's own; 1 until it sends one */
   bool knows_triangles;
-  uint64_t begun;             /**< number of the frame that was begun last */
-  supine_stream_frame *frame; /**< on its way; NULL: none */
+  uint64_t begun;             /**< number of the last frame */
+  supine_stream_frame *frame; /**< being sent; NULL: none */
   supine_stream_parcel parcel;
   size_t sent; /**< of the parcel */
 } supine_stream_peer;
 
 /** Result of reading or sending. */
 typedef enum supine_stream_outcome {
-  SUPINE_STREAM_DONE = 0, /**< all there was */
-  SUPINE_STREAM_MORE,     /**< there may be more: read: this pass's share is used up; sent: the rest
-                               must wait until the socket takes it */
-  SUPINE_STREAM_LOST      /**< the peer is gone, or sent what is no message */
+  SUPINE_STREAM_DONE = 0, /**< complete */
+  SUPINE_STREAM_MORE,     /**< there may be more: to read, in the next pass; to send, when the
+                               socket accepts it */
+  SUPINE_STREAM_LOST      /**< the peer is gone, or sent something that is not a message */
 } supine_stream_outcome;
 
-/** @retval SUPINE_ERROR_MEMORY; the socket stays the caller's then */
+/** Begin a peer, which owns the socket from then on.
+ * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error);
-/** Closes the socket and leaves the frame. */
+/** Close the socket and release the frame. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Called for each message whose body is worth reading; the body lies in `peer->body`. */
-typedef void supine_stream_hear(void *context, supine_stream_peer *peer);
+/** Called for each message of a known type; its body is in `peer->body`. */
+typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
-/** Reads what has come, up to a share of 64 KiB. Bodies of other types are passed over by their
- * length; a message that claims more than 256 MiB, or is no message, loses the peer.
- * @param skipped  counts messages that were passed over
- * @param error    says why the peer is lost, where it is its own fault; else untouched */
+/** Read received bytes, up to 64 KiB. Messages of other types are skipped; the peer is lost where
+ * it sends something that is not a message, or one above 256 MiB.
+ * @param skipped  incremented for each skipped message
+ * @param error    set where the peer is lost by its own fault; else untouched */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
-                                              supine_stream_hear *hear, void *context,
+                                              supine_stream_receive *receive, void *context,
                                               uint64_t *skipped, supine_error *error);
 
-/** Return whether no frame is in transit, here or in the kernel's queue. */
+/** Return whether a frame can be sent: none is being sent, here or in the kernel's queue. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
-/** Begins a frame.
- * @retval false  memory is short */
+/** Begin to send a frame; false where memory is short. */
 bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame, double now);
 
-/** Sends what the socket takes, up to a share of 1 MiB, so that no peer holds up the others. When
- * the frame has left, `peer->frame` is still it; the caller leaves it. */
+/** Send as much as the socket accepts, up to 1 MiB, so that no peer delays the others.
+ * `peer->frame` remains when the frame is sent; the caller releases it. */
 supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double now);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Observed points, live. */
+/* Store observed points, and locate the lungs from them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

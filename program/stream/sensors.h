@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Points inside the lungs that are observed live: where each was seen last, and the lungs that
- * follow from them (supine/locate.h). */
+ * Points inside the lungs that are observed live: their last positions, and the lungs located from
+ * them (supine/locate.h). */
 #ifndef SUPINE_STREAM_SENSORS_H
 #define SUPINE_STREAM_SENSORS_H
 
@@ -9,7 +9,7 @@
 
 #include <supine/locate.h>
 
-/** What sensors there are; the caller's. */
+/** The sensors; owned by the caller. */
 typedef struct supine_stream_sensor_list {
   const supine_basis *inside; /**< of 'supine embed' */
   size_t count;               /**< at most SUPINE_LOCATE_POINTS_MAX */
@@ -28,14 +28,14 @@ supine_status supine_stream_sensors_create(const supine_stream_sensor_list *list
 /** NULL is legal. */
 void supine_stream_sensors_destroy(supine_stream_sensors *sensors);
 
-/** Take in where a point is seen. Not-a-number makes it unseen.
+/** Store the position of a point; not-a-number marks it as not seen.
  * @return false where no sensor has that name */
 bool supine_stream_sensors_take(supine_stream_sensors *sensors, const char *name,
                                 const double position[3]);
 
-/** Find the lungs in a posture from all points seen so far.
- * @param state     volume DEFAULT: found
- * @param location  written; valid until the next call; NULL where no point was seen yet
+/** Locate the lungs in a posture from all points seen.
+ * @param state     volume DEFAULT: fitted
+ * @param location  valid until the next call; NULL where no point was seen
  * @retval those of supine_locate */
 supine_status supine_stream_sensors_locate(supine_stream_sensors *sensors,
                                            const supine_state *state,

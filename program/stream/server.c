@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Main loop: read messages, compute a frame of the newest pose, send it. */
+/* Main loop: read messages, compute a frame for the newest pose, send it. */
 #include <errno.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -16,10 +16,11 @@
 #include "program/stream/server.h"
 #include "sh/base/clock.h"
 
-static const double frame_time = 15e-3; /* s: while the lungs move though no pose comes */
-static const double retry_time = 20e-3; /* s: peers whose kernel still holds the last frame */
-static const double again_time = 1.0;   /* s: connecting, and accepting where that failed */
-static const double asked_time = 0.1;   /* s: whether to stop */
+/* Intervals, s. */
+static const double frame_time = 15e-3; /* between frames while the lungs move without new poses */
+static const double retry_time = 20e-3; /* until a socket that still holds a frame is tried again */
+static const double again_time = 1.0;   /* until connecting or accepting is tried again */
+static const double asked_time = 0.1;   /* between checks whether to stop */
 
 struct supine_stream_server {
   const supine_stream_options *options;
@@ -98,7 +99,7 @@ static void connect_peer(supine_stream_server *s) {
   s->connect_at = s->connected == NULL ? s->woke + again_time : (double)INFINITY;
 }
 
-/* The socket of a peer on its way is writable: it is there, or it failed. */
+/* Handle a connecting socket that became writable: it is connected, or it failed. */
 static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
   int failure = 0;
   socklen_t size = sizeof failure;
@@ -111,7 +112,7 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
   ++s->counts.peers;
 }
 
-static void hear_wish(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
+static void take_request(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
   for (int what = 0; what < SUPINE_STREAM_WHAT_COUNT; ++what) {
     if (strcmp(text, supine_stream_what_name((supine_stream_what)what)) == 0) {
       peer->what = (supine_stream_what)what;
@@ -120,11 +121,11 @@ static void hear_wish(supine_stream_server *s, supine_stream_peer *peer, const c
       return;
     }
   }
-  supine_stream_patient_warn(&s->patient, s->woke,
-                             "a peer asks for '%s': weights, points, surface or nothing", text);
+  supine_stream_patient_warn(
+      &s->patient, s->woke, "a peer requests '%s': send weights, points, surface or nothing", text);
 }
 
-static void hear(void *context, supine_stream_peer *peer) {
+static void receive(void *context, supine_stream_peer *peer) {
   supine_stream_server *s = context;
   supine_stream_message message;
   supine_error error;
@@ -134,20 +135,19 @@ static void hear(void *context, supine_stream_peer *peer) {
     supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s", error.message);
     return;
   }
-  if (message.kind == SUPINE_STREAM_WISH) {
-    hear_wish(s, peer, message.text);
+  if (message.kind == SUPINE_STREAM_REQUEST) {
+    take_request(s, peer, message.text);
     return;
   }
-  /* Where poll() had nothing to wait for, the message may have lain there since the socket was last
-   * empty. */
+  /* Where poll() did not wait, the message may have been there since the socket was last empty. */
   const bool waited = s->woke - s->waited > 50e-6;
-  supine_stream_patient_hear(&s->patient, &message, waited ? s->woke : peer->heard,
-                             peer->header.stamp);
+  supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->heard,
+                                peer->header.stamp);
 }
 
 static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
   supine_error error = {.status = SUPINE_OK};
-  if (supine_stream_peer_read(peer, s->woke, hear, s, &s->counts.skipped, &error) ==
+  if (supine_stream_peer_read(peer, s->woke, receive, s, &s->counts.skipped, &error) ==
       SUPINE_STREAM_LOST) {
     if (error.status != SUPINE_OK) {
       ++s->counts.lost;
@@ -175,7 +175,7 @@ static void replay_poses(supine_stream_server *s) {
   }
 }
 
-/* When the next frame is due: INFINITY where nothing moves. */
+/* Return the time of the next frame; INFINITY where nothing moves. */
 static double frame_due(const supine_stream_server *s) {
   const double soonest = s->latest == NULL ? 0.0 : s->framed + 1.0 / s->options->rate;
   if (s->patient.fresh || s->latest == NULL) {
@@ -184,7 +184,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* Poses received at that rate trigger the frames themselves. */
+  /* While poses are received at this rate, they trigger the frames. */
   const bool posed = s->woke - s->patient.received < 2.0 * frame_time;
   return fmax(soonest, s->framed + (posed ? 2.0 : 1.0) * frame_time);
 }
@@ -201,12 +201,12 @@ static bool make_frame(supine_stream_server *s) {
   s->framed = s->woke;
   ++s->counts.frames;
   if (s->options->web != NULL) {
-    supine_stream_web_tell(s->options->web, &moment);
+    supine_stream_web_send(s->options->web, &moment);
   }
   return true;
 }
 
-/* Send the newest frame to a peer that is ready, or the rest of an older one. */
+/* Send a peer the newest frame where it is ready, or the rest of an older one. */
 static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (lagging(s, peer) && supine_stream_peer_ready(peer) &&
       !supine_stream_peer_give(peer, s->frames, s->latest, s->woke)) {
@@ -266,8 +266,8 @@ static void lose_stuck(supine_stream_server *s) {
   }
 }
 
-/* Compute the timeout of poll, ms. */
-static struct timespec patience_of(const supine_stream_server *s, double end) {
+/* Compute the timeout of poll. */
+static struct timespec find_timeout(const supine_stream_server *s, double end) {
   const supine_stream_poses *poses = s->options->replay;
   double next = fmin(fmin(s->woke + asked_time, end), fmin(s->connect_at, frame_due(s)));
   if (poses != NULL && s->replay_begun >= 0.0 && s->replayed < poses->count) {
@@ -341,9 +341,9 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   double asked = s->woke;
   while (s->woke < end && !replay_over(s)) {
     const nfds_t count = gather(s);
-    const struct timespec patience = patience_of(s, end);
+    const struct timespec timeout = find_timeout(s, end);
     s->waited = supine_clock_seconds();
-    if (ppoll(s->polled, count, &patience, NULL) < 0 && errno != EINTR) {
+    if (ppoll(s->polled, count, &timeout, NULL) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "poll: %s", strerror(errno));
     }
     s->woke = supine_clock_seconds();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Greedy strips: the longest of the three that start at the first triangle left. */
+/* Make strips greedily: from the first unused triangle, the longest of its three strips. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,7 +24,7 @@ static uint32_t after(uint32_t edge) {
   return edge % 3 == 2 ? edge - 2 : edge + 1;
 }
 
-/* An edge between two vertices, in that direction, of a triangle that is left. */
+/* Return an edge from one vertex to another of an unused triangle; `none` where there is none. */
 static uint32_t edge_between(const walk *w, uint32_t from, uint32_t to) {
   uint32_t edge = w->first[from];
   for (int i = 0; i < LOOKS && edge != none; ++i, edge = w->next[edge]) {
@@ -35,8 +35,8 @@ static uint32_t edge_between(const walk *w, uint32_t from, uint32_t to) {
   return none;
 }
 
-/* The strip that begins with an edge: of each of its triangles the edge that it shares with the one
- * before; returns how many. They stay marked as used. */
+/* Build the strip that begins with an edge: for each of its triangles the edge shared with the
+ * previous one. Return the number of triangles, which remain marked as used. */
 static size_t grow(walk *w, uint32_t edge) {
   size_t count = 0;
   uint32_t last = w->corner[after(edge)];
@@ -51,7 +51,7 @@ static size_t grow(walk *w, uint32_t edge) {
   return count;
 }
 
-/* The longest of the strips that begin with a triangle, into w->best. */
+/* Find the longest strip that begins with a triangle, in w->best; return its length. */
 static size_t longest(walk *w, uint32_t triangle) {
   size_t most = 0;
   for (uint32_t k = 0; k < 3; ++k) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * A surface's triangles as strips, as POLYDATA has them: a third of the bytes of triangles. */
+ * Triangle strips of a surface for POLYDATA: a third of the bytes of its triangles. */
 #ifndef SUPINE_STREAM_STRIPS_H
 #define SUPINE_STREAM_STRIPS_H
 
@@ -9,15 +9,15 @@
 
 #include <supine/status.h>
 
-/** Strips on the wire: for each its number of corners and the corners, 32 bits, big-endian. Corners
- * i, i + 1, i + 2 of a strip are a triangle, which faces the other way round where i is odd. */
+/** Strips as sent: for each the number of its corners and the corners, 32 bits, big-endian. Corners
+ * i, i + 1, i + 2 of a strip are a triangle, of the opposite orientation where i is odd. */
 typedef struct supine_stream_strips {
-  unsigned char *bytes; /**< [size]; the caller's, to be freed */
+  unsigned char *bytes; /**< [size]; the caller frees them */
   size_t size;
   size_t count; /**< of strips */
 } supine_stream_strips;
 
-/** Makes strips of triangles: each triangle once, as it faces, in an order of the strips' own.
+/** Make strips that contain each triangle once, in its orientation, in another order.
  * @param triangles  [count] corners below `vertices`
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_strips_make(const uint32_t *triangles, size_t count, size_t vertices,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The page and its WebSocket, by libwebsockets, in a thread of its own. */
+/* Serve the page and its WebSocket by libwebsockets, in a thread of their own. */
 #include <jansson.h>
 #include <libwebsockets.h>
 #include <math.h>
@@ -29,29 +29,29 @@
 /* libwebsockets, which brings OpenSSL and three event loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
-enum { TEXT = 256, HEARD = 512, CHUNK = 65536 };
+enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
 
 struct supine_stream_web {
   supine_stream_site site;
   struct lws_context *context;
   int port;
-  int event; /* readable when a pose has come */
+  int event; /* readable when a pose was received */
   pthread_t thread;
   bool running;
   atomic_bool ending;
   atomic_size_t viewers;
-  pthread_mutex_t lock; /* of what follows */
-  uint64_t told;        /* number of the moment in `text` */
-  char text[TEXT];      /* JSON, but for the pose's age and the end */
-  double posed_at;      /* s of the clock, when the newest pose shown came; 0: none did */
+  pthread_mutex_t lock; /* for the fields below */
+  uint64_t number;      /* of the state in `text` */
+  char text[TEXT];      /* JSON without the age of the pose and the end */
+  double posed_at;      /* s of the clock, when the newest pose was received; 0: none */
   bool posed;
   double gravity[3], received;
 };
 
-/* One connection: the page on its way to a browser, or a viewer. */
+/* A connection: of a browser that loads the page, or of a viewer. */
 typedef struct session {
   size_t sent;
-  uint64_t told;
+  uint64_t number;
   bool counted;
 } session;
 
@@ -59,7 +59,8 @@ static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* Accept sockets only from our own page: browsers send its origin, other programs none. */
+/* Return whether a socket is opened by our own page, or by a program other than a browser, which
+ * sends no origin. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
@@ -74,8 +75,8 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* {"gravity":[x,y,z]} */
-static void hear(supine_stream_web *web, const char *bytes, size_t size) {
+/* Read {"gravity":[x,y,z]}. */
+static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
   double number[3];
@@ -98,19 +99,19 @@ static void hear(supine_stream_web *web, const char *bytes, size_t size) {
 }
 
 /* Send the newest state where the viewer has not received it; 0, or -1 to end. */
-static int tell(supine_stream_web *web, struct lws *wsi, session *s) {
+static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
   (void)pthread_mutex_lock(&web->lock);
-  const uint64_t told = web->told;
+  const uint64_t number = web->number;
   const double age = web->posed_at > 0 ? supine_clock_seconds() - web->posed_at : -1;
   const int size =
       snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
-  if (told == s->told) {
+  if (number == s->number) {
     return 0;
   }
-  s->told = told;
+  s->number = number;
   return lws.write(wsi, bytes + LWS_PRE, (size_t)size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
 }
 
@@ -134,14 +135,14 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
       (void)atomic_fetch_sub(&web->viewers, 1);
     }
     return 0;
-  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* by supine_stream_web_tell */
+  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* by supine_stream_web_send */
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
-    return tell(web, wsi, s);
-  case LWS_CALLBACK_RECEIVE: /* longer ones come in pieces, and are none of ours */
+    return send_state(web, wsi, s);
+  case LWS_CALLBACK_RECEIVE: /* messages in several parts are too long to be valid */
     if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
-      hear(web, in, size);
+      receive(web, in, size);
     }
     return 0;
   default:
@@ -200,7 +201,7 @@ static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, 
 
 static const struct lws_protocols protocols[] = {
     {"http", serve, sizeof(session), 0, 0, NULL, 0},
-    {"supine", view, sizeof(session), HEARD, 0, NULL, 0},
+    {"supine", view, sizeof(session), RECEIVED, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0}};
 
 static void *run(void *context) {
@@ -297,13 +298,13 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
   return posed;
 }
 
-void supine_stream_web_tell(supine_stream_web *web, const supine_stream_moment *moment) {
+void supine_stream_web_send(supine_stream_web *web, const supine_stream_moment *moment) {
   (void)pthread_mutex_lock(&web->lock);
   (void)snprintf(web->text, sizeof web->text,
                  "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g", moment->gravity[0],
                  moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
   web->posed_at = moment->received >= 0 ? moment->received : web->posed_at;
-  ++web->told;
+  ++web->number;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {
     lws.cancel_service(web->context);
