@@ -21,7 +21,6 @@
 #include <supine/runtime.h>
 
 #include "sh/base/clock.h"
-#include "sh/base/denormals.h"
 #include "sh/base/parallel.h"
 #include "tests/runtime_fixture.h"
 
@@ -274,9 +273,8 @@ static size_t add_entries(bench *work, entry *entries) {
   return count;
 }
 
-/* Take turns, each turn beginning with another entry, denormal numbers flushed. */
+/* Take turns, each turn beginning with another entry. */
 static void measure(entry *entries, size_t count, size_t vertices) {
-  const unsigned saved = supine_denormals_flush();
   const size_t rounds = 1 + ENOUGH / vertices;
   for (size_t turn = 0; turn < REPEATS; ++turn) {
     for (size_t i = 0; i < count; ++i) {
@@ -289,7 +287,6 @@ static void measure(entry *entries, size_t count, size_t vertices) {
       e->seconds = fmin(e->seconds, (supine_clock_seconds() - begin) / (double)rounds);
     }
   }
-  supine_denormals_restore(saved);
 }
 
 static double find(const entry *entries, size_t count, const char *what, const char *how,
