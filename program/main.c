@@ -90,6 +90,7 @@ int main(int argc, char **argv) {
   (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
   openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own */
+  (void)setenv("OMP_THREAD_LIMIT", "1", 0); /* CHOLMOD's loops are too short for threads */
   supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();

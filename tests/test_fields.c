@@ -59,7 +59,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
   fields.directions = malloc(3 * count * sizeof(double));
   fields.displacement = malloc(3 * count * n * sizeof(double));
   for (size_t d = 0; d < count; ++d) {
-    supine_solution solution;
+    supine_solution solution = {0};
     double *u = fields.displacement + 3 * d * n;
     random_direction(&seed, fields.directions + 3 * d);
     assert_int_equal(supine_physics_solve(of, &model, fields.directions + 3 * d, &solution, NULL),

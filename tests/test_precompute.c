@@ -197,7 +197,7 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
     double weights[SUPINE_MODES_MAX];
     double scales[2] = {1.0, 1.0};
     double scale;
-    supine_solution solution;
+    supine_solution solution = {0};
     assert_int_equal(supine_physics_solve(lungs, model, g, &solution, NULL), SUPINE_OK);
     assert_int_equal(supine_basis_weights(basis, g, weights), SUPINE_OK);
     supine_physics_solution_apply(&solution, &lungs->mesh, 1.0, should);
@@ -232,7 +232,7 @@ static double error_of_first(size_t kept, const supine_lungs *lungs, const supin
   double field2 = 0.0;
   for (size_t d = 0; d < count; ++d) {
     double weights[SUPINE_MODES_MAX];
-    supine_solution solution;
+    supine_solution solution = {0};
     assert_int_equal(supine_physics_solve(lungs, model, directions + 3 * d, &solution, NULL),
                      SUPINE_OK);
     assert_int_equal(supine_basis_weights(basis, directions + 3 * d, weights), SUPINE_OK);

@@ -579,10 +579,10 @@ static void test_lung_alone_moves_as_in_its_pair(void **state) {
     skip();
   }
   for (size_t p = 0; p < 6; ++p) {
-    supine_solution both;
+    supine_solution both = {0};
     assert_int_equal(supine_physics_solve(&pair, &model, postures[p], &both, NULL), SUPINE_OK);
     for (size_t side = 0; side < 2; ++side) {
-      supine_solution one;
+      supine_solution one = {0};
       double square = 0.0;
       assert_int_equal(supine_physics_solve(&alone[side], &model, postures[p], &one, NULL),
                        SUPINE_OK);

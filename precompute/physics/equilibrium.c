@@ -3,6 +3,7 @@
  * factorise it with CHOLMOD. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <suitesparse/cholmod.h>
 
@@ -42,6 +43,7 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
+  double reach;    /* mm */
   double *area;    /* [N] area of a vertex over the mean; NULL: the paper's springs */
   double *link;    /* [edges] with a reach w / 2, without D(mass, spring) in mm */
   double *lesions; /* [N] factors on the normalised stiffness */
@@ -177,14 +179,10 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
  * link's own area a (a third of its triangles') and length h, c = 2 a / h^2 does so for links that
  * run in all directions alike; unlike cotangents it is never negative, whatever the triangles, at
  * the price of R^2 within a tenth or so. */
-static bool set_reach(supine_equilibrium *eq, const supine_mesh *mesh, double reach) {
+static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
   double mean = 0.0;
-  eq->area = malloc(n * sizeof *eq->area);
-  if (eq->area == NULL) {
-    return false;
-  }
   supine_mesh_vertex_area(mesh, eq->area);
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
@@ -194,6 +192,7 @@ static bool set_reach(supine_equilibrium *eq, const supine_mesh *mesh, double re
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
   }
+  memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     double edge[2][3];
@@ -211,10 +210,9 @@ static bool set_reach(supine_equilibrium *eq, const supine_mesh *mesh, double re
     const double *first = p + 3 * (size_t)eq->topology->edges[2 * e];
     const double *second = p + 3 * (size_t)eq->topology->edges[2 * e + 1];
     const double length = supine_distance(first, second);
-    eq->link[e] =
-        2.0 * reach * reach / mean * fmax(eq->link[e], least) / fmax(length * length, least);
+    eq->link[e] = 2.0 * eq->reach * eq->reach / mean * fmax(eq->link[e], least) /
+                  fmax(length * length, least);
   }
-  return true;
 }
 
 supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
@@ -224,7 +222,7 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error) {
   const size_t n = mesh->vertex_count;
   *equilibrium = NULL;
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
+  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -234,25 +232,21 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
   }
   made->vertex_count = n;
   made->topology = topology;
-  made->link = calloc(topology->edge_count + 1, sizeof *made->link);
+  made->area = reach > 0.0 ? malloc(n * sizeof *made->area) : NULL;
+  made->link = malloc((topology->edge_count + 1) * sizeof *made->link);
   made->lesions = malloc(n * sizeof *made->lesions);
   made->give = malloc(n * sizeof *made->give);
   made->load = malloc(n * sizeof *made->load);
   if (made->link == NULL || made->lesions == NULL || made->give == NULL || made->load == NULL ||
-      !create_matrices(made) || (reach > 0.0 && !set_reach(made, mesh, reach))) {
+      (reach > 0.0 && made->area == NULL) || !create_matrices(made)) {
     supine_physics_equilibrium_destroy(made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
     made->lesions[i] = lesions != NULL ? lesions[i] : 1.0;
   }
-  for (size_t e = 0; e < topology->edge_count && !(reach > 0.0); ++e) {
-    made->link[e] =
-        supine_physics_link_distance(mesh->vertices + 3 * (size_t)topology->edges[2 * e],
-                                     mesh->vertices + 3 * (size_t)topology->edges[2 * e + 1]);
-  }
   *equilibrium = made;
-  return supine_physics_equilibrium_set_stiffness(made, NULL, error);
+  return supine_physics_equilibrium_set_shape(made, mesh, reach, NULL, error);
 }
 
 /* Fill in the values of a part's matrix. */
@@ -300,6 +294,25 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
     }
   }
   return status;
+}
+
+supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
+                                                   const supine_mesh *mesh, double reach,
+                                                   const double *stiffness, supine_error *error) {
+  supine_equilibrium *eq = equilibrium;
+  eq->reach = reach;
+  for (size_t e = 0; e < eq->topology->edge_count && eq->area == NULL; ++e) {
+    const uint32_t *edge = eq->topology->edges + 2 * e;
+    eq->link[e] = supine_physics_link_distance(mesh->vertices + 3 * (size_t)edge[0],
+                                               mesh->vertices + 3 * (size_t)edge[1]);
+  }
+  if (eq->area != NULL) {
+    set_reach(eq, mesh);
+  }
+  for (size_t k = 0; k < eq->part_count; ++k) {
+    eq->parts[k].factorised = false;
+  }
+  return supine_physics_equilibrium_set_stiffness(eq, stiffness, error);
 }
 
 /* One solve of all right-hand sides. */

@@ -60,6 +60,12 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
+/** Set vertices that have moved, the reach (above 0 if it was) and the stiffness: faster than
+ * another equilibrium. Parameters and statuses as supine_physics_equilibrium_set_stiffness */
+supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
+                                                   const supine_mesh *mesh, double reach,
+                                                   const double *stiffness, supine_error *error);
+
 /** Set the stiffness; without a reach this changes the matrix.
  * @param stiffness  [N] E > 0, relative: scaled here to geometric mean 1; NULL: 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */

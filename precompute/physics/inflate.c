@@ -29,6 +29,7 @@ typedef struct ascent {
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
+  supine_solution field; /* of the present estimate */
   size_t size;           /* 3 N */
   double *image;         /* [size] of the lungs' vertices */
   double *last;          /* [size] the image before */
@@ -124,27 +125,26 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
 /* Apply the field of the present lungs to the scan, with the gains that give each lung its
  * reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
-  supine_solution field = {0};
+  supine_solution *field = &a->field;
   a->rms = 0.0;
   ++a->found->solves;
   supine_mesh_box(&a->lungs.mesh, a->lungs.minimum, a->lungs.maximum);
   supine_status status =
-      supine_physics_solve(&a->lungs, &a->model, a->found->scan.state.gravity, &field, error);
+      supine_physics_solve(&a->lungs, &a->model, a->found->scan.state.gravity, field, error);
   if (status == SUPINE_OK) {
-    status = supine_reference_find_gains(&a->scan, a->model.bend, field.directions, field.catch_,
+    status = supine_reference_find_gains(&a->scan, a->model.bend, field->directions, field->catch_,
                                          a->found, error);
   }
   for (size_t lung = 0; lung < a->scan.lung_count && status == SUPINE_OK; ++lung) {
     const double *gains = a->found->scan_gains[lung];
     for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
       a->image[i] =
-          a->scan.mesh.vertices[i] - gains[i % 3] * field.catch_[i / 3] * field.directions[i];
+          a->scan.mesh.vertices[i] - gains[i % 3] * field->catch_[i / 3] * field->directions[i];
       const double residual = a->image[i] - a->lungs.mesh.vertices[i];
       a->rms += residual * residual;
     }
   }
   a->rms = sqrt(a->rms / (double)(a->size / 3));
-  supine_physics_solution_free(&field);
   return status;
 }
 
@@ -269,6 +269,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
     a.scan.mesh.vertices = NULL;
   }
 cleanup:
+  supine_physics_solution_free(&a.field);
   free(a.scan.mesh.vertices);
   free(a.image);
   free(a.last);

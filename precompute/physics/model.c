@@ -37,9 +37,13 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
                                                supine_error *error) {
   /* A force that spreads over the whole lungs is even, and the matrix close to singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
-  supine_status status =
-      supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, fmin(model->reach, longest),
-                                        model->lesions, equilibrium, error);
+  const double reach = fmin(model->reach, longest);
+  if (*equilibrium != NULL) {
+    return supine_physics_equilibrium_set_shape(*equilibrium, &lungs->mesh, reach, model->stiffness,
+                                                error);
+  }
+  supine_status status = supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, reach,
+                                                           model->lesions, equilibrium, error);
   if (status == SUPINE_OK && model->stiffness != NULL) {
     status = supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error);
   }

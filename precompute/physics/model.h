@@ -64,7 +64,8 @@ extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 supine_status supine_physics_model_check(const supine_model *model, supine_error *error);
 
 /** Set up the equilibrium of lungs with the model's stiffness, lesions and reach.
- * @param lungs  must outlive the equilibrium
+ * @param lungs        must outlive the equilibrium
+ * @param equilibrium  NULL in, or that of the same lungs, whose vertices may have moved since
  * Statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness */
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,

@@ -12,6 +12,7 @@
 void supine_physics_solution_free(supine_solution *solution) {
   free(solution->catch_);
   free(solution->directions);
+  supine_physics_equilibrium_destroy(solution->equilibrium);
   *solution = (supine_solution){0};
 }
 
@@ -20,16 +21,19 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   static const double one = 1.0;
-  supine_equilibrium *equilibrium = NULL;
   supine_volume_forms forms = {0};
-  supine_solution made = {.vertex_count = n, .has_volume = lungs->topology.closed};
+  supine_solution made = *solution;
   double range[2];
   double *work = malloc(n * sizeof *work);
-  made.catch_ = malloc(n * sizeof *made.catch_);
-  made.directions = malloc(3 * n * sizeof *made.directions);
+  *solution = (supine_solution){0};
+  made.vertex_count = n;
+  made.has_volume = lungs->topology.closed;
+  made.catch_ = made.catch_ != NULL ? made.catch_ : malloc(n * sizeof *made.catch_);
+  made.directions =
+      made.directions != NULL ? made.directions : malloc(3 * n * sizeof *made.directions);
   supine_status status = supine_physics_model_check(model, error);
   if (status == SUPINE_OK) {
-    status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
+    status = supine_physics_model_equilibrium(lungs, model, &made.equilibrium, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
@@ -46,8 +50,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   }
   const supine_gravities gravity = {1, g, range, range + 1};
   supine_physics_force(lungs, &model->force, &gravity, n, NULL, work);
-  status =
-      supine_physics_equilibrium_solve(equilibrium, 1, work, made.catch_, &made.residual, error);
+  status = supine_physics_equilibrium_solve(made.equilibrium, 1, work, made.catch_, &made.residual,
+                                            error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
@@ -69,7 +73,6 @@ cleanup:
   supine_physics_volume_forms_free(&forms);
   supine_physics_solution_free(&made);
   free(work);
-  supine_physics_equilibrium_destroy(equilibrium);
   return status;
 }
 

@@ -12,15 +12,18 @@
 /** Full physics for one orientation, no harmonics: u_i = s F_i d_i. */
 typedef struct supine_solution {
   size_t vertex_count;
-  double *catch_;     /**< [N] F */
-  double *directions; /**< [N, 3] d, mm */
-  bool has_volume;    /**< the surface is closed, and cubic is set */
-  double cubic[3];    /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
+  supine_equilibrium *equilibrium; /**< of the lungs solved, for another solve */
+  double *catch_;                  /**< [N] F */
+  double *directions;              /**< [N, 3] d, mm */
+  bool has_volume;                 /**< the surface is closed, and cubic is set */
+  double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
   supine_volume_form form[2]; /**< of each lung, of three gains */
   double residual;            /**< relative, of the equilibrium */
 } supine_solution;
 
-/** Solves for gravity along the unit vector `g`.
+/** Solve for gravity along the unit vector `g`.
+ * @param solution  zero-initialised, or of the same lungs, whose vertices may have moved: then
+ *   its arrays and the factor's memory serve again; empty after a failure
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
                                    const double g[3], supine_solution *solution,
