@@ -254,7 +254,7 @@ static void test_deep_law_supine_is_its_unsplit_form(void **state) {
   supine_model whole = split;
   whole.force = (supine_force_law){.base = 0.7, .gain = 0.6};
   double scale[2];
-  supine_solution solution[2];
+  supine_solution solution[2] = {{0}};
   assert_int_equal(supine_physics_solve(&lungs, &split, supine, &solution[0], NULL), SUPINE_OK);
   assert_int_equal(supine_physics_solve(&lungs, &whole, supine, &solution[1], NULL), SUPINE_OK);
   for (int k = 0; k < 2; ++k) {
