@@ -145,7 +145,8 @@ void supine_volume_form_along(const supine_volume_form *form, const double ratio
 }
 
 void supine_volume_bend(const double bend[3], double sigma, double ratio[3]) {
-  const double e = sigma <= 1 ? (sigma * sigma * sigma - sigma) / 2 : 1 - 1 / sigma;
+  const double cube = sigma * sigma * sigma;
+  const double e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   for (size_t axis = 0; axis < 3; ++axis) {
     ratio[axis] = sigma + 2 * bend[axis] * e;
   }

@@ -242,6 +242,20 @@ static void test_volume_bend_slopes_as_stated(void **state) {
   }
 }
 
+/* Full inflation and beyond, between full and rest, below rest. */
+static void test_volume_bend_values_as_stated(void **state) {
+  (void)state;
+  static const double at[][3] = {{-0.2, -0.2864, -0.1136},
+                                 {0.4, 0.5512, 0.2488},
+                                 {1.3, 1.244062423021089, 1.355937576978911}};
+  for (size_t i = 0; i < 3; ++i) {
+    double ratio[3];
+    supine_volume_bend(box_bend, at[i][0], ratio);
+    assert_true(fabs(ratio[0] - at[i][0]) <= 1e-15);
+    assert_true(fabs(ratio[1] - at[i][1]) <= 1e-15 && fabs(ratio[2] - at[i][2]) <= 1e-15);
+  }
+}
+
 static void test_volume_form_gains_straight_path_one_scale(void **state) {
   (void)state;
   static const double straight[3] = {0, 0, 0};
@@ -274,6 +288,7 @@ int main(void) {
       cmocka_unit_test(test_volume_form_gains_every_volume_met_on_the_path),
       cmocka_unit_test(test_volume_form_gains_at_rest_equal_on_all_axes),
       cmocka_unit_test(test_volume_bend_slopes_as_stated),
+      cmocka_unit_test(test_volume_bend_values_as_stated),
       cmocka_unit_test(test_volume_form_gains_straight_path_one_scale),
       cmocka_unit_test(test_volume_form_gains_out_of_reach_refused),
   };

@@ -32,7 +32,7 @@ static const char volume_text[] =
     "with "
     "a bend: r, the root for s at rest, t = 0, then the q at which s = r q, t = 2 r e(q), e = (q^3 "
     "- q) "
-    "/ 2 for q <= 1, 1 - 1 / q above; without: the root s that grows out of 0.";
+    "/ 2 for q <= 1, (q - 1) / q^6 above; without: the root s that grows out of 0.";
 static const char resting_text[] =
     "mL that a lung holds at rest beyond referenceVolume, negative: the sum over l <= 2 and m of "
     "resting[l*l+l+m] * Y[l*l+l+m](g), of all lungs together if byLung is false. Above rest all "

@@ -41,7 +41,7 @@ ROWS = (
     ("move to prone at rest, mean", 6, 20, "mm", ""),
     ("lower half over upper third of that", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
     ("triangles turned over", 0, 0.03, "%", ""),
-    ("more of them than without bend", None, None, "", "(2 were wanted)"),
+    ("more of them than without bend", None, 2, "", ""),
 )
 
 

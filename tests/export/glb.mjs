@@ -65,7 +65,7 @@ function gainsFor(form, bend, rest, mL) {
   const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
   if (bend.every((c) => c === 0)) return [even(mL), 0];
   const r = even(rest);
-  const bent = (q) => 2 * r * (q <= 1 ? (q ** 3 - q) / 2 : 1 - 1 / q);
+  const bent = (q) => 2 * r * (q <= 1 ? (q ** 3 - q) / 2 : (q - 1) / q ** 6);
   const q = root((at) => formAt(form, bend.map((c) => r * at + c * bent(at))) - mL, mL / rest);
   return [r * q, bent(q)];
 }

@@ -219,7 +219,8 @@ function scaleForVolume(c, volume) {
 
 /** The path of the gains from full inflation (sigma 0) to rest (1), relative to those at rest. */
 function pathAt(bend, sigma) {
-  const e = sigma <= 1 ? (sigma ** 3 - sigma) / 2 : 1 - 1 / sigma;
+  const cube = sigma * sigma * sigma;
+  const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 

@@ -53,10 +53,11 @@ SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volum
  * to those at rest:
  *
  *     A_j = sigma + 2 bend_j e(sigma)
- *     e = (sigma^3 - sigma) / 2  for sigma <= 1;  1 - 1 / sigma  for sigma > 1
+ *     e = (sigma^3 - sigma) / 2  for sigma <= 1;  (sigma - 1) / sigma^6  for sigma > 1
  *
  * A quiet breath is mostly the diaphragm's, z, one near full inflation the rib cage's
- * (Verschakelen 1995, n 120). A bend of 0 is a straight line. */
+ * (Verschakelen 1995, n 120). Below rest the bend fades, as it would turn triangles over. A bend of
+ * 0 is a straight line. */
 SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ratio[3]);
 
 /** The gains at which a lung holds `volume` beyond its reference.
