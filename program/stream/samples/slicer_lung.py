@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
 """3D Slicer: the lung follows a transform node.
 
-In Slicer's Python console, with 'supine stream lungs.safetensors --send points --space ras' running:
+Start the server with the options of SERVER_OPTIONS:
+
+    supine stream lungs.safetensors --send points --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1
+
+then, in Slicer's Python console:
 
     import sys; sys.path.append("/path/to/samples")   # the folder of this file and supine_link.py
     from slicer_lung import Follow
     follow = Follow("PatientToRoom")   # a linear transform node: how the patient lies
     follow.stop()
 
-Slicer's axes are right, front, head (RAS), the patient's and, in a room where nobody has turned yet,
-the room's. So a patient who lies on the back has the identity, and things fall along -y: start the
-server with SERVER_OPTIONS."""
+Slicer's axes are right, front, head (RAS): the patient's, and the room's as long as nobody has turned. So
+a patient who lies on the back has the identity, and things fall along -y."""
 from supine_link import Link, corners, unpack
 
 SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",
