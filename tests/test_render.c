@@ -261,30 +261,6 @@ static void test_draw_same_state_twice_is_equal(void **state) {
   unmake(&m);
 }
 
-static void test_draw_one_lung_leaves_the_other_out(void **state) {
-  (void)state;
-  static uint32_t pixels[PIXELS];
-  made m = make(fixture_create(900, 5, 2, 2, true, true, 1, 64));
-  const double weights[5] = {0};
-  const double scales[2] = {1, 1};
-  double both[4] = SUPINE_EXTENT_NONE;
-  double one[4] = SUPINE_EXTENT_NONE;
-  supine_scene scene = {.pose = POSED(m.basis, weights, scales),
-                        .value = m.value,
-                        .largest = 10,
-                        .view = SUPINE_VIEW_ANTERIOR,
-                        .width = WIDTH,
-                        .height = HEIGHT};
-  supine_render_extent(m.renderer, &scene, both);
-  scene.one_lung = true;
-  scene.lung = 1;
-  supine_render_extent(m.renderer, &scene, one);
-  assert_true(one[1] - one[0] < 0.7 * (both[1] - both[0]));
-  assert_int_equal(supine_render_draw(m.renderer, &scene, pixels, NULL), SUPINE_OK);
-  assert_true(covered(pixels) > PIXELS / 8);
-  unmake(&m);
-}
-
 static void test_draw_impossible_size_is_refused(void **state) {
   (void)state;
   uint32_t pixel = 0;
@@ -333,7 +309,6 @@ int main(void) {
       cmocka_unit_test(test_draw_puts_the_head_on_top),
       cmocka_unit_test(test_project_agrees_with_the_drawing),
       cmocka_unit_test(test_draw_same_state_twice_is_equal),
-      cmocka_unit_test(test_draw_one_lung_leaves_the_other_out),
       cmocka_unit_test(test_draw_impossible_size_is_refused),
       cmocka_unit_test(test_png_is_a_png),
   };

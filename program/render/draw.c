@@ -55,12 +55,6 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-static void shown_vertices(const supine_renderer *r, const supine_scene *scene, size_t *begin,
-                           size_t *end) {
-  *begin = r->info->lung_begin[scene->one_lung ? scene->lung : 0];
-  *end = r->info->lung_begin[scene->one_lung ? scene->lung + 1 : r->info->lung_count];
-}
-
 /* A viewer in front of the middle of the resting lungs, whatever their state. */
 typedef struct camera {
   double axes[3][3];
@@ -72,11 +66,8 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   camera c = {.radius = 1e-3};
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  size_t begin;
-  size_t end;
   supine_render_view_axes(scene->view, c.axes);
-  shown_vertices(r, scene, &begin, &end);
-  for (size_t i = 3 * begin; i < 3 * end; ++i) {
+  for (size_t i = 0; i < 3 * r->info->vertex_count; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)r->info->vertices[i]);
     high[i % 3] = fmax(high[i % 3], (double)r->info->vertices[i]);
   }
@@ -105,11 +96,8 @@ static void place(const camera *c, const float xyz[3], double seen[3]) {
 void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
   const camera c = find_camera(r, scene);
   const double closest = c.away - 0.98 * depth_in_radii * c.radius;
-  size_t begin;
-  size_t end;
-  shown_vertices(r, scene, &begin, &end);
   supine_deform(r->basis, scene->pose, r->scratch);
-  for (size_t i = begin; i < end; ++i) {
+  for (size_t i = 0; i < r->info->vertex_count; ++i) {
     double p[3];
     place(&c, r->scratch + 3 * i, p);
     for (int side = 0; side < 2; ++side) {
@@ -164,7 +152,6 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 typedef struct canvas {
   const supine_renderer *renderer;
   const supine_scene *scene;
-  size_t begin, end;                /* vertices that are shown */
   size_t width, height;             /* samples */
   uint32_t *nearest;                /* [height, width] triangle; NOTHING: none */
   float *nearness;                  /* [height, width] of it */
@@ -183,7 +170,7 @@ static void find_corners(const canvas *c) {
   supine_deform(r->basis, c->scene->pose, r->scratch);
   const float *normals = r->scratch + 3 * r->info->vertex_count;
   supine_normals(r->basis, r->scratch, r->scratch + 3 * r->info->vertex_count);
-  for (size_t i = c->begin; i < c->end; ++i) {
+  for (size_t i = 0; i < r->info->vertex_count; ++i) {
     const double n[3] = {(double)normals[3 * i], (double)normals[3 * i + 1],
                          (double)normals[3 * i + 2]};
     double p[3];
@@ -380,8 +367,8 @@ static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   for (size_t t = 0; t < info->triangle_count; ++t) {
     const uint32_t *v = info->triangles + 3 * t;
-    if (v[0] >= c->begin && v[0] < c->end && corners[v[0]].nearness > 0.0F &&
-        corners[v[1]].nearness > 0.0F && corners[v[2]].nearness > 0.0F) {
+    if (corners[v[0]].nearness > 0.0F && corners[v[1]].nearness > 0.0F &&
+        corners[v[2]].nearness > 0.0F) {
       draw_face(c, t, OVERSAMPLE * begin, OVERSAMPLE * end);
     }
   }
@@ -425,7 +412,6 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   } else {
     memset(c.nearest, 0xFF, count * sizeof *c.nearest);
-    shown_vertices(r, scene, &c.begin, &c.end);
     find_colours(&c);
     find_corners(&c);
     supine_parallel_for(scene->height, GRAIN, 0, draw_rows, &c);

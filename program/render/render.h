@@ -62,8 +62,6 @@ typedef struct supine_scene {
   double line_step;   /**< thin lines at multiples of this; 0: none */
   supine_colours colours;
   supine_view view;
-  bool one_lung; /**< draw `lung` alone */
-  size_t lung;
   bool dark;            /**< lit for a dark page */
   bool shell;           /**< seen through: grey, its outline dark, without colours */
   size_t width, height; /**< pixels */
@@ -75,7 +73,7 @@ typedef struct supine_scene {
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
 /** Widens an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
- * so that several states can be drawn to one scale. The scenes must share view and lungs. */
+ * so that several states can be drawn to one scale. The scenes must share the view. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
 /** Draws on a transparent ground. Uses all cores.

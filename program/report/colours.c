@@ -11,12 +11,6 @@ json_t *supine_report_hex(supine_colours map, double t) {
                       (unsigned)(255.0 * rgb[2] + 0.5) & 255U);
 }
 
-const char *supine_report_ink(supine_colours map, double t) {
-  double rgb[3];
-  supine_render_colour(map, t, rgb);
-  return 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] > 0.5 ? "#101418" : "#fff";
-}
-
 /* Colours distinguishable with any colour vision (M. Okabe and K. Ito, 2008). */
 const char *supine_report_line(size_t posture) {
   static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",

@@ -4,6 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/posture.h>
+
+#include "sh/base/vec3.h"
+
 #include "program/render/render.h"
 #include "program/report/comparison_parts.h"
 
@@ -157,4 +161,24 @@ json_t *supine_report_map(const supine_comparison *c) {
   }
   return json_pack("{s:o, s:o, s:o, s:o}", "cells", map_cells(c), "rolls", across_names, "tilts",
                    down_names, "dots", dots);
+}
+
+json_t *supine_report_direction(const double g[3]) {
+  const char *name = "";
+  double nearest = -2.0;
+  for (size_t i = 0; i < supine_posture_count(); ++i) {
+    double named[3];
+    (void)supine_posture_gravity(supine_posture_name(i), named);
+    const double cosine = supine_dot(named, g);
+    if (cosine > nearest + 1e-9) { /* among equal ones the first: names precede DICOM codes */
+      nearest = cosine;
+      name = supine_posture_name(i);
+    }
+  }
+  const double degrees = acos(fmin(1.0, nearest)) * 180.0 / acos(-1.0);
+  if (degrees < 0.5) {
+    return json_string(name);
+  }
+  return json_sprintf("%.0f° from %s (%.2f:%.2f:%.2f)", degrees, name, g[0] + 0.0, g[1] + 0.0,
+                      g[2] + 0.0);
 }

@@ -17,19 +17,6 @@
 extern const supine_asset
     supine_report_assets[]; /* the .html and .css files, put in by the build */
 
-static void set_statistics(json_t *row, const supine_distance_statistics *d) {
-  (void)json_object_set_new(row, "mean", json_sprintf("%.2f", d->mean));
-  (void)json_object_set_new(row, "rms", json_sprintf("%.2f", d->rms));
-  (void)json_object_set_new(row, "p95", json_sprintf("%.2f", d->p95));
-  (void)json_object_set_new(row, "max", json_sprintf("%.2f", d->max));
-}
-
-static json_t *named(const supine_comparison *c, size_t posture) {
-  return json_pack("{s:s, s:s}", "name",
-                   supine_options_posture_label(c->postures.item[posture].name), "line",
-                   supine_report_line(posture));
-}
-
 static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
@@ -39,78 +26,17 @@ static json_t *lungs(const supine_comparison *c) {
   return list;
 }
 
-static double largest_pair(const supine_comparison *c) {
-  double largest = 0.0;
-  for (size_t i = 0; i < c->postures.count * c->postures.count; ++i) {
-    largest = fmax(largest, c->pair[i].rms);
-  }
-  return largest;
-}
-
-static json_t *matrix(const supine_comparison *c) {
-  const size_t count = c->postures.count;
-  const double largest = largest_pair(c);
-  json_t *rows = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    json_t *cells = json_array();
-    for (size_t j = 0; j < count; ++j) {
-      const double rms = c->pair[i * count + j].rms;
-      const double t = largest > 0.0 ? rms / largest : 0.0;
-      (void)json_array_append_new(
-          cells, i == j ? json_object()
-                        : json_pack("{s:o, s:s, s:o}", "hex",
-                                    supine_report_hex(SUPINE_COLOURS_DIFFERENCE, t), "ink",
-                                    supine_report_ink(SUPINE_COLOURS_DIFFERENCE, t), "between",
-                                    json_sprintf("%.2f", rms)));
-    }
-    (void)json_array_append_new(
-        rows, json_pack("{s:s, s:o}", "name",
-                        supine_options_posture_label(c->postures.item[i].name), "cells", cells));
-  }
-  return supine_report_parts(c, rows);
-}
-
-/* Find the two postures that differ most. */
-static json_t *matrix_title(const supine_comparison *c) {
+/* Say which two postures differ most. */
+static json_t *farthest_pair(const supine_comparison *c) {
   const size_t count = c->postures.count;
   size_t most = 0;
   for (size_t i = 0; i < count * count; ++i) {
     most = c->pair[i].rms > c->pair[most].rms ? i : most;
   }
-  return json_sprintf("Of these, %s and %s differ most: %.1f mm RMS",
+  return json_sprintf("%s and %s differ most: %.1f mm RMS",
                       supine_options_posture_label(c->postures.item[most / count].name),
                       supine_options_posture_label(c->postures.item[most % count].name),
                       c->pair[most].rms);
-}
-
-static json_t *pairs(const supine_comparison *c) {
-  const size_t count = c->postures.count;
-  json_t *list = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    for (size_t j = i + 1; j < count; ++j) {
-      json_t *row = json_pack("{s:[o, o]}", "two", named(c, i), named(c, j));
-      set_statistics(row, &c->pair[i * count + j]);
-      (void)json_array_append_new(list, row);
-    }
-  }
-  return list;
-}
-
-static json_t *slabs(const supine_comparison *c) {
-  json_t *rows = json_array();
-  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-    json_t *cells = json_array();
-    for (size_t i = 0; i < c->postures.count; ++i) {
-      const supine_slab *slab = &c->posture[i].slab[s];
-      (void)json_array_append_new(cells, json_sprintf("%+.1f of %.0f", slab->gain, slab->volume));
-    }
-    (void)json_array_append_new(
-        rows,
-        json_pack("{s:o, s:o}", "name",
-                  json_sprintf("%zu to %zu", 100 - 10 * (s + 1), 100 - 10 * s), "cells", cells));
-  }
-  return json_pack("{s:o, s:o}", "profiles", supine_report_profiles(c), "parts",
-                   supine_report_parts(c, rows));
 }
 
 /* Format a share in %; what rounds to nothing is 0. */
@@ -162,21 +88,24 @@ static void write_command(const supine_comparison *c, const char *file, char *co
   command[size - 1] = '\0';
 }
 
-/* Return the command and the metadata of the basis. */
+/* Return what made the report, in ten lines at most. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
+  static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
+                                     "patient", "error_rms_percent", "attribution", "checksum"};
   json_t *list = json_array();
   char command[2048] = "";
+  json_t *today = date();
   write_command(c, json_string_value(file), command, sizeof command);
-  size_t count = 0;
-  const supine_metadata *metadata = supine_basis_all_metadata(c->basis, &count);
   add_fact(list, "command", json_string(command));
-  add_fact(list, "program", json_string("supine " SUPINE_VERSION));
-  add_fact(list, "date", date());
+  add_fact(list, "program",
+           json_sprintf("supine " SUPINE_VERSION ", %s", json_string_value(today)));
+  json_decref(today);
   add_fact(list, "basis", json_incref(file));
-  for (size_t i = 0; i < count; ++i) {
-    json_t *value = json_string(metadata[i].value);
-    if (value != NULL) { /* it is UTF-8 */
-      add_fact(list, metadata[i].key, value);
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    const char *value = supine_basis_metadata(c->basis, keys[i]);
+    json_t *text = value == NULL ? NULL : json_string(value);
+    if (text != NULL) { /* it is UTF-8 */
+      add_fact(list, keys[i], text);
     }
   }
   return list;
@@ -216,15 +145,13 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,
                                               false, "RMS distance from supine, mm"));
   if (c->postures.count > 1) {
-    (void)json_object_set_new(
-        data, "matrix",
-        json_pack("{s:o, s:o, s:o, s:o}", "title", matrix_title(c), "parts", matrix(c), "pairs",
-                  pairs(c), "between_bar",
-                  supine_report_bar(SUPINE_COLOURS_DIFFERENCE, largest_pair(c), false,
-                                    "RMS distance, mm")));
+    (void)json_object_set_new(data, "pair", farthest_pair(c));
+    (void)json_object_set_new(data, "outlined",
+                              json_pack("{s:o}", "outlines", supine_report_outlines(c)));
   }
   if (supine_basis_get_info(c->basis)->has_volume) {
-    (void)json_object_set_new(data, "slabs", slabs(c));
+    (void)json_object_set_new(data, "slabs",
+                              json_pack("{s:o}", "profiles", supine_report_profiles(c)));
   }
   json_t *pictures = supine_report_pictures(c, error);
   if (pictures != NULL) {

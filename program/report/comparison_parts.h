@@ -11,18 +11,8 @@
 /* "#rrggbb" of a colour map at 0 <= t <= 1. */
 json_t *supine_report_hex(supine_colours map, double t);
 
-/* Black or white, whichever reads on that colour. */
-const char *supine_report_ink(supine_colours map, double t);
-
 /* Colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
-
-enum { SUPINE_REPORT_COLUMNS = 6 }; /* of a table or a row of pictures, so that they fit a sheet */
-
-/* A table of `rows` (objects with a list `cells`, one of each posture) in {{parts}} that fit a
- * sheet: each with the names of its {{columns}}, and what they are in words, {{part}}. Takes
- * `rows`. */
-json_t *supine_report_parts(const supine_comparison *comparison, json_t *rows);
 
 /* A bar of colours up to `largest`, its end pointed where values lie beyond: {{stops}}, {{ticks}},
  * {{beyond}} and {{words}}. */
@@ -51,8 +41,10 @@ json_t *supine_report_profiles(const supine_comparison *comparison);
 /* {{map}}: distance from supine for every direction of gravity. */
 json_t *supine_report_map(const supine_comparison *comparison);
 
-/* {{pictures}}, {{parts}} from the front and {{sides}} of each lung; NULL, and why in `error`,
- * where none can be drawn. */
+/* {{outlines}}: slices of the lungs, each posture over the reference. */
+json_t *supine_report_outlines(const supine_comparison *comparison);
+
+/* {{pictures}}: {{cells}} from the front; NULL, and why in `error`, where none can be drawn. */
 json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
 
 #endif

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Outlines of the lungs in slices for the HTML report, each posture over the reference. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "program/report/comparison_parts.h"
+
+/* A slice across `axis` at a share of the body's extent; `right` and `down` span its picture, seen
+ * from the feet or from the front, so that the patient's left is on the right. */
+typedef struct slice {
+  const char *name;
+  size_t axis;
+  double share;
+  size_t down;
+  double sign; /* of `down` */
+} slice;
+
+static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
+                               {"Axial, lower third", 2, 1.0 / 3, 1, 1},
+                               {"Coronal, front third", 1, 1.0 / 3, 2, -1},
+                               {"Coronal, back third", 1, 2.0 / 3, 2, -1}};
+
+/* Find where an edge crosses the plane. */
+static void cross(const slice *s, double at, const float *a, const float *b, double point[2]) {
+  const double t = (at - (double)a[s->axis]) / ((double)b[s->axis] - (double)a[s->axis]);
+  point[0] = (double)a[0] + t * ((double)b[0] - (double)a[0]);
+  point[1] = s->sign * ((double)a[s->down] + t * ((double)b[s->down] - (double)a[s->down]));
+}
+
+/* Print the outline as an SVG path of one line a triangle; return what it encloses, mm^2. */
+static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
+                    FILE *path) {
+  double twice = 0;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    double up[2] = {NAN, NAN}; /* where the boundary enters the side above the plane */
+    double down[2] = {0, 0};
+    for (size_t i = 0; i < 3; ++i) {
+      const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];
+      const float *b = xyz + 3 * (size_t)info->triangles[3 * t + (i + 1) % 3];
+      const bool above[2] = {(double)a[s->axis] > at, (double)b[s->axis] > at};
+      if (above[0] != above[1]) {
+        cross(s, at, a, b, above[1] ? up : down);
+      }
+    }
+    if (!isnan(up[0])) {
+      twice += up[0] * down[1] - down[0] * up[1];
+      (void)fprintf(path, "M%.1f %.1fL%.1f %.1f", up[0], up[1], down[0], down[1]);
+    }
+  }
+  return fabs(twice) / 2;
+}
+
+/* Return the outline in a pose as text, and what it encloses. */
+static json_t *outline(const supine_comparison *c, const slice *s, double at,
+                       const supine_pose *pose, float *xyz, double *area) {
+  char *text = NULL;
+  size_t size = 0;
+  FILE *path = open_memstream(&text, &size);
+  if (path == NULL) {
+    return json_string("");
+  }
+  supine_deform(c->basis, pose, xyz);
+  *area = trace(supine_basis_get_info(c->basis), s, at, xyz, path);
+  json_t *made = fclose(path) == 0 ? json_string(text) : json_string("");
+  free(text);
+  return made;
+}
+
+static json_t *letter(double x, double y, const char *name) {
+  return json_pack("{s:o, s:o, s:s}", "x", json_sprintf("%.0f", x), "y", json_sprintf("%.0f", y),
+                   "letter", name);
+}
+
+/* Make the chart of a slice; its title says what each posture does to the area. */
+static json_t *chart(const supine_comparison *c, const slice *s, const double low[3],
+                     const double high[3], float *xyz) {
+  enum { MARGIN = 18, SCALE = 50 /* mm */ };
+  const double at = low[s->axis] + s->share * (high[s->axis] - low[s->axis]);
+  const double top = s->sign > 0 ? low[s->down] : -high[s->down];
+  const double bottom = s->sign > 0 ? high[s->down] : -low[s->down];
+  const double middle = (top + bottom) / 2;
+  double before = 0;
+  json_t *path = outline(c, s, at, &c->reference.pose, xyz, &before);
+  json_t *lines = json_array();
+  json_t *title = json_sprintf("%s: area", s->name);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const char *name = supine_options_posture_label(c->postures.item[i].name);
+    double area = 0;
+    json_t *own = outline(c, s, at, &c->posture[i].pose, xyz, &area);
+    if (c->posture[i].displacement.max < 0.05) { /* the reference */
+      json_decref(own);
+      continue;
+    }
+    (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:o}", "line", supine_report_line(i),
+                                                 "name", name, "path", own));
+    json_t *longer =
+        json_sprintf("%s%s %s %+.0f %%", json_string_value(title),
+                     json_array_size(lines) > 1 ? "," : "", name, 100 * (area / before - 1));
+    json_decref(title);
+    title = longer;
+  }
+  return json_pack("{s:o, s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "title", title, "box",
+                   json_sprintf("%.0f %.0f %.0f %.0f", low[0] - MARGIN, top - MARGIN,
+                                high[0] - low[0] + 2 * MARGIN, bottom - top + 2 * MARGIN + 10),
+                   "before", path, "lines", lines, "mark",
+                   json_sprintf("M%.0f %.0fh%d", low[0] - MARGIN + 2, bottom + MARGIN + 6, SCALE),
+                   "letters", letter(high[0] + 10, middle, "L"), letter(low[0] - 10, middle, "R"),
+                   letter((low[0] + high[0]) / 2, top - 10, s->axis == 2 ? "A" : "H"),
+                   letter((low[0] + high[0]) / 2, bottom + 10, s->axis == 2 ? "P" : "F"));
+}
+
+json_t *supine_report_outlines(const supine_comparison *c) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  json_t *list = json_array();
+  if (xyz == NULL) {
+    return list;
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    supine_deform(c->basis, &c->posture[i].pose, xyz);
+    for (size_t j = 0; j < 3 * info->vertex_count; ++j) {
+      low[j % 3] = fmin(low[j % 3], (double)xyz[j]);
+      high[j % 3] = fmax(high[j % 3], (double)xyz[j]);
+    }
+  }
+  for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
+    (void)json_array_append_new(list, chart(c, &slices[i], low, high, xyz));
+  }
+  free(xyz);
+  return list;
+}
