@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Opening a basis file: every tensor is checked before anything uses it. */
+/* Open basis files: every tensor is checked before anything uses it. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include "runtime/internal.h"
 #include "runtime/safetensors/platform.h"
 
-/* The file that is being checked, and where its name and a failure go. */
+/* The file that is being checked, its name and where a failure is reported. */
 typedef struct check {
   const supine_safetensors *file;
   const char *name;
@@ -27,34 +27,9 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s", c->name, detail);
 }
 
-/* The tensor `name` when it is there, of that type and rank; otherwise NULL, with the reason. */
-static const supine_tensor *want(const check *c, const char *name, supine_dtype dtype,
-                                 size_t rank) {
-  const supine_tensor *tensor = supine_safetensors_find(c->file, name);
-  if (tensor == NULL || tensor->dtype != dtype || tensor->rank != rank) {
-    (void)refuse(c, "tensor '%s' is missing, or not of the type and rank of a basis file", name);
-    return NULL;
-  }
-  return tensor;
-}
-
-/* The same with every axis given. */
-static const void *want_shape(const check *c, const char *name, supine_dtype dtype, size_t rank,
-                              const size_t *shape) {
-  const supine_tensor *tensor = want(c, name, dtype, rank);
-  for (size_t i = 0; tensor != NULL && i < rank; ++i) {
-    if (tensor->shape[i] != shape[i]) {
-      (void)refuse(c, "axis %zu of tensor '%s' is %zu instead of %zu", i, name, tensor->shape[i],
-                   shape[i]);
-      return NULL;
-    }
-  }
-  return tensor == NULL ? NULL : tensor->data;
-}
-
 /* No lung has a number of 2^30 or more in any unit here; with all below it, sums over 256 modes of
- * the products of three stay finite. Without a branch an element, so that it runs at the speed of
- * memory: the exponent decides, also for what is infinite or NaN. */
+ * the products of three stay finite. The exponent decides, also for what is infinite or NaN:
+ * without a branch an element, so that it runs at the speed of memory. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -66,15 +41,44 @@ static bool finite_floats(const float *values, size_t count) {
 }
 
 static bool finite_doubles(const double *values, size_t count) {
+  size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
-    if (!(fabs(values[i]) < 0x1p30)) {
-      return false;
-    }
+    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* or NaN */
   }
-  return true;
+  return bad == 0;
 }
 
-/* kind, format, version; sets info.vector. */
+/* An axis of any length. */
+#define ANY SIZE_MAX
+
+/* Find the numbers of a tensor of this type and shape, all finite; axes that are ANY are filled in.
+ * NULL with the reason if the file has not got it. */
+static const void *want(const check *c, const char *name, supine_dtype dtype, size_t rank,
+                        size_t *shape) {
+  const supine_tensor *tensor = supine_safetensors_find(c->file, name);
+  size_t count = 1;
+  if (tensor == NULL || tensor->dtype != dtype || tensor->rank != rank) {
+    (void)refuse(c, "tensor '%s' is missing, or not of the type and rank of a basis file", name);
+    return NULL;
+  }
+  for (size_t i = 0; i < rank; ++i) {
+    shape[i] = shape[i] == ANY ? tensor->shape[i] : shape[i];
+    count *= shape[i];
+    if (tensor->shape[i] != shape[i]) {
+      (void)refuse(c, "axis %zu of tensor '%s' is %zu instead of %zu", i, name, tensor->shape[i],
+                   shape[i]);
+      return NULL;
+    }
+  }
+  if ((dtype == SUPINE_F32 && !finite_floats(tensor->data, count)) ||
+      (dtype == SUPINE_F64 && !finite_doubles(tensor->data, count))) {
+    (void)refuse(c, "tensor '%s' has a number that is not finite, or 2^30 or more", name);
+    return NULL;
+  }
+  return tensor->data;
+}
+
+/* Check format, version and kind, and the checksum. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -97,93 +101,75 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
 
 static supine_status check_surface(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  const supine_tensor *vertices = want(c, "vertices", SUPINE_F32, 2);
-  const supine_tensor *triangles = want(c, "triangles", SUPINE_U32, 2);
-  if (vertices == NULL || triangles == NULL) {
+  size_t vertices[2] = {ANY, 3};
+  size_t triangles[2] = {ANY, 3};
+  uint32_t highest = 0;
+  info->vertices = want(c, "vertices", SUPINE_F32, 2, vertices);
+  info->triangles = want(c, "triangles", SUPINE_U32, 2, triangles);
+  if (info->vertices == NULL || info->triangles == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  info->vertex_count = vertices->shape[0];
-  info->triangle_count = triangles->shape[0];
-  if (vertices->shape[1] != 3 || triangles->shape[1] != 3 || info->vertex_count == 0 ||
-      info->vertex_count > UINT32_MAX) {
-    return refuse(c, "vertices and triangles must be [N, 3], N from 1 to 4294967295");
-  }
-  basis->info.vertices = vertices->data;
-  basis->info.triangles = triangles->data;
-  uint32_t highest = 0;
+  info->vertex_count = vertices[0];
+  info->triangle_count = triangles[0];
   for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
-    highest = basis->info.triangles[i] > highest ? basis->info.triangles[i] : highest;
+    highest = info->triangles[i] > highest ? info->triangles[i] : highest;
   }
-  if (highest >= info->vertex_count) {
-    return refuse(c, "a triangle names vertex %u of %zu", highest, info->vertex_count);
-  }
-  return finite_floats(basis->info.vertices, 3 * info->vertex_count)
-             ? SUPINE_OK
-             : refuse(c, "a vertex is not finite, or 2^30 and more");
+  return info->vertex_count < 1 || info->vertex_count > UINT32_MAX
+             ? refuse(c, "%zu vertices: a surface has 1 to 4294967295", info->vertex_count)
+         : highest >= info->vertex_count
+             ? refuse(c, "a triangle names vertex %u of %zu", highest, info->vertex_count)
+             : SUPINE_OK;
 }
 
 static supine_status check_field(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t n = info->vertex_count;
-  const size_t rank = info->vector ? 3 : 2;
-  const supine_tensor *coefficients = want(c, "coefficients", SUPINE_F32, rank);
-  if (coefficients == NULL) {
+  size_t scalar[] = {n, ANY};
+  size_t vector[] = {n, 3, ANY};
+  size_t direction[] = {n, 3};
+  info->coefficients = info->vector ? want(c, "coefficients", SUPINE_F32, 3, vector)
+                                    : want(c, "coefficients", SUPINE_F32, 2, scalar);
+  if (info->coefficients == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  const size_t modes = coefficients->shape[rank - 1];
-  if (coefficients->shape[0] != n || (info->vector && coefficients->shape[1] != 3) || modes < 1 ||
-      modes > SUPINE_MODES_MAX) {
-    return refuse(c, "coefficients must be [N, K] or [N, 3, K], N = %zu, K from 1 to %d", n,
-                  SUPINE_MODES_MAX);
+  info->mode_count = info->vector ? vector[2] : scalar[1];
+  if (info->mode_count < 1 || info->mode_count > SUPINE_MODES_MAX) {
+    return refuse(c, "%zu modes: a basis has 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
-  info->mode_count = modes;
-  basis->info.coefficients = coefficients->data;
-  if (!finite_floats(basis->info.coefficients, n * modes * (info->vector ? 3 : 1))) {
-    return refuse(c, "a coefficient is not finite, or 2^30 and more");
+  if (!info->vector) {
+    info->direction = want(c, "direction", SUPINE_F32, 2, direction);
   }
-  if (info->vector) {
-    return SUPINE_OK;
-  }
-  basis->info.direction = want_shape(c, "direction", SUPINE_F32, 2, (size_t[]){n, 3});
-  if (basis->info.direction == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  return finite_floats(basis->info.direction, 3 * n)
-             ? SUPINE_OK
-             : refuse(c, "a direction is not finite, or 2^30 and more");
+  return info->vector || info->direction != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
 static supine_status check_modes(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  const supine_tensor *modes = want(c, "modes", SUPINE_F64, 2);
-  if (modes == NULL) {
+  size_t shape[] = {info->mode_count, ANY};
+  info->modes = want(c, "modes", SUPINE_F64, 2, shape);
+  if (info->modes == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  while (info->band < SUPINE_SH_BAND_MAX && supine_sh_count(info->band) < modes->shape[1]) {
+  while (info->band < SUPINE_SH_BAND_MAX && supine_sh_count(info->band) < shape[1]) {
     ++info->band;
   }
-  if (modes->shape[0] != info->mode_count || modes->shape[1] != supine_sh_count(info->band)) {
-    return refuse(c, "modes must be [K, (L + 1)^2], K = %zu, L from 0 to %d", info->mode_count,
-                  SUPINE_SH_BAND_MAX);
-  }
-  basis->info.modes = modes->data;
-  return finite_doubles(basis->info.modes, info->mode_count * modes->shape[1])
+  return shape[1] == supine_sh_count(info->band)
              ? SUPINE_OK
-             : refuse(c, "a mode is not finite, or 2^30 and more");
+             : refuse(c, "modes of %zu harmonics, not (L + 1)^2 with L from 0 to %d", shape[1],
+                      SUPINE_SH_BAND_MAX);
 }
 
-/* "left,right" of the metadata; what it does not name is numbered. */
-static void name_lungs(const supine_safetensors *file, supine_basis *basis) {
-  const char *at = supine_safetensors_metadata(file, "lungs");
+/* Name the lungs by the metadata, "left,right", and those that it does not name by their number. */
+static void name_lungs(const check *c, supine_basis *basis) {
+  const char *at = supine_safetensors_metadata(c->file, "lungs");
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t length = at == NULL ? 0 : strcspn(at, ",");
+    basis->name_of[lung] = basis->names[lung];
     if (length > 0) {
       (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%.*s", (int)length, at);
     } else {
       (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%zu", lung);
     }
     at = at == NULL || at[length] == '\0' ? NULL : at + length + 1;
-    basis->name_of[lung] = basis->names[lung];
   }
   basis->info.lung_names = basis->name_of;
 }
@@ -207,7 +193,7 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* How many lungs the metadata names. */
+/* Count the lungs that the metadata names. */
 static size_t named_lungs(const check *c) {
   const char *names = supine_safetensors_metadata(c->file, "lungs");
   size_t count = names != NULL;
@@ -217,12 +203,12 @@ static size_t named_lungs(const check *c) {
   return count < SUPINE_LUNGS_MAX ? count : SUPINE_LUNGS_MAX;
 }
 
-/* Lungs come one after the other: 0 ... 0 1 ... 1 2 ... Those that the metadata names may be empty:
- * what is carried along inside may lie in one lung alone. */
+/* Find where each lung's vertices begin: they are grouped by lung, 0 ... 0 1 ... 1 2 ... A lung
+ * that the metadata names may be empty, as content may lie in one lung alone. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  const size_t n = info->vertex_count;
-  const unsigned char *lung = want_shape(c, "lung", SUPINE_U8, 1, &n);
+  size_t n = info->vertex_count;
+  const unsigned char *lung = want(c, "lung", SUPINE_U8, 1, &n);
   if (lung == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -248,55 +234,49 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   basis->lung_begin[count] = n;
   info->lung_count = count;
   info->lung_begin = basis->lung_begin;
-  name_lungs(c->file, basis);
+  name_lungs(c, basis);
   bound_lungs(basis);
   return SUPINE_OK;
 }
 
+/* Volume forms are optional, all or none; the first two have an axis more since version 3. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
   const size_t k = info->mode_count;
   const size_t axes = info->volume_axes;
-  const size_t together[] = {g, k, k, k};
-  const size_t by_axis[] = {g, axes, k, k};
+  size_t cubic[] = {g, k, k, k};
+  size_t by_axis[] = {g, axes, k, k};
+  size_t *shape = axes == 3 ? by_axis : cubic;
   static const char *const names[] = {"volume_linear", "volume_quadratic", "volume_cubic"};
-  const double **const forms[] = {&info->volume_linear, &info->volume_quadratic,
-                                  &info->volume_cubic};
-  size_t present = 0;
   for (size_t i = 0; i < 3; ++i) {
-    present += supine_safetensors_find(c->file, names[i]) != NULL;
+    info->has_volume = info->has_volume || supine_safetensors_find(c->file, names[i]) != NULL;
   }
-  if (present == 0) {
+  if (!info->has_volume) {
     return SUPINE_OK;
   }
-  size_t count = g;
-  for (size_t i = 0; i < 3; ++i) {
-    const bool axis = axes == 3 && i < 2;
-    *forms[i] = want_shape(c, names[i], SUPINE_F64, i + 2 + axis, axis ? by_axis : together);
-    if (*forms[i] == NULL) {
-      return SUPINE_ERROR_FORMAT;
-    }
-    count *= k;
-    if (!finite_doubles(*forms[i], axis ? axes * count : count)) {
-      return refuse(c, "%s is not finite, or 2^30 and more", names[i]);
-    }
-  }
-  info->has_volume = true;
-  return SUPINE_OK;
+  info->volume_linear = want(c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
+  info->volume_quadratic = want(c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
+  info->volume_cubic = want(c, names[2], SUPINE_F64, 4, cubic);
+  return info->volume_linear != NULL && info->volume_quadratic != NULL && info->volume_cubic != NULL
+             ? SUPINE_OK
+             : SUPINE_ERROR_FORMAT;
 }
 
-/* Read `count` numbers, separated by commas, of a metadata string; false where it has others. */
-static bool read_numbers(const char *text, size_t count, double *values) {
-  for (size_t i = 0; i < count; ++i) {
+/* Read the numbers, separated by commas, of a metadata string; where the file lacks it, they stay.
+ */
+static supine_status read_numbers(const check *c, const char *key, size_t count, double *values) {
+  const char *const text = supine_safetensors_metadata(c->file, key);
+  const char *at = text;
+  for (size_t i = 0; at != NULL && i < count; ++i) {
     char *end = NULL;
-    values[i] = strtod(text, &end);
-    if (end == text || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
-      return false;
+    values[i] = strtod(at, &end);
+    if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
+      return refuse(c, "metadata %s is no list of %zu numbers: %.48s", key, count, text);
     }
-    text = end + 1;
+    at = end + 1;
   }
-  return true;
+  return SUPINE_OK;
 }
 
 /* Compute the volume in mL that each lung of the reference surface encloses. */
@@ -327,52 +307,44 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* The volume of the reference, by lung. Content has not the lungs' surface: its file states them.
- */
+/* Find the volume of the reference surface. Content is not that surface: its file states it. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
-  const char *stated = supine_safetensors_metadata(c->file, "reference_volume_ml");
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
     return SUPINE_OK;
   }
-  if (supine_safetensors_metadata(c->file, "content") == NULL || stated == NULL) {
+  if (supine_safetensors_metadata(c->file, "content") == NULL ||
+      supine_safetensors_metadata(c->file, "reference_volume_ml") == NULL) {
     measure_lungs(basis);
     return SUPINE_OK;
   }
-  return read_numbers(stated, basis->info.lung_count, basis->reference_volume)
-             ? SUPINE_OK
-             : refuse(c, "reference_volume_ml has no number for each lung: %.32s", stated);
+  return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* The scan's state: a file of fields, or of a scan taken as it is, has its surface as reference. */
+/* Read the scan's state. A file of fields, or of a scan taken as it is, has its surface as
+ * reference.
+ */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
-  const char *gravity = supine_safetensors_metadata(c->file, "scan_gravity");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
-  const char *upright = supine_safetensors_metadata(c->file, "full_upright_gain");
   const char *route = supine_safetensors_metadata(c->file, "route");
-  const char *bend = supine_safetensors_metadata(c->file, "bend");
   double by_lung[SUPINE_LUNGS_MAX] = {0};
   const size_t count = volume != NULL && strchr(volume, ',') != NULL ? basis->info.lung_count : 1;
-  if (volume != NULL && !read_numbers(volume, count, by_lung)) {
-    return refuse(c, "scan_volume_ml is no number: %.32s", volume);
+  basis->scan_gravity[1] = 1;
+  basis->info.is_fields = route != NULL && strcmp(route, "fields") == 0;
+  basis->info.has_full = basis->info.has_rest || (scanned != NULL && strcmp(scanned, "full") == 0);
+  if (read_numbers(c, "scan_volume_ml", count, by_lung) != SUPINE_OK ||
+      read_numbers(c, "scan_gravity", 3, basis->scan_gravity) != SUPINE_OK ||
+      read_numbers(c, "full_upright_gain", 1, &basis->upright_gain) != SUPINE_OK ||
+      read_numbers(c, "bend", 3, basis->info.bend) != SUPINE_OK) {
+    return SUPINE_ERROR_FORMAT;
   }
   for (size_t i = 0; i < count; ++i) {
     basis->scan_volume += by_lung[i];
   }
-  basis->scan_gravity[1] = 1;
-  if (gravity != NULL && !read_numbers(gravity, 3, basis->scan_gravity)) {
-    return refuse(c, "scan_gravity is not three numbers: %.48s", gravity);
-  }
-  if (upright != NULL && !read_numbers(upright, 1, &basis->upright_gain)) {
-    return refuse(c, "full_upright_gain is no number: %.16s", upright);
-  }
-  if (bend != NULL && (!read_numbers(bend, 3, basis->info.bend) || !basis->rest_by_lung)) {
-    return refuse(c, "bend is not three numbers, or volumes at rest are not by lung: %.48s", bend);
-  }
-  basis->info.is_fields = route != NULL && strcmp(route, "fields") == 0;
-  basis->info.has_full = basis->info.has_rest || (scanned != NULL && strcmp(scanned, "full") == 0);
-  return SUPINE_OK;
+  return supine_safetensors_metadata(c->file, "bend") == NULL || basis->rest_by_lung
+             ? SUPINE_OK
+             : refuse(c, "bend without volumes at rest by lung");
 }
 
 /* Volumes at rest: by lung, or of all lungs together in files of version 1 and 2. */
@@ -381,52 +353,40 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   if (tensor == NULL) {
     return SUPINE_OK;
   }
-  const size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
+  size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
   basis->rest_by_lung = tensor->rank == 2;
-  const size_t rank = basis->rest_by_lung ? 2 : 1;
-  basis->resting = want_shape(c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
-  if (basis->resting == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  basis->info.has_rest = true;
-  return finite_doubles(basis->resting, rank == 2 ? shape[0] * shape[1] : shape[1])
-             ? SUPINE_OK
-             : refuse(c, "resting_volume is not finite, or 2^30 and more");
+  basis->resting = basis->rest_by_lung ? want(c, "resting_volume", SUPINE_F64, 2, shape)
+                                       : want(c, "resting_volume", SUPINE_F64, 1, shape + 1);
+  basis->info.has_rest = basis->resting != NULL;
+  return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
 /* Normals are optional: the modes and their weights, or neither. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  const size_t axes = info->volume_axes;
   const size_t terms = supine_basis_normal_terms(basis);
+  size_t shape[] = {info->vertex_count, 3, ANY};
   if (supine_safetensors_find(c->file, "normals") == NULL &&
       supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
   }
-  const supine_tensor *normals = want(c, "normals", SUPINE_I16, 3);
-  if (normals == NULL) {
+  info->normals = want(c, "normals", SUPINE_I16, 3, shape);
+  if (info->normals == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  const size_t count = normals->shape[2];
-  if (normals->shape[0] != info->vertex_count || normals->shape[1] != 3 || count < 1 ||
-      count > SUPINE_NORMAL_MODES_MAX) {
-    return refuse(c, "normals must be [N, 3, Q], N = %zu, Q from 1 to %d", info->vertex_count,
+  info->normal_count = shape[2];
+  if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
+    return refuse(c, "%zu modes of the normals: a basis has 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
   }
-  info->normals = normals->data;
-  info->normal_weights = want_shape(c, "normal_weights", SUPINE_F64, axes == 3 ? 4 : 3,
-                                    axes == 3 ? (size_t[]){info->lung_count, count, 3, terms}
-                                              : (size_t[]){info->lung_count, count, terms});
-  if (info->normal_weights == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  info->normal_count = count;
-  return finite_doubles(info->normal_weights, info->lung_count * count * axes * terms)
-             ? SUPINE_OK
-             : refuse(c, "normal_weights is not finite");
+  size_t one[] = {info->lung_count, info->normal_count, terms};
+  size_t by_axis[] = {info->lung_count, info->normal_count, 3, terms};
+  info->normal_weights = info->volume_axes == 3 ? want(c, "normal_weights", SUPINE_F64, 4, by_axis)
+                                                : want(c, "normal_weights", SUPINE_F64, 3, one);
+  return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Chooses the code and packs: AUTO is the smallest storage that is accurate enough. */
+/* Choose the kernels and pack. AUTO takes the smallest storage that is accurate enough. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
   static const double error_limit = 0.005; /* mm */
@@ -477,7 +437,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   return SUPINE_OK;
 }
 
-/* Options of a program that knew fewer of them: the others are zero. */
+/* Copy options; those that an older program does not know of are zero. */
 static supine_status take_options(const check *c, const supine_basis_options *options,
                                   supine_basis_options *taken) {
   const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
@@ -494,7 +454,6 @@ static supine_status take_options(const check *c, const supine_basis_options *op
   return SUPINE_OK;
 }
 
-/* Takes the file, whatever comes of it. */
 /* Rigid parts are optional: ranges of vertices, each in one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
@@ -518,6 +477,7 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Open a basis; the file is its own from here on, and closed on failure. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {

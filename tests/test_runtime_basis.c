@@ -222,17 +222,22 @@ static void spoil_lung_first(fixture *f) {
 static void test_open_wrong_content_refused_with_reason(void **state) {
   (void)state;
   expect_refused(spoil_triangle, "a triangle names vertex 12 of 12");
-  expect_refused(spoil_vertex, "a vertex is not finite");
-  expect_refused(spoil_direction, "a direction is not finite");
-  expect_refused(spoil_coefficient, "a coefficient is not finite");
-  expect_refused(spoil_mode, "a mode is not finite");
-  expect_refused(spoil_mode_size, "a mode is not finite, or 2^30 and more");
-  expect_refused(spoil_coefficient_size, "a coefficient is not finite, or 2^30 and more");
-  expect_refused(spoil_linear, "volume_linear is not finite");
-  expect_refused(spoil_quadratic, "volume_quadratic is not finite");
-  expect_refused(spoil_cubic, "volume_cubic is not finite");
-  expect_refused(spoil_resting, "resting_volume is not finite, or 2^30 and more");
-  expect_refused(spoil_resting_size, "resting_volume is not finite, or 2^30 and more");
+  expect_refused(spoil_vertex, "'vertices' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_direction, "'direction' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_coefficient,
+                 "'coefficients' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_mode, "'modes' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_mode_size, "'modes' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_coefficient_size,
+                 "'coefficients' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_linear, "'volume_linear' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_quadratic,
+                 "'volume_quadratic' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_cubic, "'volume_cubic' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_resting,
+                 "'resting_volume' has a number that is not finite, or 2^30 or more");
+  expect_refused(spoil_resting_size,
+                 "'resting_volume' has a number that is not finite, or 2^30 or more");
   expect_refused(spoil_lung_order, "grouped by lung");
   expect_refused(spoil_lung_gap, "vertex 6 is of lung 2");
   expect_refused(spoil_lung_first, "vertex 0 is of lung 1");
