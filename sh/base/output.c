@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdio_ext.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
@@ -13,12 +14,6 @@
 #include <unistd.h>
 
 #include "sh/base/output.h"
-
-/* Stream behind FILE that remembers why a write failed. */
-struct supine_output_stream {
-  int descriptor;
-  int code; /* errno of the first failure, or 0 */
-};
 
 enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* Most outputs open at once; buffer in bytes. */
 
@@ -56,27 +51,6 @@ void supine_output_abandon_all(void) {
       (void)unlink(name);
     }
   }
-}
-
-static ssize_t stream_write(void *cookie, const char *bytes, size_t size) {
-  struct supine_output_stream *stream = cookie;
-  size_t done = 0;
-  while (done < size && stream->code == 0) {
-    const ssize_t wrote = write(stream->descriptor, bytes + done, size - done);
-    if (wrote > 0) {
-      done += (size_t)wrote;
-    } else if (wrote < 0 && errno != EINTR) {
-      stream->code = errno;
-    }
-  }
-  return done == size ? (ssize_t)size : 0;
-}
-
-static int stream_seek(void *cookie, off64_t *offset, int from) {
-  const struct supine_output_stream *stream = cookie;
-  const off64_t at = lseek(stream->descriptor, *offset, from);
-  *offset = at;
-  return at < 0 ? -1 : 0;
 }
 
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
@@ -200,21 +174,19 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   output->standard = supine_output_is_standard(path);
   output->path = strdup(path);
   output->target = follow_links(path);
-  output->stream = malloc(sizeof *output->stream);
-  if (output->stream != NULL) {
-    *output->stream = (struct supine_output_stream){.descriptor = -1};
-  }
-  if (output->path == NULL || output->target == NULL || output->stream == NULL) {
+  if (output->path == NULL || output->target == NULL) {
     supine_output_abandon(output);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
-  output->stream->descriptor = open_descriptor(output);
-  if (output->stream->descriptor < 0) {
+  const int descriptor = open_descriptor(output);
+  if (descriptor < 0) {
     return output_fail(output, error, "cannot write");
   }
-  output->file = fopencookie(output->stream, "wb",
-                             (cookie_io_functions_t){.write = stream_write, .seek = stream_seek});
+  output->file = fdopen(descriptor, "wb");
   if (output->file == NULL || setvbuf(output->file, NULL, _IOFBF, BUFFER) != 0) {
+    if (output->file == NULL) {
+      (void)close(descriptor);
+    }
     supine_output_abandon(output);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
@@ -225,7 +197,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
 static bool give_name(supine_output *output) {
   if (output->temporary == NULL) {
     char link[32];
-    descriptor_path(output->stream->descriptor, link);
+    descriptor_path(fileno(output->file), link);
     if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
       return true;
     }
@@ -250,14 +222,16 @@ static void sync_folder(const char *target) {
 }
 
 supine_status supine_output_commit(supine_output *output, supine_error *error) {
-  struct supine_output_stream *stream = output->stream;
-  struct stat made;
-  errno = 0;
+  const int descriptor = fileno(output->file);
+  struct stat made = {0};
   const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
-  const bool known = fstat(stream->descriptor, &made) == 0;
+  if (!flushed) { /* the reason of an earlier failure is lost: meet it again */
+    errno = write(descriptor, "", 1) == 1 ? EIO : errno;
+    return output_fail(output, error, "cannot write");
+  }
+  const bool known = fstat(descriptor, &made) == 0;
   const bool regular = known && S_ISREG(made.st_mode) && !output->standard;
-  if (!flushed || stream->code != 0 || !known || (regular && fsync(stream->descriptor) != 0)) {
-    errno = stream->code != 0 ? stream->code : errno == 0 ? EIO : errno;
+  if (!known || (regular && fsync(descriptor) != 0)) {
     return output_fail(output, error, "cannot write");
   }
   if (regular) {
@@ -279,16 +253,10 @@ void supine_output_abandon(supine_output *output) {
     (void)unlink(output->temporary);
     set_live(output->temporary, NULL);
   }
-  if (output->stream != NULL) {
-    output->stream->code = output->stream->code == 0 ? ECANCELED : output->stream->code;
-    if (output->stream->descriptor >= 0) {
-      (void)close(output->stream->descriptor);
-    }
-  }
   if (output->file != NULL) {
-    (void)fclose(output->file); /* the stream has failed: nothing more is written */
+    __fpurge(output->file); /* else closing would write what is left into a pipe */
+    (void)fclose(output->file);
   }
-  free(output->stream);
   free(output->temporary);
   free(output->target);
   free(output->path);

@@ -20,7 +20,6 @@ typedef struct supine_output {
   char *target;    /**< path with symbolic links followed */
   char *temporary; /**< its present name; "" if it has none */
   bool standard;   /**< standard output */
-  struct supine_output_stream *stream;
 } supine_output;
 
 /** Begin a file. A new file gets its mode by the umask, an old one keeps its own; a symbolic
