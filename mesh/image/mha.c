@@ -30,76 +30,50 @@ static const struct {
 
 enum { TYPES = sizeof types / sizeof *types };
 
+enum { KEYS_MAX = 128 };
+
+/* Lines "Key = value" of a header, in the text itself. */
 typedef struct header {
-  double dimensions, size[4], spacing[4], offset[4], matrix[16], channels, packed_size;
-  bool binary, compressed, big_endian, is_image, is_local, ended;
-  const char *type;
+  size_t count;
+  const char *key[KEYS_MAX], *value[KEYS_MAX];
   size_t length; /* bytes before the voxels */
 } header;
+
+/* Find the last value of any of up to three keys; "" if there is none. */
+static const char *value_of(const header *h, const char *key, const char *second,
+                            const char *third) {
+  const char *value = "";
+  for (size_t i = 0; i < h->count; ++i) {
+    if (strcmp(h->key[i], key) == 0 || strcmp(h->key[i], second) == 0 ||
+        strcmp(h->key[i], third) == 0) {
+      value = h->value[i];
+    }
+  }
+  return value;
+}
 
 static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Parse up to `most` numbers; return how many. */
-static size_t numbers(const char *text, double *values, size_t most) {
-  size_t count = 0;
-  for (char *end; count < most; text = end) {
-    values[count] = strtod(text, &end);
-    if (end == text) {
-      break;
-    }
-    ++count;
+/* Parse a list of `count` numbers; an empty text leaves them as they are. */
+static bool numbers(const char *text, double *values, size_t count) {
+  bool good = true;
+  for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
+    char *end;
+    values[i] = strtod(text, &end);
+    good = end != text && (*end != '\0' || i + 1 == count);
+    text = end;
   }
-  return count;
+  return good;
 }
 
-/* Parse one line, ended by NUL; false if a list is too short. */
-static bool take_line(char *key, char *value, header *h) {
-  const struct {
-    const char *key;
-    double *values;
-    bool squared;
-  } lists[] = {{"DimSize", h->size, false},   {"ElementSpacing", h->spacing, false},
-               {"Offset", h->offset, false},  {"Position", h->offset, false},
-               {"Origin", h->offset, false},  {"TransformMatrix", h->matrix, true},
-               {"Rotation", h->matrix, true}, {"Orientation", h->matrix, true}};
-  const size_t n = (size_t)h->dimensions;
-  for (size_t i = 0; i < sizeof lists / sizeof *lists; ++i) {
-    if (strcmp(key, lists[i].key) == 0) {
-      const size_t wanted = lists[i].squared ? n * n : n;
-      return numbers(value, lists[i].values, wanted) == wanted;
-    }
-  }
-  h->is_image = strcmp(key, "ObjectType") == 0 ? strcasecmp(value, "Image") == 0 : h->is_image;
-  h->binary = strcmp(key, "BinaryData") == 0 ? is_true(value) : h->binary;
-  h->compressed = strcmp(key, "CompressedData") == 0 ? is_true(value) : h->compressed;
-  if (strcmp(key, "BinaryDataByteOrderMSB") == 0 || strcmp(key, "ElementByteOrderMSB") == 0) {
-    h->big_endian = is_true(value);
-  }
-  if (strcmp(key, "NDims") == 0) {
-    return numbers(value, &h->dimensions, 1) == 1 && (h->dimensions == 3.0 || h->dimensions == 4.0);
-  }
-  if (strcmp(key, "ElementNumberOfChannels") == 0) {
-    return numbers(value, &h->channels, 1) == 1;
-  }
-  if (strcmp(key, "CompressedDataSize") == 0) {
-    return numbers(value, &h->packed_size, 1) == 1;
-  }
-  h->type = strcmp(key, "ElementType") == 0 ? value : h->type;
-  if (strcmp(key, "ElementDataFile") == 0) {
-    h->ended = true;
-    h->is_local = strcasecmp(value, "LOCAL") == 0;
-  }
-  return true;
-}
-
-/* Parse the lines of `text`, which is modified; return NULL or the error. */
+/* Split the lines of `text`, which is modified; return NULL or the error. */
 static const char *read_header(char *text, header *h) {
-  *h = (header){.spacing = {1.0, 1.0, 1.0, 1.0}, .channels = 1.0, .binary = true, .is_image = true};
-  for (char *line = text; !h->ended;) {
+  *h = (header){0};
+  for (char *line = text; h->count == 0 || strcmp(h->key[h->count - 1], "ElementDataFile") != 0;) {
     char *end = strchr(line, '\n');
-    if (end == NULL) {
+    if (end == NULL || h->count == KEYS_MAX) {
       return "no line ElementDataFile ends its header";
     }
     *end = '\0';
@@ -114,49 +88,80 @@ static const char *read_header(char *text, header *h) {
     for (size_t l = strlen(value); l > 0 && strchr(" \t\r", value[l - 1]) != NULL; --l) {
       value[l - 1] = '\0';
     }
-    if (!take_line(key, value, h)) {
-      return "its header has too few numbers, or not three axes";
-    }
+    h->key[h->count] = key;
+    h->value[h->count++] = value;
     line = end + 1;
     h->length = (size_t)(line - text);
   }
-  return !h->is_image          ? "it is not an image"
-         : !h->is_local        ? "the voxels are in another file; save them in one (.mha)"
-         : !h->binary          ? "voxels as text are not read"
-         : h->dimensions < 3.0 ? "its header does not say NDims = 3"
-         : h->dimensions == 4.0 && h->size[3] != 1.0 ? "several volumes; give one"
-         : h->channels != 1.0                        ? "several numbers per voxel; give one"
-                                                     : NULL;
+  return NULL;
+}
+
+/* Check that the voxels are binary numbers in this file; return NULL or the error. */
+static const char *check(const header *h) {
+  const char *object = value_of(h, "ObjectType", "", "");
+  const char *binary = value_of(h, "BinaryData", "", "");
+  if (*object != '\0' && strcasecmp(object, "Image") != 0) {
+    return "it is not an image";
+  }
+  if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
+    return "the voxels are in another file; save them in one (.mha)";
+  }
+  if (*binary != '\0' && !is_true(binary)) {
+    return "voxels as text are not read; save them as binary";
+  }
+  return NULL;
 }
 
 /* Find size, frame and type; return NULL or the error. */
-static const char *describe(const header *h, size_t file_size, supine_image *image, bool *wide) {
+static const char *describe(const header *h, size_t file_size, supine_image *image,
+                            size_t *type_index) {
+  const char *name = value_of(h, "ElementType", "", "");
+  double dimensions = 0.0;
+  double channels = 1.0;
+  double size[4] = {0.0};
+  double spacing[4] = {1.0, 1.0, 1.0, 1.0};
+  double offset[4] = {0.0};
+  double matrix[16] = {0.0};
+  if (!numbers(value_of(h, "NDims", "", ""), &dimensions, 1) ||
+      (dimensions != 3.0 && dimensions != 4.0)) {
+    return "its header does not say NDims = 3; give an image of three axes";
+  }
+  const size_t n = (size_t)dimensions;
+  if (!numbers(value_of(h, "DimSize", "", ""), size, n) ||
+      !numbers(value_of(h, "ElementSpacing", "", ""), spacing, n) ||
+      !numbers(value_of(h, "Offset", "Position", "Origin"), offset, n) ||
+      !numbers(value_of(h, "TransformMatrix", "Rotation", "Orientation"), matrix, n * n) ||
+      !numbers(value_of(h, "ElementNumberOfChannels", "", ""), &channels, 1)) {
+    return "a list of its header has too few numbers; save it again";
+  }
+  if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
+    return channels != 1.0 ? "several numbers per voxel; give one" : "several volumes; give one";
+  }
   size_t type = 0;
-  while (type < TYPES && (h->type == NULL || strcmp(h->type, types[type].name) != 0)) {
+  while (type < TYPES && strcmp(name, types[type].name) != 0) {
     ++type;
   }
   if (type == TYPES) {
-    return "its ElementType is not read";
+    return "its ElementType is not read; save it as MET_SHORT";
   }
-  const size_t n = (size_t)h->dimensions;
   bool framed = false;
+  *type_index = type;
   image->voxel = types[type].voxel;
-  *wide = types[type].wide;
   image->axes = SUPINE_AXES_LPS;
   image->frame_source = "TransformMatrix";
   for (size_t a = 0; a < 3; ++a) {
-    if (!(h->size[a] >= 1.0 && h->size[a] <= 1e6) || h->size[a] != (double)(size_t)h->size[a]) {
-      return "its DimSize is invalid";
+    if (!(size[a] >= 1.0 && size[a] <= 1e6) || size[a] != (double)(size_t)size[a]) {
+      return "its DimSize is invalid; save it again";
     }
-    image->size[a] = (size_t)h->size[a];
-    image->origin[a] = h->offset[a];
+    image->size[a] = (size_t)size[a];
+    image->origin[a] = offset[a];
     for (size_t k = 0; k < 3; ++k) {
-      image->step[a][k] = h->spacing[a] * h->matrix[a * n + k];
-      framed = framed || h->matrix[a * n + k] != 0.0;
+      image->step[a][k] = spacing[a] * matrix[a * n + k];
+      framed = framed || matrix[a * n + k] != 0.0;
     }
   }
   for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix the axes are those of LPS */
-    image->step[a][a] = h->spacing[a];
+    image->step[a][a] = spacing[a];
   }
   return supine_image_bytes(image, file_size) == 0 ? "its voxels are more than the file can hold"
                                                    : NULL;
@@ -175,15 +180,12 @@ static void swap_bytes(unsigned char *bytes, size_t count, size_t size) {
 /* Unpack the voxels from the rest of the file; false if they are incomplete. */
 static bool unpack(const header *h, const unsigned char *packed, size_t packed_size,
                    unsigned char *values, size_t bytes) {
-  if (!h->compressed) {
-    if (packed_size < bytes) {
-      return false;
-    }
-    memcpy(values, packed, bytes);
-    return true;
-  }
   uLongf made = bytes;
-  return uncompress(values, &made, packed, packed_size) == Z_OK && made == bytes;
+  if (is_true(value_of(h, "CompressedData", "", ""))) {
+    return uncompress(values, &made, packed, packed_size) == Z_OK && made == bytes;
+  }
+  memcpy(values, packed, packed_size < bytes ? packed_size : bytes);
+  return packed_size >= bytes;
 }
 
 supine_status supine_image_read_mha(const char *path, size_t file_size, supine_image *image,
@@ -192,9 +194,8 @@ supine_status supine_image_read_mha(const char *path, size_t file_size, supine_i
   unsigned char *bytes = malloc(file_size + 1);
   char *text = malloc(HEADER_MAX + 1);
   header h;
-  bool wide = false;
-  const char *wrong = NULL;
-  supine_status status = SUPINE_ERROR_FORMAT;
+  size_t type = 0;
+  supine_status status = SUPINE_OK;
   if (file == NULL || bytes == NULL || text == NULL) {
     status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
                               "%s: cannot read", path);
@@ -204,8 +205,9 @@ supine_status supine_image_read_mha(const char *path, size_t file_size, supine_i
   const size_t head = size < HEADER_MAX ? size : HEADER_MAX;
   memcpy(text, bytes, head);
   text[head] = '\0';
-  wrong = read_header(text, &h);
-  wrong = wrong == NULL ? describe(&h, file_size, image, &wide) : wrong;
+  const char *wrong = read_header(text, &h);
+  wrong = wrong == NULL ? check(&h) : wrong;
+  wrong = wrong == NULL ? describe(&h, file_size, image, &type) : wrong;
   if (wrong == NULL) {
     const size_t count = image->size[0] * image->size[1] * image->size[2];
     const size_t each = supine_image_voxel_size(image->voxel);
@@ -214,20 +216,17 @@ supine_status supine_image_read_mha(const char *path, size_t file_size, supine_i
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
       goto cleanup;
     }
-    if (unpack(&h, bytes + h.length, size - h.length, image->values, count * each)) {
-      if (h.big_endian) {
-        swap_bytes(image->values, count, each);
-      }
-      if (wide) {
-        supine_image_widen(image->values, count, h.type[4] != 'U');
-      }
-      status = SUPINE_OK;
-    } else {
-      wrong = "truncated or damaged";
+    if (!unpack(&h, bytes + h.length, size - h.length, image->values, count * each)) {
+      wrong = "truncated or damaged; save it again";
+    } else if (is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", ""))) {
+      swap_bytes(image->values, count, each);
+    }
+    if (wrong == NULL && types[type].wide) {
+      supine_image_widen(image->values, count, types[type].name[4] != 'U');
     }
   }
   if (wrong != NULL) {
-    (void)supine_error_set(error, status, "%s: %s", path, wrong);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
   }
 cleanup:
   free(bytes);

@@ -56,7 +56,9 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
   }
   if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the header has no orientation (qform and sform are 0)", path);
+                            "%s: the header has no orientation (qform and sform are 0); give the "
+                            "file that the segmenter wrote",
+                            path);
   }
   const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
   while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
@@ -187,39 +189,29 @@ static float *planes(const supine_image *image) {
   return made;
 }
 
-/* Compress `bytes` more bytes into the file; `flush` is Z_FINISH for the last. */
-static bool deflate_bytes(z_stream *z, const unsigned char *values, size_t bytes, int flush,
-                          FILE *file) {
-  enum { PIECE = 1 << 28, SPACE = 1 << 16 };
-  unsigned char space[SPACE];
-  do {
-    const size_t piece = bytes < PIECE ? bytes : PIECE;
-    z->next_in = values;
-    z->avail_in = (unsigned)piece;
-    values += piece;
-    bytes -= piece;
-    do {
-      z->next_out = space;
-      z->avail_out = SPACE;
-      (void)deflate(z, bytes == 0 ? flush : Z_NO_FLUSH); /* fails only on misuse */
-      const size_t made = SPACE - z->avail_out;
-      if (fwrite(space, 1, made, file) != made) {
-        return false;
-      }
-    } while (z->avail_out == 0);
-  } while (bytes > 0);
-  return true;
-}
-
+/* Compress the header and the values into the file. */
 static bool write_gzip(FILE *file, const unsigned char *header, const unsigned char *values,
                        size_t bytes) {
-  enum { LEVEL = 6, GZIP = 16 + MAX_WBITS, MEMORY = 8 };
-  z_stream z = {0};
-  if (deflateInit2(&z, LEVEL, Z_DEFLATED, GZIP, MEMORY, Z_DEFAULT_STRATEGY) != Z_OK) {
-    return false;
+  enum { LEVEL = 6, GZIP = 16 + MAX_WBITS, MEMORY = 8, PIECE = 1 << 28, SPACE = 1 << 16 };
+  unsigned char space[SPACE];
+  z_stream z = {.next_in = header, .avail_in = 352};
+  bool well = deflateInit2(&z, LEVEL, Z_DEFLATED, GZIP, MEMORY, Z_DEFAULT_STRATEGY) == Z_OK;
+  while (well) {
+    z.next_out = space;
+    z.avail_out = SPACE;
+    const int result = deflate(&z, bytes == 0 ? Z_FINISH : Z_NO_FLUSH);
+    const size_t made = SPACE - z.avail_out;
+    well = fwrite(space, 1, made, file) == made;
+    if (result == Z_STREAM_END) {
+      break;
+    }
+    if (z.avail_in == 0 && bytes > 0) {
+      z.next_in = values;
+      z.avail_in = (unsigned)(bytes < PIECE ? bytes : PIECE);
+      values += z.avail_in;
+      bytes -= z.avail_in;
+    }
   }
-  const bool well = deflate_bytes(&z, header, 352, Z_NO_FLUSH, file) &&
-                    deflate_bytes(&z, values, bytes, Z_FINISH, file);
   (void)deflateEnd(&z);
   return well;
 }

@@ -11,12 +11,11 @@
 /* Labels of segmenters: lungmask's R231 and LTRCLobes, TotalSegmentator's `total` from 2.0 and
  * earlier. */
 static const struct {
-  const char *name;
-  uint16_t left[4], right[4]; /* ended by 0 */
-} conventions[] = {{"lungmask", {2}, {1}},
-                   {"lobes", {1, 2}, {3, 4, 5}},
-                   {"totalsegmentator", {10, 11}, {12, 13, 14}},
-                   {"totalsegmentator-v1", {13, 14}, {15, 16, 17}}};
+  const char *name, *labels;
+} conventions[] = {{"lungmask", "left=2,right=1"},
+                   {"lobes", "left=1+2,right=3+4+5"},
+                   {"totalsegmentator", "left=10+11,right=12+13+14"},
+                   {"totalsegmentator-v1", "left=13+14,right=15+16+17"}};
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
@@ -63,12 +62,6 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-static void take(const uint16_t *labels, uint8_t value, uint8_t *side) {
-  for (; *labels != 0; ++labels) {
-    side[*labels] = value;
-  }
-}
-
 /* Parse "10+11" up to a comma or the end; NULL if it is invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
@@ -85,7 +78,8 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-static bool read_custom(const char *wanted, uint8_t *side) {
+/* Parse "left=10+11,right=12" into the sides of the labels, which are 0 before. */
+static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
   for (;;) {
@@ -100,21 +94,6 @@ static bool read_custom(const char *wanted, uint8_t *side) {
     }
     ++at;
   }
-}
-
-/* Report whether the labels present are exactly those of a convention. */
-static bool is_convention(const labels_tally *tally, size_t convention) {
-  uint8_t *named = calloc(LABELS_MAX, 1);
-  bool same = named != NULL;
-  if (same) {
-    take(conventions[convention].left, 1, named);
-    take(conventions[convention].right, 1, named);
-  }
-  for (size_t label = 1; same && label < LABELS_MAX; ++label) {
-    same = (tally[label].count > 0) == (named[label] != 0);
-  }
-  free(named);
-  return same;
 }
 
 /* Choose without an option: two labels are two lungs, whatever their numbers. */
@@ -146,9 +125,13 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    if (is_convention(tally, c)) {
-      take(conventions[c].left, LABELS_LEFT, side);
-      take(conventions[c].right, LABELS_RIGHT, side);
+    bool same = true; /* exactly its labels are present */
+    memset(side, 0, LABELS_MAX);
+    (void)read_sides(conventions[c].labels, side);
+    for (size_t label = 1; same && label < LABELS_MAX; ++label) {
+      same = (tally[label].count > 0) == (side[label] != 0);
+    }
+    if (same) {
       *name = conventions[c].name;
       return true;
     }
@@ -178,15 +161,14 @@ static supine_status choose(const char *path, const supine_image *image, const l
     memset(side + 1, LABELS_EITHER, LABELS_MAX - 1);
     return SUPINE_OK;
   }
+  const char *labels = wanted;
   for (size_t c = 0; c < CONVENTIONS; ++c) {
     if (strcmp(wanted, conventions[c].name) == 0) {
-      take(conventions[c].left, LABELS_LEFT, side);
-      take(conventions[c].right, LABELS_RIGHT, side);
+      labels = conventions[c].labels;
       *name = wanted;
-      return SUPINE_OK;
     }
   }
-  if (!read_custom(wanted, side)) {
+  if (!read_sides(labels, side)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--labels takes one, lungmask, lobes, totalsegmentator, "
                             "totalsegmentator-v1 or left=LABEL+...,right=LABEL+..., not '%s'",

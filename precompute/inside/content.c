@@ -7,70 +7,58 @@
 #include "mesh/io/points.h"
 #include "precompute/inside/content.h"
 
-static supine_status no_memory(const char *path, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-}
-
-/* Make room for more points, at least doubling it so that appending is cheap. */
-static bool reserve(supine_inside_content *content, size_t *capacity, size_t more) {
-  if (content->count + more <= *capacity) {
-    return true;
-  }
-  const size_t wanted = 2 * (content->count + more);
-  double *points = realloc(content->points, 3 * wanted * sizeof *points);
-  content->points = points != NULL ? points : content->points;
-  uint32_t *part = realloc(content->part, wanted * sizeof *part);
-  content->part = part != NULL ? part : content->part;
-  if (points == NULL || part == NULL) {
-    return false;
-  }
-  *capacity = wanted;
-  return true;
-}
-
-static bool add_name(supine_inside_content *content, const char *name, size_t length, size_t *used,
-                     size_t *capacity) {
-  if (*used + length + 2 > *capacity) {
-    const size_t wanted = 2 * (*used + length + 2);
-    char *names = realloc(content->names, wanted);
-    if (names == NULL) {
-      return false;
+/* Make room for more points, triangles and bytes of names.
+ * @retval SUPINE_ERROR_MEMORY */
+static supine_status reserve(supine_inside_content *content, size_t points, size_t triangles,
+                             size_t names, const char *path, supine_error *error) {
+  const size_t used = content->names != NULL ? strlen(content->names) : 0;
+  const size_t sizes[] = {3 * (content->count + points) * sizeof *content->points,
+                          (content->count + points) * sizeof *content->part,
+                          3 * (content->triangle_count + triangles) * sizeof *content->triangles,
+                          used + names};
+  void *const arrays[] = {&content->points, &content->part, &content->triangles, &content->names};
+  for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
+    void *array;
+    memcpy(&array, arrays[i], sizeof array);
+    void *grown = realloc(array, sizes[i] + 1);
+    if (grown == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
     }
-    content->names = names;
-    *capacity = wanted;
+    memcpy(arrays[i], &grown, sizeof grown);
   }
-  if (content->part_count > 0) {
-    content->names[(*used)++] = '\n';
+  content->names[used] = '\0';
+  return SUPINE_OK;
+}
+
+/* Append a name at the end of the names, and return their new end. */
+static char *add_name(supine_inside_content *content, const char *name, size_t length, char *end) {
+  if (content->part_count++ > 0) {
+    *end++ = '\n';
   }
-  memcpy(content->names + *used, name, length);
-  *used += length;
-  content->names[*used] = '\0';
-  ++content->part_count;
-  return true;
+  memcpy(end, name, length);
+  end[length] = '\0';
+  return end + length;
 }
 
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error) {
-  size_t capacity = content->count;
-  size_t used = content->names != NULL ? strlen(content->names) : 0;
-  size_t room = used;
   supine_mesh_points read = {0};
+  size_t length = 0;
   supine_status status = supine_mesh_points_read(path, options, &read, error);
-  if (status != SUPINE_OK) {
-    return status;
+  for (size_t i = 0; i < read.count; ++i) {
+    length += strlen(read.names[i]) + 1;
   }
-  if (!reserve(content, &capacity, read.count)) {
-    status = no_memory(path, error);
+  if (status == SUPINE_OK) {
+    status = reserve(content, read.count, 0, length, path, error);
   }
-  for (size_t i = 0; i < read.count && status == SUPINE_OK; ++i) {
-    const uint32_t part = (uint32_t)content->part_count;
-    if (!add_name(content, read.names[i], strlen(read.names[i]), &used, &room)) {
-      status = no_memory(path, error);
-      break;
+  if (status == SUPINE_OK) {
+    char *end = content->names + strlen(content->names);
+    memcpy(content->points + 3 * content->count, read.at, 3 * read.count * sizeof *read.at);
+    for (size_t i = 0; i < read.count; ++i) {
+      content->part[content->count++] = (uint32_t)content->part_count;
+      end = add_name(content, read.names[i], strlen(read.names[i]), end);
     }
-    memcpy(content->points + 3 * content->count, read.at + 3 * i, 3 * sizeof *read.at);
-    content->part[content->count++] = part;
   }
   supine_mesh_points_free(&read);
   return status;
@@ -87,27 +75,23 @@ static const char *part_name(const char *path, size_t *length) {
 
 static supine_status add_surface(const char *name, size_t length, const supine_mesh *mesh,
                                  supine_inside_content *content, supine_error *error) {
-  size_t capacity = content->count;
-  size_t used = content->names != NULL ? strlen(content->names) : 0;
-  size_t room = used;
-  const uint32_t part = (uint32_t)content->part_count;
-  const size_t triangles = content->triangle_count + mesh->triangle_count;
-  uint32_t *joined = realloc(content->triangles, 3 * triangles * sizeof *joined);
-  content->triangles = joined != NULL ? joined : content->triangles;
-  if (joined == NULL || !reserve(content, &capacity, mesh->vertex_count) ||
-      !add_name(content, name, length, &used, &room)) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%.*s: out of memory", (int)length, name);
+  const supine_status status =
+      reserve(content, mesh->vertex_count, mesh->triangle_count, length + 1, name, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
+  uint32_t *joined = content->triangles + 3 * content->triangle_count;
   for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-    joined[3 * content->triangle_count + i] = mesh->triangles[i] + (uint32_t)content->count;
+    joined[i] = mesh->triangles[i] + (uint32_t)content->count;
   }
   memcpy(content->points + 3 * content->count, mesh->vertices,
          3 * mesh->vertex_count * sizeof *mesh->vertices);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    content->part[content->count + i] = part;
+    content->part[content->count + i] = (uint32_t)content->part_count;
   }
   content->count += mesh->vertex_count;
-  content->triangle_count = triangles;
+  content->triangle_count += mesh->triangle_count;
+  (void)add_name(content, name, length, content->names + strlen(content->names));
   return SUPINE_OK;
 }
 

@@ -213,7 +213,11 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     status = mend(&meshes[m], source->name, findings, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_lungs_create(meshes, count, source->midline, lungs, error);
+    supine_error inner = {0};
+    status = supine_lungs_create(meshes, count, source->midline, lungs, &inner);
+    if (status != SUPINE_OK) {
+      (void)supine_error_set(error, status, "%s: %s", source->name, inner.message);
+    }
   }
   if (status != SUPINE_OK) {
     return status;

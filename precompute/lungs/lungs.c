@@ -242,7 +242,7 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
   for (int k = 0; k < 3; ++k) {
     if (!(lungs->maximum[k] > lungs->minimum[k])) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the surface has no extent along %c: a lung has three dimensions",
+                              "the surface has no extent along %c: give a closed surface",
                               "xyz"[k]);
     }
   }
