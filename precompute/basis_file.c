@@ -16,11 +16,13 @@
 #include "precompute/writer.h"
 #include "sh/base/text.h"
 
-/* Metadata under construction. */
+enum { ENTRIES_MAX = 64 };
+
+/* Metadata under construction; values are allocated. */
 typedef struct entries {
   size_t count;
-  supine_metadata *metadata; /* [count], in room for a power of two; values are allocated */
-  bool failed;               /* out of memory */
+  supine_metadata metadata[ENTRIES_MAX];
+  bool failed; /* out of memory, or of entries */
 } entries;
 
 SUPINE_PRINTF(3, 4)
@@ -28,30 +30,19 @@ static void add(entries *list, const char *key, const char *format, ...) {
   char *text = NULL;
   va_list arguments;
   va_start(arguments, format);
-  const int length = vasprintf(&text, format, arguments);
+  const int length = list->count < ENTRIES_MAX ? vasprintf(&text, format, arguments) : -1;
   va_end(arguments);
   if (length < 0) {
     list->failed = true;
-    return;
+  } else {
+    list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
   }
-  if ((list->count & (list->count - 1)) == 0) { /* 0 or a power of two: full */
-    const size_t room = list->count == 0 ? 1 : 2 * list->count;
-    supine_metadata *grown = realloc(list->metadata, room * sizeof *grown);
-    if (grown == NULL) {
-      free(text);
-      list->failed = true;
-      return;
-    }
-    list->metadata = grown;
-  }
-  list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
 }
 
 static void entries_free(entries *list) {
   for (size_t i = 0; i < list->count; ++i) {
     free((char *)list->metadata[i].value);
   }
-  free(list->metadata);
 }
 
 static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at_rest) {
@@ -69,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* How much of the lungs lesions changed, and how far. */
+/* State how many vertices lesions change, and by which factors. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -109,7 +100,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* A number for each lung, separated by commas. */
+/* Add a number for each lung, separated by commas. */
 static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
   if (count == 2) {
     add(list, key, "%.9g,%.9g", values[0], values[1]);
@@ -118,7 +109,7 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* Where volumes count from, and what was assumed of the scan. */
+/* State the scan, full inflation and rest. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -142,11 +133,11 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* How far off positions are expected to be, and whether rest is a guess (supine/locate.h). */
+/* State the expected error of positions, and whether rest was given (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
-  if (content->model != NULL) {
-    const double own = content->expected_error;
+  if (content->fit == NULL) {
+    const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
@@ -182,7 +173,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-/* Doubles as floats. */
+/* Convert to floats; NULL: out of memory. */
 static float *to_float(const double *values, size_t count) {
   float *out = malloc(count * sizeof *out);
   for (size_t i = 0; out != NULL && i < count; ++i) {
@@ -191,14 +182,14 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Normals of the surface as the file will have it. */
+/* Find the normals of the surface as written to the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
   const supine_compression *field = content->compression;
   const supine_volume_forms *forms = content->forms;
   static const double straight[3] = {0.0, 0.0, 0.0};
-  const double *field_bend = content->reference != NULL ? content->model->bend : straight;
+  const double *field_bend = content->reference != NULL ? content->options->model.bend : straight;
   const supine_normals_surface surface = {.vertex_count = content->lungs->mesh.vertex_count,
                                           .triangle_count = content->lungs->mesh.triangle_count,
                                           .lung_count = content->lungs->lung_count,
@@ -227,10 +218,12 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
-/* Over 60 lines: the format from its first tensor to its last, in the order of the file. */
+/* Over 60 lines: all metadata and tensors, in the order of the file. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;
+  const supine_precompute_options *options = content->options;
+  const supine_model *model = content->fit == NULL ? &options->model : NULL;
   const supine_compression *field = content->compression;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
@@ -240,7 +233,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   supine_normals_modes normals = {0};
   const bool vector = content->directions == NULL;
   static const double healthy[2] = {1.0, 1.0};
-  const double *share = content->model != NULL ? content->model->share : healthy;
+  const double *share = model != NULL ? model->share : healthy;
   float *vertices = NULL;
   float *directions = NULL;
   double *rest = malloc(3 * n * sizeof *rest);
@@ -266,13 +259,13 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   add(&list, "version", "3");
   add(&list, "kind", "%s", vector ? "vector" : "scalar");
   add(&list, "band", "%zu", field->band);
-  add(&list, "modes", "%s", content->harmonics ? "harmonics" : "best");
+  add(&list, "modes", "%s", options->modes == 0 ? "harmonics" : "best");
   add(&list, "mode_count", "%zu", k);
   add(&list, "units", "mm");
   add(&list, "axes", "LPS");
   add_lungs(&list, lungs, share);
-  if (content->model != NULL) {
-    add_model(&list, lungs, content->model, content->reference != NULL);
+  if (model != NULL) {
+    add_model(&list, lungs, model, content->reference != NULL);
   }
   if (content->reference != NULL) {
     add_reference(&list, content->reference, share);
@@ -285,28 +278,28 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (content->turned_over != NULL) {
     add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
-  if (content->patient != NULL) {
-    add(&list, "patient_law", "%s", content->patient);
-    add(&list, "patient", "%s", content->patient_summary);
+  if (options->patient != NULL) {
+    add(&list, "patient_law", "%s", options->patient);
+    add(&list, "patient", "%s", options->patient_summary);
   }
-  if (content->assumed != NULL) {
-    add(&list, "assumed", "%s", content->assumed);
+  if (options->assumed != NULL) {
+    add(&list, "assumed", "%s", options->assumed);
   }
-  if (content->findings != NULL && content->findings[0] != '\0') {
-    add(&list, "warnings", "%.*s", (int)strlen(content->findings) - 1, content->findings);
+  if (options->findings != NULL && options->findings[0] != '\0') {
+    add(&list, "warnings", "%.*s", (int)strlen(options->findings) - 1, options->findings);
   }
-  if (content->frame.millimetres_per_unit > 0.0) {
+  if (options->frame.millimetres_per_unit > 0.0) {
     char letters[4];
-    supine_mesh_axes_letters(content->frame.axes, letters);
+    supine_mesh_axes_letters(options->frame.axes, letters);
     add(&list, "scan_axes", "%s", letters);
-    add(&list, "scan_unit_mm", "%.17g", content->frame.millimetres_per_unit);
+    add(&list, "scan_unit_mm", "%.17g", options->frame.millimetres_per_unit);
   }
   status = find_normals(content, vertices, directions, &normals, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   add_normals(&list, &normals, content->forms != NULL);
-  add(&list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  add(&list, "made_by", "%s", options->made_by != NULL ? options->made_by : "supine_precompute");
   if (list.failed) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
     goto cleanup;

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "precompute/basis_file.h"
-#include "precompute/precompute.h"
 #include "precompute/projection/compression.h"
 #include "precompute/projection/tally.h"
 #include "sh/base/vec3.h"
@@ -340,14 +339,14 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
     status = supine_projection_compression_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
+    const supine_precompute_options basis = {
+        .modes = options->modes, .findings = options->findings, .made_by = options->made_by};
     const supine_basis_content content = {.lungs = lungs,
+                                          .options = &basis,
                                           .fit = report,
                                           .compression = &field,
                                           .forms = forms.linear != NULL ? &forms : NULL,
-                                          .accuracy = &report->accuracy,
-                                          .harmonics = options->modes == 0,
-                                          .findings = options->findings,
-                                          .made_by = options->made_by};
+                                          .accuracy = &report->accuracy};
     report->mode_count = field.mode_count;
     status = supine_writer_basis_write(path, &content, error);
   }

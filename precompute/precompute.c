@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "sh/base/vec3.h"
-#include <supine/sh.h>
+#include <supine/volume.h>
 
 #include "precompute/physics/inflate.h"
 #include "precompute/precompute.h"
@@ -13,33 +13,31 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/compression.h"
 #include "precompute/projection/held_out.h"
-#include "precompute/rest.h"
 
-/* Held-out directions where the caller names no number: as many as keep their work bounded. Over a
- * hundred the error itself is known to about 5 %, over a thousand to 1 or 2 %. */
+/* Bounds of the default number of held-out directions, and vertices times directions within them. A
+ * hundred directions give the error to about 5 %, a thousand to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-enum { FEW_COLUMNS = 8 }; /* forms of so many cost less than a pass for each direction */
+enum { FEW_COLUMNS = 8 }; /* columns up to which volume forms cost less than a pass per direction */
 
-static const double breath_volume =
-    500.0; /* mL, that errors in mm are stated at where rest is unknown */
+/* Volume, mL, at which errors in mm are stated if rest is unknown. */
+static const double breath_volume = 500.0;
 
-/* Fewer modes are kept where the error stays within this factor of what the most would have. */
+/* Modes are dropped while the error stays below this factor of that with all modes. */
 static const double same_error = 1.01;
 
-/* Everything between the lungs and the file. */
+/* State of the pipeline, from the lungs to the file. */
 typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* the same, or anchored */
   const supine_precompute_options *options;
-  supine_lungs anchored; /* the lungs with vertices of their own, where a scan is to be met */
+  supine_lungs anchored; /* the lungs with own vertices, moved so that the field meets the scan */
   supine_reference reference;
   double *directions; /* [N, 3] */
-  double *weight;     /* [N] |d|^2: modes then minimise the error of displacement itself, 0.34 % RMS
-                         with 16 where plain or area-weighted ones leave 0.40 and 0.42 % (a left
-                         lung, soften 1) */
+  double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: 0.34 % RMS with
+                     16 modes; without weights 0.40, by area 0.42 % (a left lung, soften 1) */
   supine_projection projection;
-  supine_volume_forms column_forms; /* where the projection has few columns */
+  supine_volume_forms column_forms; /* of the projection, if it has few columns */
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
   double energy; /* sum of the squares of all singular values */
@@ -47,9 +45,9 @@ typedef struct pipeline {
   supine_held_out held_out;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9];    /* mL from the reference at rest by lung, harmonics; where it is known */
+  double resting[2][9];    /* mL from the reference at rest by lung, harmonics; if it is known */
   double resting_total[9]; /* of the lungs together */
-  supine_accuracy_state state; /* that errors in mm are stated at */
+  supine_accuracy_state state; /* at which errors in mm are stated */
   supine_error_table table;
 } pipeline;
 
@@ -113,10 +111,10 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* Move the full surface so that the compressed field leads to the scan to the last bit: by what the
- * field errs at the scan's gravity, and by what the fixed point left.
+/* Move the surface at full inflation so that the compressed field leads to the scan exactly: this
+ * corrects the field's error at the scan's gravity, and the fixed point's residual.
  *
- *     p'_j = scan_j - A_j F' d_j       A at which the volumes stay as they are */
+ *     p'_j = scan_j - A_j F' d_j       with gains A that keep the volumes */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -150,8 +148,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Finds the volume forms of the coefficients: those of the projection's columns carried along where
- * these are few, else directly. */
+/* Find the volume forms of the coefficients: from those of the projection's columns if these are
+ * few, else directly. */
 static supine_status find_forms(pipeline *p, supine_error *error) {
   const supine_compression *field = &p->compression;
   if (!p->lungs->topology.closed) {
@@ -178,15 +176,65 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
                                                     p->directions, &p->forms, error);
 }
 
-/* Errors are stated at rest where it is known. */
+/* Check that the field takes each lung to its volume at unit gravity g. */
+static supine_status check_rest(const supine_compression *compression,
+                                const supine_volume_forms *forms, const double g[3],
+                                const double *volume, supine_error *error) {
+  double weights[SUPINE_MODES_MADE_MAX];
+  supine_error inner = {0};
+  supine_projection_compression_weights(compression, g, weights);
+  for (size_t lung = 0; lung < forms->lung_count; ++lung) {
+    static const double straight[3] = {0.0, 0.0, 0.0};
+    supine_volume_form form;
+    double gains[3];
+    supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
+    if (supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) != SUPINE_OK) {
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "with gravity along %g,%g,%g the lungs cannot rest %.0f mL below full inflation: %s; "
+          "give --resting, or take the scan as it is with --scanned none",
+          g[0], g[1], g[2], -volume[lung], inner.message);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Find the volume of each lung at rest, mL beyond the reference surface, as real harmonics of bands
+ * 0 to 2: stated along the axes, and between them by harmonics.
+ * @param share  of collapsed lungs
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it holds so little in some posture */
+static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
+                                    const supine_compression *compression,
+                                    const supine_volume_forms *forms, double harmonics[2][9],
+                                    supine_error *error) {
+  double volume[2][6];
+  supine_status status = SUPINE_OK;
+  for (size_t axis = 0; axis < 6 && status == SUPINE_OK; ++axis) {
+    double g[3] = {0.0, 0.0, 0.0};
+    double rest[2];
+    g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+    (void)supine_reference_rest(reference, g, rest);
+    for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+      rest[lung] = share[lung] * (rest[lung] - reference->full_volume[lung]);
+      volume[lung][axis] = rest[lung];
+    }
+    status = check_rest(compression, forms, g, rest, error);
+  }
+  for (size_t lung = 0; lung < reference->lung_count && status == SUPINE_OK; ++lung) {
+    supine_reference_harmonics(volume[lung], harmonics[lung]);
+  }
+  return status;
+}
+
+/* Find the volumes at rest, where errors are stated, if it is known. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   p->state = (supine_accuracy_state){.volume = breath_volume};
   if (!p->reference.known) {
     return SUPINE_OK;
   }
-  const supine_status status = supine_precompute_rest(
-      &p->reference, options->model.share, &p->compression, &p->forms, p->resting, error);
+  const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
+                                              &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
     p->resting_total[t] = p->resting[0][t] + p->resting[1][t]; /* 0 where there is no second */
   }
@@ -212,7 +260,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
                                  &p->accuracy, error);
 }
 
-/* The fewest modes whose error is the same, judged by what the ones left out would carry. */
+/* Find the fewest modes of the same error, by the singular values of those dropped. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;
@@ -229,7 +277,7 @@ static size_t modes_needed(const pipeline *p) {
   return count;
 }
 
-/* Made before modes are dropped, so that it shows what more of them would bring. */
+/* Tabulate the error by band and modes, before modes are dropped. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->held_out.truth, &p->projection, &p->compression, p->directions, &p->table);
@@ -237,7 +285,7 @@ static supine_status tabulate(pipeline *p, supine_error *error) {
                              : supine_error_set(error, status, "no memory to tabulate the error");
 }
 
-/* Drops the modes that do not pay, and states the error of what is left. */
+/* Drop modes that are not needed, and measure the error again. */
 static supine_status drop_modes(pipeline *p, supine_error *error) {
   const size_t needed = modes_needed(p);
   if (p->options->modes == 0 || needed == p->compression.mode_count) {
@@ -262,25 +310,17 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
 }
 
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
+  const bool closed = p->forms.linear != NULL;
   const supine_basis_content content = {.lungs = p->lungs,
-                                        .model = &p->options->model,
+                                        .options = p->options,
                                         .directions = p->directions,
                                         .compression = &p->compression,
-                                        .forms = p->forms.linear != NULL ? &p->forms : NULL,
+                                        .forms = closed ? &p->forms : NULL,
                                         .accuracy = &p->accuracy,
-                                        .turned_over =
-                                            p->forms.linear != NULL ? &p->turned_over : NULL,
+                                        .turned_over = closed ? &p->turned_over : NULL,
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
-                                        .resting = p->reference.known ? p->resting[0] : NULL,
-                                        .harmonics = p->options->modes == 0,
-                                        .patient = p->options->patient,
-                                        .patient_summary = p->options->patient_summary,
-                                        .expected_error = p->options->expected_error,
-                                        .made_by = p->options->made_by,
-                                        .assumed = p->options->assumed,
-                                        .findings = p->options->findings,
-                                        .frame = p->options->frame};
+                                        .resting = p->reference.known ? p->resting[0] : NULL};
   stage part = {p->options, 0.9, 1.0};
   if (!stage_progress(&part, 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");

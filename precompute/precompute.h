@@ -10,34 +10,38 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-/** What a basis is made of. */
+/** How to make a basis. */
 typedef struct supine_precompute_options {
   supine_model model;
   const supine_reference *reference; /**< of the lungs; NULL: volumes count from their surface */
   size_t band;                       /**< L */
   size_t modes;                      /**< most modes; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;             /**< directions that the error is measured on; 0: 100 to 1000 */
-  const char *made_by;         /**< how it was made, for the file's metadata; optional */
-  const char *patient;         /**< a person's own law (JSON), for the same; optional */
-  double expected_error;       /**< mm of square error per mm of displacement; 0: the law's */
-  const char *patient_summary; /**< whose, and how well it held out; with the former */
-  const char *assumed;         /**< what was assumed of the scan, likewise */
-  const char *findings;        /**< what was found of the input, a line each; optional */
+  size_t held_out;       /**< directions on which the error is measured; 0: 100 to 1000 */
+  double expected_error; /**< mm of square error per mm of displacement; 0: the law's */
   supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
   void *progress_context;
+  /** @{ For the file's metadata, optional. */
+  const char *made_by;         /**< the command */
+  const char *patient;         /**< a person's own law, JSON */
+  const char *patient_summary; /**< with it: the patient and the error on held-out data, in words */
+  const char *assumed;         /**< assumptions about the scan */
+  const char *findings;        /**< notes and warnings on the input, one a line */
+  /** @} */
 } supine_precompute_options;
 
-/** What came of it. */
+/** Result of making a basis. */
 typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< directions solved for */
+  size_t iterations;
+  double residual;
   supine_accuracy accuracy;
-  /** At the accuracy's state, see supine_accuracy_turned_over; 0 where the surface is open. */
-  double turned_over;
+  double turned_over; /**< at the accuracy's state, see supine_accuracy_turned_over; 0 if the
+                       * surface is open */
 } supine_precompute_report;
 
-/** Projects, compresses, measures, and writes the basis file, whole or not at all.
+/** Project, compress, measure, and write the basis file, whole or not at all.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_INTERRUPTED, and those of the steps */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Law, tissue, directions, scan state: the steps from lungs to a model. */
+/* Choose the law, tissue, directions and reference of a model. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,14 +55,14 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
                                        supine_prepared *p, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_status status = SUPINE_OK;
-  const bool told = choice->expandability != NULL ||
-                    choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
-  if (choice->stiffness != NULL && told) {
+  const bool given = choice->expandability != NULL ||
+                     choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
+  if (choice->stiffness != NULL && given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the patient's law brings its own stiffness: leave --expandability "
                             "out");
   }
-  if (choice->stiffness == NULL && !told) {
+  if (choice->stiffness == NULL && !given) {
     return SUPINE_OK;
   }
   double *a = p->stiffness = allocate(n, &status, error);
@@ -77,7 +77,10 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
             ? supine_tissue_expandability_load(choice->expandability, n, a, error)
             : supine_tissue_expandability_regional(lungs, &choice->expandability_law, a, error);
   }
-  return status == SUPINE_OK ? supine_tissue_expandability_stiffness(n, a, a, error) : status;
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    a[i] = 1.0 / a[i];
+  }
+  return status;
 }
 
 static supine_status set_directions(const supine_lungs *lungs, const supine_model_choice *choice,
@@ -93,7 +96,7 @@ static supine_status set_directions(const supine_lungs *lungs, const supine_mode
                              : status;
 }
 
-/* Say why a lesion changes nothing: stiffness belongs to vertices, and it reaches none. */
+/* Warn of a lesion that reaches no vertex, and so changes no stiffness. */
 static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                            supine_findings *findings) {
   const double *c = lesion->centre;
@@ -139,18 +142,17 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
-    if (choice->share[side] > 0.0) {
-      status =
-          lung == lungs->lung_count
-              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                 "--lung %s: the model has no %s lung", names[side], names[side])
-              : supine_tissue_collapse(lungs, lung, choice->share[side], p->model.share, error);
+    if (choice->share[side] > 0.0 && lung == lungs->lung_count) {
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
+                                names[side], names[side]);
+    } else if (choice->share[side] > 0.0) {
+      p->model.share[lung] = choice->share[side];
     }
   }
   return status;
 }
 
-/* Say what was assumed, so that the user can check it. */
+/* Summarise the assumptions, so that the user can check them. */
 static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_resting usual = supine_reference_resting_default();

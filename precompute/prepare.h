@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * From lungs as scanned, and what a user says of them, to what a basis is made of: the model, and
- * the lungs at its reference. */
+ * From the lungs in the scan and the user's choices to the model, and the lungs at its reference.
+ */
 #ifndef SUPINE_PREPARE_H
 #define SUPINE_PREPARE_H
 
@@ -13,42 +13,42 @@
 
 enum { SUPINE_LESIONS_MAX = 64 };
 
-/** What is said of the model and of the scan. */
+/** Choices for the model and the scan. */
 typedef struct supine_model_choice {
-  int law;                 /**< a supine_law; SUPINE_LAW_COUNT: chosen by the scan's state */
-  supine_model model;      /**< constants other than the law's; NAN: the law's */
-  const char *own;         /**< whose the model is, all its constants said; NULL: a law's */
+  int law;            /**< a supine_law; SUPINE_LAW_COUNT: by the scan's state */
+  supine_model model; /**< constants; NAN: the law's own */
+  const char *own;    /**< name of a model with all its constants, a patient's; NULL: a law's */
   const double *stiffness; /**< [N] E, with `own`; or NULL */
   bool has_scan;           /**< false: full, with `paper` none */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
-  const char *directions;    /**< a file of vectors, or NULL: the law's */
-  const char *expandability; /**< a file, or NULL: as follows */
+  const char *directions;    /**< a file of vectors; NULL: the law's */
+  const char *expandability; /**< a file; NULL: as follows */
   supine_expandability_law expandability_law;
   size_t lesion_count;
   supine_lesion lesions[SUPINE_LESIONS_MAX];
   double share[2]; /**< of the left and the right lung, collapsed; 0: healthy */
 } supine_model_choice;
 
-/** The defaults. */
+/** Return the defaults. */
 supine_model_choice supine_precompute_choice_default(void);
 
-/** What came of it. */
+/** Result of preparation. */
 typedef struct supine_prepared {
-  supine_model model; /**< its arrays are those below */
+  supine_model model; /**< its arrays are the following */
   supine_reference reference;
-  char summary[512]; /**< what was assumed: law, scan, full inflation, rest */
+  char summary[512]; /**< assumptions: law, scan, full inflation, rest */
   double *stiffness; /**< [N], or NULL */
   double *lesions;   /**< [N], or NULL */
   double *vectors;   /**< [N, 3], or NULL */
 } supine_prepared;
 
 /** Choose the law, find tissue and directions, and take the lungs to the reference.
- * @param lungs     as scanned; at the reference afterwards
+ * @param lungs     as scanned; moved to the reference
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added
- * @retval SUPINE_ERROR_ARGUMENT  `paper` of a scan whose state is said; a lung that is not there
+ * @retval SUPINE_ERROR_ARGUMENT  the paper law with a scan's state; a lung that is not there;
  * and those of the steps */
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
                                         supine_prepared *prepared, supine_findings *findings,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Surfaces and label maps to lungs. */
+/* Load surfaces and label maps, and join them into lungs. */
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 
-/* The files under way; a map holds two lungs at most. */
+/* Files being read; a map holds at most two lungs. */
 typedef struct reading {
   const supine_source_options *options;
   char **paths;
@@ -69,7 +69,7 @@ static void find_in_map(const char *path, const supine_labels_report *report,
                         supine_findings *findings) {
   if (report->frames_differ) {
     supine_findings_add(findings,
-                        "%s: warning: its qform and sform do not agree; the sform was taken", path);
+                        "%s: warning: its qform and sform do not agree; the sform was used", path);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
@@ -101,7 +101,7 @@ typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
   char *list[LOBES];
   size_t count;
-  char labels[64]; /* which of them are left and right */
+  char labels[64]; /* sides, as for --labels */
 } lobe_files;
 
 static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
@@ -132,7 +132,7 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* A lung alone has its inner face for a midline. */
+/* Load label maps. The midline of a single lung is its inner face. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
@@ -145,7 +145,8 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   wanted.axes = r->options->load.axes;
   if (r->options->load.millimetres_per_unit != 0.0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--units is for surfaces: a label map's header says them");
+                            "--units is for surfaces: leave it out, as a label map's header states "
+                            "them");
   }
   const supine_status status = supine_labels_surfaces(
       (const char *const *)(folder ? lobes.list : r->paths), folder ? lobes.count : r->count,
@@ -169,7 +170,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   return SUPINE_OK;
 }
 
-/* The frame that all files share. */
+/* Find the frame that all files share; zeros if there is none. */
 static supine_scan_frame frame_of(const reading *r) {
   for (size_t i = 1; i < r->count; ++i) {
     if (r->reports[i].axes != r->reports[0].axes) {
@@ -189,7 +190,7 @@ static void summarize(const reading *r, supine_source *source) {
   char letters[4];
   supine_mesh_axes_letters(report->axes, letters);
   supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters,
-                  load->axes != SUPINE_AXES_AUTO ? "as told"
+                  load->axes != SUPINE_AXES_AUTO ? "by --axes"
                   : report->axes_from_tag        ? "the file's tag"
                                                  : "assumed",
                   load->millimetres_per_unit == 0.0 ? 1.0 : load->millimetres_per_unit);
@@ -209,7 +210,7 @@ static void summarize(const reading *r, supine_source *source) {
   }
 }
 
-/* Whether all files are maps, or none. */
+/* Check that all files are maps, or none. */
 static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;
@@ -219,12 +220,13 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
   }
   *is_map = images == count;
   if (images > 0 && images < count) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "label maps or surfaces, not both");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "label maps and surfaces: give only one kind");
   }
   if (images == 0 && (labels->labels != NULL || labels->edge > 0.0 || labels->close > 0.0 ||
                       options->surfaces_out != NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--labels, --edge, --close and --surfaces-out are of label maps "
+                            "--labels, --edge, --close and --surfaces-out are for label maps "
                             "(.nrrd, .nii, .nii.gz, .mha)");
   }
   return SUPINE_OK;
@@ -232,12 +234,12 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
 
 static supine_status join(reading *r, supine_source *source, supine_findings *findings,
                           supine_error *error) {
-  const supine_lungs_source told = {.name = r->paths[0],
-                                    .axes = r->axes,
-                                    .axes_given = r->options->load.axes != SUPINE_AXES_AUTO,
-                                    .units_given = r->options->load.millimetres_per_unit != 0.0,
-                                    .midline = r->has_midline ? &r->midline : NULL};
-  supine_status status = supine_lungs_gate(r->meshes, r->count, &told, &source->lungs,
+  const supine_lungs_source given = {.name = r->paths[0],
+                                     .axes = r->axes,
+                                     .axes_given = r->options->load.axes != SUPINE_AXES_AUTO,
+                                     .units_given = r->options->load.millimetres_per_unit != 0.0,
+                                     .midline = r->has_midline ? &r->midline : NULL};
+  supine_status status = supine_lungs_gate(r->meshes, r->count, &given, &source->lungs,
                                            &source->axes_hold, findings, error);
   if (status == SUPINE_OK && r->options->surfaces_out != NULL) {
     status = supine_mesh_save(r->options->surfaces_out, &source->lungs.mesh, NULL, error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * From files to lungs: surfaces, or a label map. */
+ * Load lungs from surfaces or label maps. */
 #ifndef SUPINE_SOURCE_H
 #define SUPINE_SOURCE_H
 
@@ -10,29 +10,29 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/reference.h"
 
-/** What is said of the files. */
+/** How to read the files. */
 typedef struct supine_source_options {
   supine_mesh_load_options load;
   supine_labels_options labels; /**< of label maps; its axes are those of `load` */
-  const char *surfaces_out;     /**< where surfaces made of a label map are kept, or NULL */
+  const char *surfaces_out;     /**< file for the surfaces made from a label map, or NULL */
   bool has_midline;
   double midline;
 } supine_source_options;
 
-/** What was read. */
+/** Result of loading. */
 typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
-  bool is_map;    /**< label maps, and what they hold is in `report` */
+  bool is_map;    /**< label maps, described by `report` */
   bool axes_hold; /**< the shape agrees with the axes (supine_lungs_gate) */
   supine_labels_report report;
-  char summary[256]; /**< how the files were read, and where the lungs lie */
+  char summary[256]; /**< axes, unit and the lungs' boxes, in words */
 } supine_source;
 
 /** Read surfaces (all at once) or label maps, check them and join them into lungs.
  * @param source    zeroed; release with supine_precompute_source_free
- * @param findings  notes and warnings are added, also where it fails
- * @retval SUPINE_ERROR_ARGUMENT  maps beside surfaces; options of the one kind for the other
+ * @param findings  notes and warnings are added, also after a failure
+ * @retval SUPINE_ERROR_ARGUMENT  maps beside surfaces; options of the one kind for the other;
  * and those of supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,

@@ -33,7 +33,9 @@ static double *gradient_of(const supine_lungs *lungs, const supine_expandability
   const size_t n = lungs->mesh.vertex_count;
   double *e = malloc(n * sizeof *e);
   assert_int_equal(supine_tissue_expandability_regional(lungs, law, e, NULL), SUPINE_OK);
-  assert_int_equal(supine_tissue_expandability_stiffness(n, e, e, NULL), SUPINE_OK);
+  for (size_t i = 0; i < n; ++i) {
+    e[i] = 1.0 / e[i];
+  }
   return e;
 }
 

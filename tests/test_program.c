@@ -190,7 +190,7 @@ static void test_scanned_state_and_frame_come_back(void **state) {
          "deform low.safetensors --posture supine --volume scan --from scan -o low.obj");
   EXPECT(0, "displacement 0.000 mm from supine at full inflation",
          "deform low.safetensors --posture prone --volume full --from full -o low.obj");
-  EXPECT(0, "assumed: RAS axes (as told), 10 mm a unit",
+  EXPECT(0, "assumed: RAS axes (by --axes), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "ras.ply",
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");

@@ -19,7 +19,8 @@ static double mean_edge(const supine_inside_shell *shell) {
   return sum / (double)(3 * shell->triangle_count);
 }
 
-/* @param scanned  [N, 3] the basis's vertices in the scan */
+/* Extract one lung's surface.
+ * @param scanned  [N, 3] the basis's vertices in the scan */
 static supine_status create_shell(const supine_basis_info *info, const float *scanned, size_t lung,
                                   supine_inside_shell *shell, supine_error *error) {
   const size_t begin = info->lung_begin[lung];
@@ -27,7 +28,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   shell->begin = begin;
   shell->vertex_count = end - begin;
   shell->vertices = malloc(3 * shell->vertex_count * sizeof *shell->vertices);
-  shell->triangles = malloc(3 * info->triangle_count * sizeof *shell->triangles);
+  shell->triangles = malloc(3 * (info->triangle_count + 1) * sizeof *shell->triangles);
   if (shell->vertices == NULL || shell->triangles == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the surface of %zu vertices",
                             shell->vertex_count);
@@ -37,12 +38,17 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   }
   for (size_t t = 0; t < info->triangle_count; ++t) {
     const uint32_t *corner = info->triangles + 3 * t;
-    if (corner[0] >= begin && corner[0] < end) { /* triangles join vertices of one lung */
-      for (size_t k = 0; k < 3; ++k) {
-        shell->triangles[3 * shell->triangle_count + k] = corner[k] - (uint32_t)begin;
-      }
-      ++shell->triangle_count;
+    size_t here = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      here += corner[k] >= begin && corner[k] < end;
+      shell->triangles[3 * shell->triangle_count + k] = corner[k] - (uint32_t)begin;
     }
+    if (here != 0 && here != 3) {
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "a triangle of the basis joins two lungs: make a new basis from separate lungs");
+    }
+    shell->triangle_count += here == 3;
   }
   if (shell->triangle_count == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
@@ -54,25 +60,6 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
                                       &shell->surface, error);
 }
 
-/* Report whether every triangle has its corners in one lung. */
-static bool separate(const supine_basis_info *info) {
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    const size_t begin = info->lung_begin[lung];
-    const size_t end = info->lung_begin[lung + 1];
-    for (size_t t = 0; t < info->triangle_count; ++t) {
-      const uint32_t *corner = info->triangles + 3 * t;
-      size_t here = 0;
-      for (size_t k = 0; k < 3; ++k) {
-        here += corner[k] >= begin && corner[k] < end;
-      }
-      if (here != 0 && here != 3) {
-        return false;
-      }
-    }
-  }
-  return true;
-}
-
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -82,11 +69,6 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
         error, SUPINE_ERROR_FORMAT,
         "the basis already holds %s inside lungs: give the basis of the lungs' surface",
         supine_basis_metadata(basis, "content"));
-  }
-  if (!separate(info)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_MESH,
-        "a triangle of the basis joins two lungs: make a new basis from separate lungs");
   }
   float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
   const supine_state scan = supine_basis_scan(basis);

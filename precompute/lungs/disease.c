@@ -8,7 +8,7 @@
 
 #include "precompute/lungs/disease.h"
 
-/* The part of a lesion that a distance gets: 1 inside, 0 from the radius on. */
+/* Find the weight of a lesion at a distance: 1 inside, 0 from the radius on. */
 static double lesion_weight(double distance, double radius) {
   if (distance >= radius) {
     return 0.0;
@@ -47,22 +47,7 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
   return SUPINE_OK;
 }
 
-supine_status supine_tissue_collapse(const supine_lungs *lungs, size_t lung, double share,
-                                     double shares[2], supine_error *error) {
-  if (lung >= lungs->lung_count) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "lung %zu of %zu", lung,
-                            lungs->lung_count);
-  }
-  if (!(share > 0.0 && share <= 1.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a %s lung of share %g: it must be above 0 and at most 1",
-                            supine_lungs_name(lungs, lung), share);
-  }
-  shares[lung] = share;
-  return SUPINE_OK;
-}
-
-/* Mean of the vertices in the quarter of the lung's width nearest the midline. */
+/* Find the mean of the vertices in the quarter of the lung's width nearest the midline. */
 static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) {
   const double *p = lungs->mesh.vertices;
   double low = INFINITY;

@@ -2,7 +2,7 @@
 /** @file
  * Diseased lungs ([Santhanam2008] VI): tumours that stiffen what is around them, and collapse.
  *
- * Both are written down in the model (model.h): as factors on the stiffness, and as shares.
+ * The model (model.h) holds both: as factors on the stiffness, and as shares.
  */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
@@ -21,41 +21,35 @@ typedef struct supine_lesion {
   double factor;    /**< > 0; above 1 stiffer, below 1 softer, 1 changes nothing */
 } supine_lesion;
 
-/** Multiplies a lesion into `factors` [N], which start as 1 everywhere. It acts after stiffness was
- * scaled to geometric mean 1: scaling with the lesion in it would soften all other tissue, by 4 %
- * for a lesion of factor 10 over 2 % of the vertices, however far away. So at one breath scale
- * tissue away from the lesion moves as before; at one volume it also takes, everywhere in the same
- * proportion, what the lesion no longer does.
+/** Multiply a lesion into `factors` [N], which start as 1 everywhere. Factors apply after stiffness
+ * was scaled to geometric mean 1: scaling with the lesion included would soften all other tissue,
+ * by 4 % for a lesion of factor 10 over 2 % of the vertices. So at one breath scale other tissue
+ * moves as before; at one volume it takes over, everywhere in proportion, what the lesion no longer
+ * does.
  *
- * @param reached  optional: how many vertices are nearer than the radius; 0: it changes nothing
+ * @param reached  optional: number of vertices nearer than the radius; 0: no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *                                positive and finite
  */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 
-/** Collapses a lung (pneumothorax) to a share of its volume and of its breath.
+/** Compute the surface with collapsed lungs (pneumothorax), [N, 3] mm. `mesh` of the lungs keeps
+ * the healthy shape, on which forces, heights and links are based.
  *
- * The lung is drawn together about its hilum, the mean of the vertices in the quarter of its width
- * that is nearest the midline, as a similar body: lengths, and displacements with them, by
- * k = share^(1/3), after the field was solved on the healthy shape. So at any breath scale s
+ * A lung of share < 1 is shrunk about its hilum, the mean of the vertices in the quarter of its
+ * width nearest the midline: lengths, and displacements with them, by k = share^(1/3), after the
+ * field was solved on the healthy shape. So at any breath scale s
  *
  *     rest volume = share x healthy      V_j(s, g) = share x healthy V_j(s, g)
  *
- * exactly, for every direction of gravity, and a breath of V mL that both lungs draw at one scale
- * is divided as share V_sick(s) : V_healthy(s) without any word to the run-time library.
+ * exactly, for every direction of gravity, and a breath that both lungs draw at one scale is
+ * divided as share V_sick(s) : V_healthy(s).
  *
- * @param lung   0 to lung_count - 1
- * @param share  0 < share <= 1; 1 changes nothing
- * @retval SUPINE_ERROR_ARGUMENT */
-supine_status supine_tissue_collapse(const supine_lungs *lungs, size_t lung, double share,
-                                     double shares[2], supine_error *error);
-
-/** The surface at rest, [N, 3] mm: the healthy lungs' with collapsed ones drawn together. `mesh` of
- * the lungs itself keeps the healthy shape, which forces, heights and links are taken from. */
+ * @param share  [lungs] 0 < share <= 1; 1: healthy */
 void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Turns directions d [N, 3] of the healthy shape into those of the surface at rest, in place. */
+/** Scale directions d [N, 3] of the healthy shape to those of the collapsed lungs, in place. */
 void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
                                    double *directions);
 

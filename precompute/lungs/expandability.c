@@ -10,7 +10,7 @@
 #include "precompute/lungs/expandability.h"
 
 static bool positive(double value) {
-  return value > 0.0 && isfinite(value);
+  return value > 0.0 && isfinite(value) && isfinite(1.0 / value);
 }
 
 supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
@@ -41,19 +41,6 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
   return SUPINE_OK;
 }
 
-supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,
-                                                    double *stiffness, supine_error *error) {
-  for (size_t i = 0; i < count; ++i) {
-    if (!positive(a[i]) || !positive(1.0 / a[i])) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "expandability of vertex %zu is %g: it must be positive and finite",
-                              i, a[i]);
-    }
-    stiffness[i] = 1.0 / a[i];
-  }
-  return SUPINE_OK;
-}
-
 /* Parse the number of a vertex. */
 static bool parse_vertex(const char *text, size_t *vertex) {
   char *end = NULL;
@@ -78,10 +65,10 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   if (status != SUPINE_OK) {
     return status;
   }
-  const char *wrong = vertex >= count                            ? "is not in the model"
-                      : !(value > 0.0) || !isfinite(1.0 / value) ? "is not positive"
-                      : a[vertex] != 0.0                         ? "was given before"
-                                                                 : NULL;
+  const char *wrong = vertex >= count    ? "is not in the model"
+                      : !positive(value) ? "is not positive"
+                      : a[vertex] != 0.0 ? "was given before"
+                                         : NULL;
   if (wrong != NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung gives
- * way. The stiffness of a mass node is E = 1/a.
+ * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung
+ * gives way. The stiffness of a mass node is E = 1/a.
  *
  * Only ratios count, as E is scaled to geometric mean 1: twice the value is twice as expandable as
  * its surroundings. Vertices are in the model's order (lungs.h): the left lung's first, each lung's
@@ -11,7 +11,7 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** How expandability goes along an axis. */
+/** Variation of expandability along an axis. */
 typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_UNIFORM = 0, /**< a = 1 */
   SUPINE_EXPANDABILITY_LINEAR,      /**< a = from + (to - from) t */
@@ -26,13 +26,14 @@ typedef struct supine_expandability_law {
   double from, to; /**< a at t = 0 and t = 1, > 0 */
 } supine_expandability_law;
 
-/** a [N] of a regional model.
- * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or an end that is not positive */
+/** Compute a [N] of a regional model.
+ * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or an end that is not positive,
+ *                                or too small for 1/a */
 supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
                                                    const supine_expandability_law *law, double *a,
                                                    supine_error *error);
 
-/** a [N] from a CSV file: a header line, then either one value a line in the model's order, or
+/** Read a [N] from a CSV file: a header line, then either one value a line in the model's order, or
  * `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin with
  * #, are skipped.
  * @retval SUPINE_ERROR_READ    missing or unreadable
@@ -41,10 +42,5 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error);
-
-/** E = 1/a; `stiffness` may be `a`.
- * @retval SUPINE_ERROR_ARGUMENT  an a that is not positive and finite (vertex named) */
-supine_status supine_tissue_expandability_stiffness(size_t count, const double *a,
-                                                    double *stiffness, supine_error *error);
 
 #endif
