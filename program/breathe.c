@@ -187,17 +187,6 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
-/* Return the positions [N, 3] that displacement is measured from; NULL: no memory. */
-static double *find_origin(const supine_basis *basis, const supine_pose *pose, float *xyz) {
-  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
-  double *origin = malloc(count * sizeof *origin);
-  supine_deform(basis, pose, xyz);
-  for (size_t i = 0; origin != NULL && i < count; ++i) {
-    origin[i] = (double)xyz[i];
-  }
-  return origin;
-}
-
 /* Over 60 lines: what a breath needs is made in one place and freed in one. */
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
@@ -234,9 +223,8 @@ static supine_status play(const supine_basis *basis, const request *wanted,
     status = check_ends(basis, wanted, &course, error);
   }
   if (status == SUPINE_OK) {
-    origin = find_origin(basis, &from.pose, xyz);
-    status =
-        origin != NULL ? SUPINE_OK : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    origin = supine_options_basis_positions(basis, &from.pose);
+    status = origin != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {

@@ -205,8 +205,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
                  "expected error %.1f mm RMS",
                  record->name, supine_patient_law_names[record->patient.law],
                  record->patient.centre_count > 0 ? " and kriging" : "", record->points,
-                 record->held_out, record->held_out_baseline, record->explained,
-                 record->expected);
+                 record->held_out, record->held_out_baseline, record->explained, record->expected);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = record->expected_constant;
   (void)printf("%s\n", wanted->summary);

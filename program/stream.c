@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine stream: poses of a tracked patient in, the lungs for each of them out. */
+/* supine stream: receive the poses of a tracked patient, and send the lungs in each of them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,15 +20,14 @@ static const char name[] = "stream";
 static const double budget = 15e-3; /* time allowed per frame, s */
 
 typedef struct request {
-  const char *listen, *connect, *device, *called;
+  supine_stream_options options;
   double down[3], body[4]; /* body: quaternion W, X, Y, Z */
-  int send, space;
+  int space;
   supine_state volume;
   bool has_volume;
   const char *pv;
   supine_pv_breath breath;
-  double smooth, fps, seconds;
-  size_t peers;
+  double smooth; /* ms */
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
@@ -43,11 +42,11 @@ static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
      "address at which to wait for peers; a port alone can be reached from this machine only; 0: "
      "any free port. Default: 18944, the port of the protocol, unless --connect is given",
-     SUPINE_FILLS(request, listen)},
+     SUPINE_FILLS(request, options.listen)},
     {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
-     SUPINE_FILLS(request, connect)},
+     SUPINE_FILLS(request, options.connect)},
     {"device", 0, "NAME", "device whose poses are followed; default: any",
-     SUPINE_FILLS(request, device)},
+     SUPINE_FILLS(request, options.device)},
     {.help = "Where gravity points:"},
     {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
      SUPINE_FILLS(request, down), .standard = "0,0,-1", .more = true},
@@ -87,15 +86,15 @@ static const supine_option table[] = {
      "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
      "POLYDATA whose triangles are sent once. A peer chooses with a STRING of device SEND that "
      "holds one of these words",
-     SUPINE_FILLS(request, send), .choices = sends, .standard = "weights"},
+     SUPINE_FILLS(request, options.what), .choices = sends, .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
-    {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, called),
+    {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, options.name),
      .standard = "SUPINE", .more = true},
-    {"fps", 0, "N", "largest number of frames a second", SUPINE_FILLS(request, fps),
+    {"fps", 0, "N", "largest number of frames a second", SUPINE_FILLS(request, options.rate),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
     {"peers", 0, "N", "largest number of peers, and of viewers of the page",
-     SUPINE_FILLS(request, peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
+     SUPINE_FILLS(request, options.peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live, to any number of viewers; a phone that shows it "
@@ -114,13 +113,9 @@ static const supine_option table[] = {
     {"replay", 0, "POSES.csv",
      "follow recorded poses instead, from the first peer or viewer on, then stop",
      SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
-    {"seconds", 0, "S", "duration; default: until interrupted", SUPINE_FILLS(request, seconds),
-     SUPINE_ABOVE_ZERO, .more = true},
+    {"seconds", 0, "S", "duration; default: until interrupted",
+     SUPINE_FILLS(request, options.seconds), SUPINE_ABOVE_ZERO, .more = true},
     {.name = NULL}};
-
-static void begin(void *chosen) {
-  ((request *)chosen)->breath = supine_breath_default();
-}
 
 static void warn(void *context, const char *text) {
   (void)context;
@@ -173,15 +168,16 @@ static void report(const supine_stream_server *server, const request *wanted) {
   }
 }
 
-/* Observed points: a file of 'supine embed' and their names. */
-typedef struct watched {
+/* Observed points: the file of 'supine embed', and the names in it. */
+typedef struct observed_points {
   supine_basis *inside;
   supine_command_names names;
   supine_stream_sensor_list list;
-} watched;
+} observed_points;
 
-static supine_status open_points(const supine_basis *basis, const request *wanted, watched *points,
-                                 supine_stream_sensors **sensors, supine_error *error) {
+static supine_status open_points(const supine_basis *basis, const request *wanted,
+                                 observed_points *points, supine_stream_sensors **sensors,
+                                 supine_error *error) {
   if (wanted->points == NULL) {
     return SUPINE_OK;
   }
@@ -196,7 +192,7 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   return status == SUPINE_OK ? supine_stream_sensors_create(&points->list, sensors, error) : status;
 }
 
-static void close_points(watched *points, supine_stream_sensors *sensors) {
+static void close_points(observed_points *points, supine_stream_sensors *sensors) {
   supine_stream_sensors_destroy(sensors);
   free(points->list.names);
   free(points->list.vertices);
@@ -209,7 +205,7 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   supine_stream_address address;
   supine_reference_pose from;
   supine_stream_site site = {
-      .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->peers};
+      .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->options.peers};
   if (wanted->web == NULL) {
     return SUPINE_OK;
   }
@@ -252,14 +248,14 @@ static supine_status set_volume(const request *wanted, supine_stream_volume *vol
 }
 
 static supine_status stream(const supine_basis *basis, const char *path, const request *wanted,
-                            const supine_stream_options *given, supine_error *error) {
-  supine_stream_options options = *given;
+                            supine_error *error) {
+  supine_stream_options options = wanted->options;
   supine_stream_volume volume = {0};
   supine_stream_poses poses = {0};
   supine_output record = {0};
   supine_stream_server *server = NULL;
   char *page = NULL;
-  watched points = {0};
+  observed_points points = {0};
   supine_status status = set_volume(wanted, &volume, error);
   options.volume = &volume;
   if (status == SUPINE_OK) {
@@ -304,40 +300,39 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   return status;
 }
 
+static void begin(void *chosen) {
+  request *wanted = chosen;
+  wanted->breath = supine_breath_default();
+  wanted->options = (supine_stream_options){.setup = supine_stream_setup_default(),
+                                            .warn = warn,
+                                            .stop = stop,
+                                            .shown = isatty(STDERR_FILENO) ? show : NULL};
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  const request *wanted = chosen;
+  request *wanted = chosen;
   const char *why = NULL;
-  supine_stream_options options = {.listen = wanted->listen,
-                                   .connect = wanted->connect,
-                                   .device = wanted->device,
-                                   .name = wanted->called,
-                                   .setup = supine_stream_setup_default(),
-                                   .what = (supine_stream_what)wanted->send,
-                                   .ras = wanted->space == 1,
-                                   .rate = wanted->fps,
-                                   .peers = wanted->peers,
-                                   .smooth = 1e-3 * wanted->smooth,
-                                   .seconds = wanted->seconds,
-                                   .warn = warn,
-                                   .stop = stop,
-                                   .shown = isatty(STDERR_FILENO) ? show : NULL};
-  if (wanted->listen == NULL && wanted->connect == NULL) {
-    options.listen = "18944";
+  supine_stream_options *options = &wanted->options;
+  options->ras = wanted->space == 1;
+  options->smooth = 1e-3 * wanted->smooth;
+  if (options->listen == NULL && options->connect == NULL) {
+    options->listen = "18944";
   }
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
   const double size = sqrt(wanted->body[0] * wanted->body[0] + wanted->body[1] * wanted->body[1] +
                            wanted->body[2] * wanted->body[2] + wanted->body[3] * wanted->body[3]);
-  if (!(size > 1e-6) || supine_stream_gravity_down(&options.setup, wanted->down, options.setup.down,
-                                                   &why) != SUPINE_STREAM_EXACT) {
+  if (!(size > 1e-6) ||
+      supine_stream_gravity_down(&options->setup, wanted->down, options->setup.down, &why) !=
+          SUPINE_STREAM_EXACT) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a "
                             "direction and a rotation, as 0,0,-1 and 1,0,0,0");
   }
   const double unit[4] = {wanted->body[0] / size, wanted->body[1] / size, wanted->body[2] / size,
                           wanted->body[3] / size};
-  supine_stream_rotation(unit, options.setup.body);
+  supine_stream_rotation(unit, options->setup.body);
   supine_basis *basis = NULL;
   supine_status status =
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
@@ -348,7 +343,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                               given->operand[0]);
   }
   if (status == SUPINE_OK) {
-    status = stream(basis, given->operand[0], wanted, &options, error);
+    status = stream(basis, given->operand[0], wanted, error);
   }
   supine_basis_close(basis);
   return status;

@@ -33,21 +33,39 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
   return SUPINE_OK;
 }
 
+/* Convert [N, 3] to doubles; NULL: no memory. */
+static double *to_doubles(const supine_basis *basis, const float *xyz) {
+  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
+  double *converted = malloc(count * sizeof *converted);
+  for (size_t i = 0; converted != NULL && i < count; ++i) {
+    converted[i] = (double)xyz[i];
+  }
+  return converted;
+}
+
+double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose) {
+  float *xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
+  double *positions = NULL;
+  if (xyz != NULL) {
+    supine_deform(basis, pose, xyz);
+    positions = to_doubles(basis, xyz);
+  }
+  free(xyz);
+  return positions;
+}
+
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const float *vertices = supine_basis_vertices(basis);
-  supine_mesh made = {.vertex_count = info->vertex_count, .triangle_count = info->triangle_count};
-  made.vertices = malloc(3 * info->vertex_count * sizeof *made.vertices);
-  made.triangles = malloc(3 * info->triangle_count * sizeof *made.triangles);
+  const size_t bytes = 3 * info->triangle_count * sizeof *mesh->triangles;
+  supine_mesh made = {.vertex_count = info->vertex_count,
+                      .vertices = to_doubles(basis, supine_basis_vertices(basis)),
+                      .triangle_count = info->triangle_count,
+                      .triangles = malloc(bytes)};
   if (made.vertices == NULL || made.triangles == NULL) {
     supine_mesh_free(&made);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    made.vertices[i] = (double)vertices[i];
-  }
-  memcpy(made.triangles, supine_basis_triangles(basis),
-         3 * info->triangle_count * sizeof *made.triangles);
+  memcpy(made.triangles, supine_basis_triangles(basis), bytes);
   *mesh = made;
   return SUPINE_OK;
 }

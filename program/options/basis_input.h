@@ -20,6 +20,9 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
+/* Compute the positions of a pose as doubles [N, 3], which the caller frees; NULL: no memory. */
+double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
+
 /* Copy the reference surface into a mesh. */
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
 

@@ -90,29 +90,18 @@ static supine_status say_or_fail(const supine_error *wrong, const char *command,
 
 static supine_status check_folds(const supine_basis *basis, const char *command, bool strict,
                                  const supine_pose *pose, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
   supine_mesh mesh = {0};
-  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
-  double *moved = malloc(3 * info->vertex_count * sizeof *moved);
-  supine_status status = SUPINE_OK;
-  if (xyz == NULL || moved == NULL || supine_options_basis_rest_mesh(basis, &mesh) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  } else {
-    supine_deform(basis, pose, xyz);
-    for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-      moved[i] = (double)xyz[i];
-    }
-    const double turned = supine_mesh_turned_over(&mesh, moved);
-    if (turned > folded_limit) {
-      supine_error wrong;
-      (void)supine_error_set(&wrong, SUPINE_ERROR_NUMERICAL,
-                             "the surface folds: %.3g %% of its triangles turn over",
-                             100.0 * turned);
-      status = say_or_fail(&wrong, command, strict, error);
-    }
+  double *moved = supine_options_basis_positions(basis, pose);
+  supine_status status =
+      moved != NULL ? supine_options_basis_rest_mesh(basis, &mesh) : SUPINE_ERROR_MEMORY;
+  const double turned = status == SUPINE_OK ? supine_mesh_turned_over(&mesh, moved) : 0.0;
+  if (turned > folded_limit) {
+    supine_error wrong;
+    (void)supine_error_set(&wrong, SUPINE_ERROR_NUMERICAL,
+                           "the surface folds: %.3g %% of its triangles turn over", 100.0 * turned);
+    status = say_or_fail(&wrong, command, strict, error);
   }
   supine_mesh_free(&mesh);
-  free(xyz);
   free(moved);
   return status;
 }

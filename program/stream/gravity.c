@@ -5,6 +5,7 @@
 
 #include "sh/base/vec3.h"
 
+#include "program/breath/breath_course.h"
 #include "program/stream/gravity.h"
 
 /* Deviation from a rotation that is accepted silently: 32-bit floats give 1e-6, trackers' own
@@ -117,24 +118,10 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
 
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]) {
-  double cross[3];
-  supine_cross(smooth, gravity, cross);
-  const double cosine = supine_dot(smooth, gravity);
-  const double sine = supine_length(cross);
-  const double angle = atan2(sine, cosine);
   const double share = seconds > 0.0 ? -expm1(-step / seconds) : 1.0;
-  if (share >= 1.0 || sine < 1e-12) { /* there, or opposite: no arc is shorter than another */
-    memcpy(smooth, gravity, 3 * sizeof *smooth);
-    return 0.0;
-  }
-  const double a = sin((1.0 - share) * angle) / sine;
-  const double b = sin(share * angle) / sine;
-  for (int i = 0; i < 3; ++i) {
-    smooth[i] = a * smooth[i] + b * gravity[i];
-  }
-  const double length = supine_length(smooth);
-  for (int i = 0; i < 3; ++i) {
-    smooth[i] /= length;
-  }
-  return (1.0 - share) * angle;
+  breath_turn turn = {.seconds = 1.0};
+  memcpy(turn.from, smooth, sizeof turn.from);
+  memcpy(turn.to, gravity, sizeof turn.to);
+  supine_breath_turn_gravity(&turn, share, smooth);
+  return (1.0 - share) * acos(fmax(-1.0, fmin(1.0, supine_dot(turn.from, turn.to))));
 }
