@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine breathe: the lungs of a basis, breathing, frame by frame. */
+/* supine breathe: compute the surfaces of a breath, frame by frame. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -187,7 +187,7 @@ static supine_status check_ends(const supine_basis *basis, const request *wanted
   return status;
 }
 
-/* Over 60 lines: what a breath needs is made in one place and freed in one. */
+/* Compute and write the breath. Over 60 lines: all resources are made and freed here. */
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
                           supine_error *error) {

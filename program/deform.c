@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine deform: a basis, a direction of gravity and a volume in, a deformed surface out. */
+/* supine deform: write the surface of a basis for a posture and a volume. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,8 +26,8 @@ typedef struct request {
   bool has_scale, as_scanned;
   double scale;
   supine_deform_content content;
-  const char *states; /* list of states */
-  char *output;       /* output of a row of that list */
+  const char *states; /* file of --states */
+  char *output;       /* output of a row of that file */
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
@@ -54,8 +54,7 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Positions of a pose as doubles, for measuring and saving; normals [N, 3] where they are not NULL.
- */
+/* Compute the positions of a pose, and the normals [N, 3] where they are not NULL. */
 static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
                                    supine_mesh *mesh, float *normals) {
   const size_t n = mesh->vertex_count;
@@ -111,7 +110,7 @@ static supine_status find_pose(const supine_basis *basis, const request *wanted,
   return status;
 }
 
-/* Print in one line the file written, the displacement and the volume. */
+/* Print the file written, the displacement and the volume in one line. */
 static void report(const char *path, const double gravity[3], const supine_mesh *mesh,
                    const supine_mesh *from, const char *reference, bool volumes) {
   (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Moved points as CSV; displacement fields; images resampled by them. */
+/* Write moved points as CSV, displacement fields, and images moved by them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,8 +13,8 @@
 #include "program/field/field.h"
 #include "program/inside.h"
 
-/* How far outside the lungs a field fades to 0, mm: no steeper than the tissue moves. 'supine
- * embed' leaves as much room around. */
+/* Distance outside the lungs over which a field fades to 0, mm; grids of 'supine embed' have this
+ * margin. */
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
@@ -218,10 +218,10 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   supine_field_residual residual = {0};
   const supine_status status = supine_field_invert(forward, inverse, &residual, error);
   if (status == SUPINE_OK) {
-    (void)printf("forward and back again misses %.3g mm RMS, %.3g mm at most, inside the lungs",
+    (void)printf("forward and back again: off by %.3g mm RMS, %.3g mm at most, inside the lungs",
                  residual.rms, residual.largest);
     if (residual.lost > 0) {
-      (void)printf("; the field folds at %zu nodes, outside or between them", residual.lost);
+      (void)printf("; the field folds at %zu nodes outside or between the lungs", residual.lost);
     }
     (void)putchar('\n');
   }

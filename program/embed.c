@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine embed: what is inside the lungs, made to move with them. */
+/* supine embed: make a basis of structures that move with the lungs. */
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -23,7 +23,7 @@ static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
 
-/* Labels by number; a name of NULL: "label 7". */
+/* Labels of parts, and their names. */
 typedef struct label_list {
   bool given;
   size_t count; /* 0: all */
@@ -37,7 +37,7 @@ typedef struct request {
   bool has_grid;
   double grid; /* mm */
   bool clamp;
-  const char *rigid; /* parts named, or "all" */
+  const char *rigid; /* names of rigid parts, or "all" */
   supine_mesh_load_options load;
 } request;
 
@@ -92,7 +92,7 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
-/* The nodes of a grid: of its own, or of an image's voxels. */
+/* Make the nodes of a regular grid, or of the voxels of an image. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {
@@ -120,13 +120,13 @@ static supine_status read_labelled(const request *wanted, const char *path,
     (void)snprintf(text, sizeof text, "label %u", parts[i].label);
     const char *part = list->count > 0 ? list->name[i] : text;
     if (parts[i].surface.triangle_count == 0) {
-      supine_options_say(name, "%s: %s is thinner than half a voxel everywhere: left out", path,
-                         part);
+      supine_options_say(name, "%s: %s is left out, as it is thinner than half a voxel everywhere",
+                         path, part);
       continue;
     }
     supine_options_say(name,
-                       "%s: %s, %.3g mL of voxels, %.3g mL within its surface, which is "
-                       "within %.2g mm of them",
+                       "%s: %s, %.3g mL of voxels; its surface encloses %.3g mL, at most "
+                       "%.2g mm from them",
                        path, part, parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface),
                        parts[i].farthest);
     status = supine_inside_content_surface(part, &parts[i].surface, content, error);
@@ -159,8 +159,8 @@ static void part_name(const supine_inside_content *content, size_t point, char *
   (void)snprintf(text, size, "%.*s", (int)strcspn(at, "\n"), at);
 }
 
-static void tell(const supine_inside_shells *shells, const supine_inside_content *content,
-                 const supine_inside_report *report, const request *wanted) {
+static void print_summary(const supine_inside_shells *shells, const supine_inside_content *content,
+                          const supine_inside_report *report, const request *wanted) {
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   const bool grid = content->part_count == 0;
   (void)printf("%s: %zu %s", wanted->path, report->count,
@@ -180,23 +180,24 @@ static void tell(const supine_inside_shells *shells, const supine_inside_content
     (void)printf("rigid parts, moved and turned, never deformed: %zu\n", report->rigid);
   }
   if (shells->scan.gains[0][0] != 0.0) {
-    (void)puts("given where the scan had it; the file holds it at full inflation");
+    (void)puts("positions were given in the scan; the file holds them at full inflation");
   }
   if (report->centres < report->surface) {
-    (void)printf("interpolated from %zu of %zu vertices; at the others that leaves %.2g %% of the "
-                 "motion,\nwhich is added near the surface\n",
-                 report->centres, report->surface, report->left_percent);
+    (void)printf(
+        "interpolated from %zu of %zu vertices; the residual at the others, %.2g %% of the "
+        "motion,\nis added near the surface\n",
+        report->centres, report->surface, report->left_percent);
   }
   if (report->outside > 0 && !grid) {
     char text[64];
     part_name(content, report->farthest, text, sizeof text);
-    (void)printf("outside the lungs: %zu of %zu, at most %.1f mm (%s); they move as %s\n",
+    (void)printf("outside the lungs: %zu of %zu, by at most %.1f mm (%s); they move with %s\n",
                  report->outside, report->count, report->farthest_mm, text,
-                 wanted->clamp ? "the surface next to them"
-                               : "the inside would if it went on, unless --clamp is given");
+                 wanted->clamp ? "the nearest point of the surface"
+                               : "the extrapolated motion inside, unless --clamp is given");
     if (2 * report->outside > report->count && report->farthest_mm > 50.0) {
-      (void)printf("most are outside: if the content is RAS, as of 3D Slicer or ITK-SNAP, add "
-                   "--axes RAS\n");
+      (void)printf("most are outside: if the content is in RAS, as from 3D Slicer or ITK-SNAP, "
+                   "add --axes RAS\n");
     }
   }
 }
@@ -218,7 +219,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
     status = supine_inside_embed(&shells, &content, &options, wanted->path, &report, error);
   }
   if (status == SUPINE_OK) {
-    tell(&shells, &content, &report, wanted);
+    print_summary(&shells, &content, &report, wanted);
   }
   supine_inside_content_free(&content);
   supine_inside_shells_free(&shells);

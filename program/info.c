@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine info: what a basis file holds and how exact it is. */
+/* supine info: describe a basis file and its accuracy. */
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
@@ -16,8 +16,8 @@
 #include "program/options/basis_input.h"
 #include "program/options/expected.h"
 
-/* Share of the squared displacement in each band, [band + 1]; zeros where the surface has no area.
- */
+/* Compute the share of the squared displacement in each band, [band + 1]; 0 where the surface has
+ * no area. */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
   supine_compare *compare = NULL;
   const supine_status status = supine_compare_create(basis, &compare, error);
@@ -107,7 +107,8 @@ static void print_content(const supine_basis *basis, const char *content) {
   }
 }
 
-/* The expected error of the default state, supine and prone, counted from the scan. */
+/* Print the expected error of a displacement from the scan to the default state, supine and prone.
+ */
 static void print_expected(const supine_basis *basis) {
   const supine_state scan = supine_basis_scan(basis);
   bool first = true;
@@ -200,7 +201,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
                  state, text_of(basis, turned_over));
   }
   if (info->triangle_count == 0) {
-    return; /* the energy is that of the surface */
+    return; /* energy is defined on the surface */
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;
@@ -225,7 +226,7 @@ static const double *error_list(const supine_basis *basis, const char *key, size
   return tensor->data;
 }
 
-/* Error against the number of functions of orientation, each a multiplication per vertex. */
+/* Print the error against the number of functions of orientation. */
 static void print_table(const supine_basis *basis) {
   size_t bands;
   size_t modes;

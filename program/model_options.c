@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The options that choose the lungs and the model. */
+/* Options that choose the lungs and the model. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,7 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
-/* "supine=0.43,prone=2600mL"; anything without an equals sign names a file. */
+/* Read "supine=0.43,prone=2600mL"; a text without an equals sign names a file. */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   char copy[256];
@@ -37,7 +37,7 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   return status;
 }
 
-/* A model's name; anything with a dot or a slash is a file of vectors. */
+/* Read the name of a model; a text with a dot or a slash names a file of vectors. */
 static supine_status read_direction(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -54,7 +54,7 @@ static supine_status read_direction(const char *text, void *field, supine_error 
   return supine_options_fits(strpbrk(text, "./") != NULL);
 }
 
-/* "linear:z:0.5:1.5"; anything without such a beginning names a file. */
+/* Read "linear:z:0.5:1.5"; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -101,7 +101,7 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
   return SUPINE_OK;
 }
 
-/* "left:0.3" */
+/* Read "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -119,7 +119,7 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
 
 static const char *const sexes[] = {"unknown", "female", "male", NULL}; /* as supine_sex */
 
-/* The laws' help, and the constants of each for the options that change one. */
+/* For help texts: the laws, and the constants of each. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) " " name " " #base
 #define LAW_GAIN(id, name, base, gain, ...) " " name " " #gain
@@ -257,7 +257,7 @@ static void print_map(const char *path, const supine_source *source) {
                  lung->surface - lung->mask, lung->farthest);
   }
   if (source->axes_hold) {
-    (void)printf("the lungs' shape confirms the axes in the header: narrow at the head, "
+    (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "
                  "deepest at the back, the heart on the left\n");
   }
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The options that choose the lungs and the model: the same for every command that runs the
- * physics. */
+/* Options that choose the lungs and the model, shared by commands that run the physics. */
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
@@ -12,21 +11,21 @@
 
 #include "program/options/command.h"
 
-/* A table of options that fills a supine_model_options: {.table = ..., SUPINE_FILLS(...)}. */
+/* Table of options that fills a supine_model_options. */
 extern const supine_option supine_command_model_options[];
 
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
-  supine_patient_field field;           /* of it */
+  supine_patient_field field;           /* of the patient */
   supine_source made_from;  /* the lungs as loaded, and the axes and units of their files */
-  supine_prepared prepared; /* the model of them */
-  char assumed[800];        /* what was assumed, in a sentence */
+  supine_prepared prepared; /* their model */
+  char assumed[800];        /* sentence about the assumptions */
   supine_findings findings; /* findings that the user should know */
 } supine_model_options;
 
-/* The defaults, of a zeroed struct. */
+/* Set the defaults of a zeroed struct. */
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Load the files, print the findings and prepare the model.

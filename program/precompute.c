@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine precompute: lung surfaces in, basis file out. */
+/* supine precompute: make a basis file of lung surfaces or a label map. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,7 +62,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Share of turned-over triangles from which the result is called torn. */
+/* Share of turned-over triangles above which the surface is reported as torn. */
 static const double turned_over_limit = 0.01;
 
 static void report_result(const char *path, const supine_lungs *lungs,
@@ -100,7 +100,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
   }
 }
 
-/* Report the fit: its error in each band and what the directions determine. */
+/* Print the errors by band, and the bands that the directions determine. */
 static void report_fit(const char *path, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
@@ -198,7 +198,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  wanted->model.choice.law = SUPINE_LAW_DEEP; /* law whose constants the options below replace */
+  wanted->model.choice.law = SUPINE_LAW_DEEP; /* its constants are replaced by the patient's */
   wanted->basis.patient = *text;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %.0f points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
@@ -216,8 +216,8 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Refuse constants given beside a patient model. Call before loading, which sets those not
- * given. */
+/* Refuse constants of the law beside a patient model. Call before loading, which sets constants
+ * that were not given. */
 static supine_status check_patient(const request *wanted, supine_error *error) {
   const supine_model_choice *choice = &wanted->model.choice;
   const supine_model *model = &choice->model;

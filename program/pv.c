@@ -30,7 +30,7 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
     {.name = NULL}};
 
-/* Numbers that are not finite become null: JSON cannot represent them. */
+/* Make a list of numbers; those that are not finite become null. */
 static json_t *json_numbers(size_t count, const double *numbers) {
   json_t *list = json_array();
   for (size_t i = 0; i < count; ++i) {
@@ -65,7 +65,7 @@ static void print_json(const supine_pv *pv, const supine_pv_report *reports, dou
 static void print_limb(const char *name, const supine_pv_curve *curve,
                        const supine_pv_report *report) {
   if (report->samples == 0) {
-    (void)printf("%s: no samples, the other limb's curve\n", name);
+    (void)printf("%s: no samples; the curve is the other limb's\n", name);
     return;
   }
   (void)printf("%s: %zu samples, %g to %g cmH2O\n", name, report->samples, curve->pressure[0],

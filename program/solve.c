@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine solve: the full physics for one direction of gravity. */
+/* supine solve: solve the full physics for one direction of gravity. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,7 +49,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Writes one column of T as CSV. */
+/* Write one column of the transfer matrix T as CSV. */
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -83,7 +83,7 @@ cleanup:
   return status;
 }
 
-/* Compute the volume of each lung, mL, beyond its healthy reference surface. */
+/* Compute the volume of each lung, mL, above that of its healthy reference surface. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -119,7 +119,7 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* The gains of each lung: by --scale, by the state's volume, or 1. */
+/* Find the gains of each lung: by --scale, by the volume of the state, or 1. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -168,7 +168,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Iteration stops where no node holds more than this share of the largest force. */
+/* Share of the largest force below which every node must be for the iteration to stop. */
 static const double pitcher_tolerance = 1e-6;
 
 /* Print progress at each doubling of the number of distributions per vertex. */

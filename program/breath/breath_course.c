@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A breath as a series of frames: when, how much air, and where gravity points. */
+/* The times, volumes and directions of gravity of a breath, frame by frame. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -50,7 +50,7 @@ void supine_breath_course_free(breath_course *course) {
   *course = (breath_course){0};
 }
 
-/* Eight parameters: the relation, the breath, the turn, and the numbers of frames and lungs. */
+/* Eight parameters: the relation, the breath, the turn, and numbers of frames and lungs. */
 supine_status supine_breath_course_create(const supine_pv *pv, const supine_pv_breath *breath,
                                           const breath_turn *turn, double rate, size_t count,
                                           size_t lungs, breath_course *course,

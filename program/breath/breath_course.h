@@ -1,28 +1,27 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A breath as a series of frames: when, how much air, and where gravity points. */
+/* The times, volumes and directions of gravity of a breath, frame by frame. */
 #ifndef SUPINE_BREATH_COURSE_H
 #define SUPINE_BREATH_COURSE_H
 
 #include "program/breath/pv.h"
 #include <supine/runtime.h>
 
-/* From one posture to another at constant speed, then staying there. */
+/* A turn from one posture to another at constant speed, after which gravity stays. */
 typedef struct breath_turn {
   double from[3], to[3]; /* unit */
   double seconds;        /* 0: gravity is `to` throughout */
 } breath_turn;
 
-/* Compute gravity at a time: along the shorter arc; between opposite directions over the left side,
- * or over the back where gravity starts along the body. */
+/* Compute gravity at a time, on the shorter arc. Between opposite directions the arc passes the
+ * left side, or the back where gravity starts along the body or to a side. */
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
-/* Compute all frames for `lungs` lungs. */
 typedef struct breath_course {
   size_t count;    /* T */
   size_t lungs;    /* G */
-  bool fixed;      /* gravity does not turn */
+  bool fixed;      /* gravity is constant */
   double *time;    /* [T] s */
-  double *volume;  /* [T] mL above rest, of all lungs together */
+  double *volume;  /* [T] of all lungs together, mL above rest */
   double *gravity; /* [T, 3] */
 } breath_course;
 

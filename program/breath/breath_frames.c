@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The surfaces of a breath, frame after frame. */
+/* Compute the surfaces of a breath, frame after frame. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,7 +41,7 @@ supine_state supine_breath_state(const supine_basis *basis, const double gravity
                         .volume = {known ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml}};
 }
 
-/* The pose of a frame from its orientation and volume. */
+/* Compute the pose of a frame from its orientation and volume. */
 static supine_status pose_frame(const breath_frames *frames, size_t t, supine_pose *pose,
                                 supine_error *error) {
   const breath_course *course = frames->course;
@@ -75,14 +75,15 @@ static void mix_gains(const breath_frames *frames, size_t first, size_t last, do
   }
 }
 
-/* Volumes of the lungs of frame t where the run takes equal steps from `first` to `last`. */
+/* Compute the volumes of frame t in a run of equal steps from `first` to `last`. */
 static void stepped_volumes(const breath_frames *frames, supine_pose *pose, size_t first,
                             size_t last, size_t t, double *volumes) {
   mix_gains(frames, first, last, (double)(t - first) / (double)(last - first), pose->gains);
   supine_basis_volumes(frames->basis, pose, volumes);
 }
 
-/* Whether equal steps from frame `first` to `last` keep the volumes of those between. */
+/* Return whether equal steps from frame `first` to `last` keep the volumes of the frames between.
+ */
 static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t first, size_t last) {
   const size_t lungs = frames->course->lungs;
   for (size_t t = first + 1; t < last; ++t) {
@@ -99,8 +100,8 @@ static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t fir
   return true;
 }
 
-/* Runs, greedily; within one, gains and volumes become those of the equal steps. Rigid parts turn,
- * which no equal steps do. */
+/* Find runs greedily, and replace the gains and volumes within a run by those of equal steps. There
+ * are none with rigid parts, whose rotations are not equal steps. */
 static void find_runs(breath_frames *frames) {
   const breath_course *course = frames->course;
   supine_pose pose;
@@ -118,7 +119,7 @@ static void find_runs(breath_frames *frames) {
            run_holds(frames, &pose, first, last + 1)) {
       ++last;
     }
-    if (last == first + 1) { /* a step would cost more than placing the frame */
+    if (last == first + 1) { /* one step does not pay for computing its displacement */
       last = first;
     }
     for (size_t t = first + 1; t <= last; ++t) {
@@ -126,7 +127,7 @@ static void find_runs(breath_frames *frames) {
       stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * course->lungs);
       ++frames->stepped;
     }
-    if (last > first) { /* the gains of the first frame and the step stay */
+    if (last > first) { /* keep the gains of the first frame, and the step in the second */
       mix_gains(frames, first, last, 1.0 / (double)(last - first), frames->gains[first + 1]);
     }
     first = last + 1;
@@ -161,7 +162,7 @@ supine_status supine_breath_frames_create(const supine_basis *basis, const breat
   return SUPINE_OK;
 }
 
-/* Compute a frame from its orientation and volume, as a player that knows no later frame would. */
+/* Compute a frame from its orientation and volume, and the step of the run that it begins. */
 static void place(breath_frames *frames, size_t t, float *xyz) {
   supine_pose pose;
   (void)pose_frame(frames, t, &pose, NULL); /* the pose was computed before, so this cannot fail */

@@ -20,7 +20,7 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
     if (length == 0 || length >= sizeof address->host) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s' names no host before its port: give HOST:PORT", text);
+                              "'%s' has no host before its port: give HOST:PORT", text);
     }
     memcpy(host, text + (bracketed ? 1 : 0), length);
     host[length] = '\0';
@@ -61,7 +61,7 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
     }
     return -1;
   }
-  /* sin_port and sin6_port lie at the same place. */
+  /* sin_port and sin6_port have the same offset. */
   *port = ntohs(((const struct sockaddr_in *)(const void *)&given)->sin_port);
   return s;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Latencies, counted. */
+/* A histogram of latencies. */
 #include <math.h>
 
 #include "program/stream/latency.h"

@@ -9,7 +9,7 @@
 #include "program/export/template.h"
 #include "program/stream/live_page.h"
 
-extern const supine_asset supine_stream_assets[]; /* live.js, put in by the build */
+extern const supine_asset supine_stream_assets[]; /* live.js, embedded by the build */
 
 /* The content security policy lets the page connect to its own server only. Not every browser
  * counts WebSockets under 'self'. */

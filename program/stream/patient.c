@@ -239,7 +239,7 @@ void supine_stream_patient_moment(supine_stream_patient *patient, double now,
                                    patient->options->smooth, patient->smooth);
   *moment = (supine_stream_moment){0};
   patient->smoothed = now;
-  patient->turning = left > 1e-6; /* a thousandth of a millimetre where a metre turns */
+  patient->turning = left > 1e-6; /* moves points by less than a micrometre */
   memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
   moment->received = patient->fresh ? patient->received : -1.0;
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();

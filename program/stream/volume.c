@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The volume at a moment: fixed, or that of a breath. */
+/* The volume of the lungs at a moment: a fixed one, or that of a breath. */
 #include <string.h>
 
 #include "program/stream/volume.h"
