@@ -288,9 +288,12 @@ static void test_png_is_a_png(void **state) {
                               .dark = true,
                               .width = WIDTH,
                               .height = HEIGHT};
-  unsigned char *png = NULL;
+  char *png = NULL;
   size_t size = 0;
-  assert_int_equal(supine_render_png(m.renderer, &scene, &png, &size, NULL), SUPINE_OK);
+  FILE *file = open_memstream(&png, &size);
+  assert_non_null(file);
+  assert_int_equal(supine_render_png(m.renderer, &scene, file, NULL), SUPINE_OK);
+  assert_int_equal(fclose(file), 0);
   assert_true(size > 500);
   assert_memory_equal(png, signature, sizeof signature);
   assert_memory_equal(png + size - 8, "IEND\xAE\x42\x60\x82", 8);

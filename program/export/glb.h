@@ -62,9 +62,6 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
 /** Write the name of a lung: "left lung", or "lung 0" where the basis names none. */
 void supine_export_glb_lung_name(const export_source *source, size_t lung, char name[64]);
 
-/** Return numbers as an array. */
-json_t *supine_export_glb_numbers(const double *values, size_t count);
-
 /** Return the extras of the file: how weights follow from gravity and volume. */
 json_t *supine_export_glb_extras(const glb *g, double largest_move);
 

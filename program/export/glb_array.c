@@ -6,14 +6,7 @@
 
 #include "program/export/glb.h"
 #include "program/export/packed.h"
-
-json_t *supine_export_glb_numbers(const double *values, size_t count) {
-  json_t *array = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(array, json_real(values[i]));
-  }
-  return array;
-}
+#include "program/export/template.h"
 
 /* How a kind of array is stored. */
 typedef struct layout {
@@ -115,8 +108,8 @@ static void set_bounds(json_t *accessor, const layout *l, const unsigned char *s
     low[axis] = fmin(low[axis], x);
     high[axis] = fmax(high[axis], x);
   }
-  (void)json_object_set_new(accessor, "min", supine_export_glb_numbers(low, l->columns));
-  (void)json_object_set_new(accessor, "max", supine_export_glb_numbers(high, l->columns));
+  (void)json_object_set_new(accessor, "min", supine_template_numbers(low, l->columns));
+  (void)json_object_set_new(accessor, "max", supine_template_numbers(high, l->columns));
 }
 
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count) {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "program/export/glb.h"
+#include "program/export/template.h"
 
 enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
 
@@ -83,14 +84,13 @@ json_t *supine_export_glb_extras(const glb *g, double largest_move) {
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
-    (void)json_array_append_new(modes,
-                                supine_export_glb_numbers(s->modes + k * s->terms, s->terms));
+    (void)json_array_append_new(modes, supine_template_numbers(s->modes + k * s->terms, s->terms));
   }
   json_t *supine =
       json_pack("{s:s, s:s, s:i, s:o, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
                 "weights", weights_text, "band", (int)s->info->band, "modes", modes, "bend",
-                supine_export_glb_numbers(s->info->bend, 3), "middle",
-                supine_export_glb_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
+                supine_template_numbers(s->info->bend, 3), "middle",
+                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
                 s->info->has_volume ? "breathVolume" : "breathScale",
                 s->info->has_volume ? g->options->breath.volume : g->options->breath.scale,
                 "largestMoveColoured", largest_move, "basis", origin(s));
@@ -111,22 +111,22 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
   const size_t axes = info->volume_axes;
   json_t *supine =
       json_pack("{s:I, s:o, s:o}", "lung", (json_int_t)lung, "offset",
-                supine_export_glb_numbers(g->targets.lung[lung].offset, g->targets.count), "unit",
-                supine_export_glb_numbers(g->targets.lung[lung].unit, g->targets.count));
+                supine_template_numbers(g->targets.lung[lung].offset, g->targets.count), "unit",
+                supine_template_numbers(g->targets.lung[lung].unit, g->targets.count));
   if (info->has_rest) {
     const double *resting =
         g->source->resting + (g->source->resting_rows > 1 ? lung * EXPORT_RESTING_TERMS : 0);
     (void)json_object_set_new(supine, "resting",
-                              supine_export_glb_numbers(resting, EXPORT_RESTING_TERMS));
+                              supine_template_numbers(resting, EXPORT_RESTING_TERMS));
   }
   if (info->has_volume && g->targets.count <= FORMS_MAX) {
     (void)json_object_update_new(
         supine,
         json_pack(
             "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
-            supine_export_glb_numbers(info->volume_linear + lung * axes * k, axes * k), "quadratic",
-            supine_export_glb_numbers(info->volume_quadratic + lung * axes * k * k, axes * k * k),
-            "cubic", supine_export_glb_numbers(info->volume_cubic + lung * k * k * k, k * k * k)));
+            supine_template_numbers(info->volume_linear + lung * axes * k, axes * k), "quadratic",
+            supine_template_numbers(info->volume_quadratic + lung * axes * k * k, axes * k * k),
+            "cubic", supine_template_numbers(info->volume_cubic + lung * k * k * k, k * k * k)));
   }
   return json_pack("{s:o, s:o}", "targetNames", target_names(g), "supine", supine);
 }

@@ -190,14 +190,6 @@ static json_t *colours(void) {
   return maps;
 }
 
-static json_t *numbers(const double *values, size_t count) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(list, json_real(values[i]));
-  }
-  return list;
-}
-
 /* Where each lung begins among vertices or corners, and the end. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
@@ -249,9 +241,10 @@ static double scan_volume(const export_source *s) {
 
 /* State that displacements are measured from. */
 static json_t *describe_from(const page *p) {
-  return json_pack("{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
-                   numbers(p->shown->from->weights, p->source->info->mode_count), "gains",
-                   numbers(p->shown->from->gains[0], 3 * p->source->info->lung_count));
+  return json_pack(
+      "{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
+      supine_template_numbers(p->shown->from->weights, p->source->info->mode_count), "gains",
+      supine_template_numbers(p->shown->from->gains[0], 3 * p->source->info->lung_count));
 }
 
 static json_t *describe(const page *p) {
@@ -294,11 +287,12 @@ static json_t *describe(const page *p) {
       begins(p->source, p->corner_begin), "hasVolume", (int)info->has_volume, "hasResting",
       (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
       "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
-      title != NULL ? title : json_string("lungs"), "middle", numbers(p->middle, 3), "placeUnit",
-      p->place_unit, "unit", p->unit, "inside", describe_inside(p), "from", describe_from(p),
-      "references", numbers(info->reference_volume, info->lung_count), "scanVolume",
+      title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
+      "placeUnit", p->place_unit, "unit", p->unit, "inside", describe_inside(p), "from",
+      describe_from(p), "references",
+      supine_template_numbers(info->reference_volume, info->lung_count), "scanVolume",
       scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
-      numbers(info->bend, 3));
+      supine_template_numbers(info->bend, 3));
 }
 
 /* {{tensors}} */

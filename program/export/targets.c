@@ -22,23 +22,32 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-void supine_export_targets_weights(const export_source *source, const export_targets *targets,
-                                   const supine_pose *pose, size_t lung, double *weights) {
+/* Compute gain times weight for each field of a lung. */
+static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
+                         size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
-  const export_weights *w = &targets->lung[lung];
   double gain[2];
   split_gains(source->info->bend, pose->gains[lung], gain);
-  for (size_t j = 0; j < targets->count; ++j) {
-    weights[j] = (gain[j / k] * pose->weights[j % k] - w->offset[j]) / w->unit[j];
+  for (size_t j = 0; j < count; ++j) {
+    amounts[j] = gain[j / k] * pose->weights[j % k];
   }
 }
 
-/* Find the least and largest weight of each target over directions and the breath. Gains go one way
- * with the volume, so the breath's two ends are the extremes. */
+void supine_export_targets_weights(const export_source *source, const export_targets *targets,
+                                   const supine_pose *pose, size_t lung, double *weights) {
+  const export_weights *w = &targets->lung[lung];
+  find_amounts(source, targets->count, pose, lung, weights);
+  for (size_t j = 0; j < targets->count; ++j) {
+    weights[j] = (weights[j] - w->offset[j]) / w->unit[j];
+  }
+}
+
+/* Find the least amount of each field over directions and the breath, as its offset, and the range
+ * above it, as its unit. Gains go one way with the volume, so the breath's ends are the extremes.
+ */
 static supine_status find_ranges(const export_source *source, const export_breath *breath,
-                                 const export_targets *targets, export_weights *low,
-                                 export_weights *high, supine_error *error) {
-  double weights[EXPORT_TARGETS_MAX];
+                                 export_targets *targets, supine_error *error) {
+  double amounts[EXPORT_TARGETS_MAX];
   supine_pose pose;
   for (size_t i = 0; i < 2 * (size_t)DIRECTIONS; ++i) {
     double g[3];
@@ -49,24 +58,16 @@ static supine_status find_ranges(const export_source *source, const export_breat
       return status;
     }
     for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
-      supine_export_targets_weights(source, targets, &pose, lung, weights);
+      export_weights *w = &targets->lung[lung];
+      find_amounts(source, targets->count, &pose, lung, amounts);
       for (size_t j = 0; j < targets->count; ++j) {
-        const bool first = i == 0;
-        low[lung].unit[j] = first ? weights[j] : fmin(low[lung].unit[j], weights[j]);
-        high[lung].unit[j] = first ? weights[j] : fmax(high[lung].unit[j], weights[j]);
+        const double high = i == 0 ? amounts[j] : fmax(amounts[j], w->offset[j] + w->unit[j]);
+        w->offset[j] = i == 0 ? amounts[j] : fmin(amounts[j], w->offset[j]);
+        w->unit[j] = high - w->offset[j];
       }
     }
   }
   return SUPINE_OK;
-}
-
-/* Set offsets and units so that the ranges become 0 to 1. */
-static void fit_ranges(size_t count, const double *low, const double *high, export_weights *fit) {
-  for (size_t j = 0; j < count; ++j) {
-    const double extra = margin * (high[j] - low[j]);
-    fit->offset[j] = low[j] - extra;
-    fit->unit[j] = high[j] > low[j] ? high[j] - low[j] + 2 * extra : 1;
-  }
 }
 
 static void find_middle(const export_source *source, export_targets *targets) {
@@ -87,25 +88,16 @@ supine_status supine_export_targets_choose(const export_source *source, const ex
                                            export_targets *targets, supine_error *error) {
   const supine_basis_info *info = source->info;
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
-  export_weights *range = calloc(2 * info->lung_count, sizeof *range); /* low, high; in `unit` */
-  if (range == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
   targets->count = (bent ? 2 : 1) * info->mode_count;
   find_middle(source, targets);
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+  const supine_status status = find_ranges(source, breath, targets, error);
+  for (size_t lung = 0; status == SUPINE_OK && lung < info->lung_count; ++lung) {
+    export_weights *w = &targets->lung[lung];
     for (size_t j = 0; j < targets->count; ++j) {
-      targets->lung[lung].offset[j] = 0;
-      targets->lung[lung].unit[j] = 1;
+      w->offset[j] -= margin * w->unit[j];
+      w->unit[j] = w->unit[j] > 0 ? (1 + 2 * margin) * w->unit[j] : 1;
     }
   }
-  const supine_status status =
-      find_ranges(source, breath, targets, range, range + info->lung_count, error);
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    fit_ranges(targets->count, range[lung].unit, range[info->lung_count + lung].unit,
-               &targets->lung[lung]);
-  }
-  free(range);
   return status;
 }
 

@@ -153,3 +153,11 @@ void supine_template_fill(const supine_template *filling, const char *name, FILE
     fill(filling, asset->bytes, asset->bytes + asset->size, &data, file);
   }
 }
+
+json_t *supine_template_numbers(const double *values, size_t count) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(list, json_real(values[i]));
+  }
+  return list;
+}

@@ -44,6 +44,9 @@ typedef struct supine_template {
  */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
+/** Return numbers as an array. */
+json_t *supine_template_numbers(const double *values, size_t count);
+
 /** Text with the characters that HTML reserves replaced: & < > ". */
 void supine_template_escape(const char *text, FILE *file);
 

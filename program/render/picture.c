@@ -260,6 +260,21 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   return SUPINE_OK;
 }
 
+/* Draw a scene on a new surface, which the caller destroys. */
+static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
+                                cairo_surface_t **image, supine_error *error) {
+  *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
+  if (cairo.surface_status(*image) != CAIRO_STATUS_SUCCESS ||
+      (size_t)cairo.image_surface_get_stride(*image) != 4 * scene->width) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  cairo.surface_flush(*image);
+  const supine_status status = supine_render_draw(
+      renderer, scene, (uint32_t *)(void *)cairo.image_surface_get_data(*image), error);
+  cairo.surface_mark_dirty(*image);
+  return status;
+}
+
 /* Thirteen parameters: a panel, the view of it, and its place in the picture, which cell() has
  * just worked out. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
@@ -277,19 +292,9 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .width = (size_t)width,
                               .height = (size_t)height,
                               .extent = extent};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  cairo_surface_t *image =
-      cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene.width, (int)scene.height);
-  if (cairo.surface_status(image) != CAIRO_STATUS_SUCCESS ||
-      (size_t)cairo.image_surface_get_stride(image) != 4 * scene.width) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
-  }
-  cairo.surface_flush(image);
-  status = supine_render_draw(renderer, &scene,
-                              (uint32_t *)(void *)cairo.image_surface_get_data(image), error);
+  cairo_surface_t *image = NULL;
+  supine_status status = draw_scene(renderer, &scene, &image, error);
   if (status == SUPINE_OK) {
-    cairo.surface_mark_dirty(image);
     cairo.set_source_surface(cr, image, floor(x), floor(y));
     cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
                                                          : 1);
@@ -298,7 +303,6 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                           &themes[picture->dark ? 1 : 0]);
     }
   }
-cleanup:
   cairo.surface_destroy(image);
   return status;
 }
@@ -449,6 +453,13 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
   return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
 }
 
+static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_error *error) {
+  const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
+  return written == CAIRO_STATUS_SUCCESS ? SUPINE_OK
+                                         : supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s",
+                                                            cairo.status_to_string(written));
+}
+
 /* The picture on a surface, which the caller destroys; its pixels are cairo's or the caller's. */
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
@@ -498,66 +509,23 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
   status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
-    const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
-    if (written != CAIRO_STATUS_SUCCESS) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s", cairo.status_to_string(written));
-    }
+    status = write_png(surface, file, error);
   }
   cairo.surface_destroy(surface);
   return status;
 }
 
-typedef struct buffer {
-  unsigned char *bytes;
-  size_t size, room;
-} buffer;
-
-static cairo_status_t to_buffer(void *closure, const unsigned char *bytes, unsigned length) {
-  buffer *out = closure;
-  if (out->room - out->size < length) {
-    const size_t room = 2 * out->room + length;
-    unsigned char *larger = realloc(out->bytes, room);
-    if (larger == NULL) {
-      return CAIRO_STATUS_NO_MEMORY;
-    }
-    out->bytes = larger;
-    out->room = room;
-  }
-  memcpy(out->bytes + out->size, bytes, length);
-  out->size += length;
-  return CAIRO_STATUS_SUCCESS;
-}
-
-supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
-                                unsigned char **bytes, size_t *size, supine_error *error) {
-  buffer out = {NULL, 0, 0};
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
+                                supine_error *error) {
   supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  status = SUPINE_ERROR_MEMORY;
-  cairo_surface_t *image =
-      cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
-  if (cairo.surface_status(image) == CAIRO_STATUS_SUCCESS &&
-      (size_t)cairo.image_surface_get_stride(image) == 4 * scene->width) {
-    cairo.surface_flush(image);
-    status = supine_render_draw(renderer, scene,
-                                (uint32_t *)(void *)cairo.image_surface_get_data(image), error);
-    cairo.surface_mark_dirty(image);
-  } else {
-    (void)supine_error_set(error, status, "out of memory");
-  }
-  if (status == SUPINE_OK &&
-      cairo.surface_write_to_png_stream(image, to_buffer, &out) != CAIRO_STATUS_SUCCESS) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  cairo_surface_t *image = NULL;
+  status = draw_scene(renderer, scene, &image, error);
+  if (status == SUPINE_OK) {
+    status = write_png(image, file, error);
   }
   cairo.surface_destroy(image);
-  if (status != SUPINE_OK) {
-    free(out.bytes);
-    return status;
-  }
-  *bytes = out.bytes;
-  *size = out.size;
-  return SUPINE_OK;
+  return status;
 }

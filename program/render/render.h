@@ -83,9 +83,9 @@ void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, 
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
 
-/** The same as a PNG file in memory (free()). */
-supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene,
-                                unsigned char **bytes, size_t *size, supine_error *error);
+/** Draw the same as a PNG file. */
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
+                                supine_error *error);
 
 /** Something inside the lungs. */
 typedef struct supine_mark {

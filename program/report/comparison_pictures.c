@@ -18,16 +18,23 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
                         .extent = extent};
 }
 
-static json_t *encoded(const void *bytes, size_t size) {
-  char *text = NULL;
-  size_t length = 0;
-  FILE *file = open_memstream(&text, &length);
-  if (file == NULL) {
-    return NULL;
+/* Draw a scene as PNG in base64; NULL on failure. */
+static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
+  char *bytes[2] = {NULL, NULL}; /* PNG, base64 */
+  size_t size[2] = {0, 0};
+  FILE *file[2] = {open_memstream(&bytes[0], &size[0]), open_memstream(&bytes[1], &size[1])};
+  json_t *made = NULL;
+  bool drawn = file[0] != NULL && file[1] != NULL &&
+               supine_render_png(renderer, scene, file[0], error) == SUPINE_OK;
+  drawn = (file[0] == NULL || fclose(file[0]) == 0) && drawn;
+  if (drawn) {
+    supine_export_base64_write(bytes[0], size[0], file[1]);
   }
-  supine_export_base64_write(bytes, size, file);
-  json_t *made = fclose(file) == 0 ? json_stringn_nocheck(text, length) : NULL;
-  free(text);
+  if (file[1] != NULL && fclose(file[1]) == 0 && drawn) {
+    made = json_stringn_nocheck(bytes[1], size[1]);
+  }
+  free(bytes[0]);
+  free(bytes[1]);
   return made;
 }
 
@@ -54,22 +61,19 @@ static void set_gravity(const double g[3], json_t *shot) {
 static json_t *picture(const supine_comparison *c, supine_renderer *renderer, size_t posture,
                        double largest, const double extent[4], float *value, supine_error *error) {
   const supine_compared_posture *shown = &c->posture[posture];
-  unsigned char *png = NULL;
-  size_t size = 0;
   supine_scene scene = make_scene(c, posture, extent);
   supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
   scene.value = value;
   scene.largest = largest;
   scene.line_step = supine_render_bar_step(largest);
-  json_t *made = NULL;
-  if (supine_render_png(renderer, &scene, &png, &size, error) == SUPINE_OK) {
-    made = json_pack("{s:s, s:o, s:o}", "name",
-                     supine_options_posture_label(c->postures.item[posture].name), "png",
-                     encoded(png, size), "points",
-                     supine_report_direction(c->postures.item[posture].gravity));
-    set_gravity(c->postures.item[posture].gravity, made);
+  json_t *png = draw(renderer, &scene, error);
+  if (png == NULL) {
+    return NULL;
   }
-  free(png);
+  json_t *made = json_pack("{s:s, s:o, s:o}", "name",
+                           supine_options_posture_label(c->postures.item[posture].name), "png", png,
+                           "points", supine_report_direction(c->postures.item[posture].gravity));
+  set_gravity(c->postures.item[posture].gravity, made);
   return made;
 }
 
