@@ -96,10 +96,13 @@ chain() { # SCAN STATE ALLOWED...: a basis of the scan against other states
     shift 3
   done
 }
-"$supine" fit p_supine_rest.ply q_supine_rest+500.ply --other supine:rest+500 -o surface.json \
-  >fit.txt || fail "fit a quiet breath"
-chain p_supine_rest rest+500 q 0.2 rest+2000 q 0.6
-chain q_supine_rest+500 rest p 0.2 rest+2000 p 0.6
+for meshes in 'p q' 'q p'; do
+  set -- $meshes
+  "$supine" fit $1_supine_rest.ply $2_supine_rest+500.ply --other supine:rest+500 -o surface.json \
+    >fit.txt || fail "fit a quiet breath"
+  chain $1_supine_rest rest+500 $2 0.2 rest+2000 $2 0.6
+  chain $2_supine_rest+500 rest $1 0.2 rest+2000 $1 0.6
+done
 "$supine" fit p_supine_rest.ply q_supine_full.ply --other supine:full -o surface.json >fit.txt ||
   fail "fit two meshings"
 grep -q 'one posture cannot tell' fit.txt || fail "a gain out of nothing"

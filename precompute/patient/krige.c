@@ -210,24 +210,26 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the sill, then the noise, of the largest likelihood, where they are not given. */
+/* Choose the sill and the noise of the largest likelihood, one after the other, where they are not
+ * given: the sill once more under the noise that was chosen. */
 static void choose(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
-  const double given[2] = {options->uncorrected ? 0.0 : options->sill, options->noise};
-  double best[2];
-  for (int which = 0; which < 2; ++which) {
-    const bool free = given[which] == 0.0 && !(which == 0 && options->uncorrected);
+  const bool given[2] = {options->uncorrected || options->sill > 0.0, options->noise > 0.0};
+  double best[2] = {options->uncorrected ? 0.0
+                    : given[0]           ? options->sill
+                                         : 1.0,
+                    given[1] ? options->noise : 1.0};
+  for (int pass = 0; pass < (given[0] || given[1] ? 2 : 3); ++pass) {
+    const int which = pass % 2;
     double most = -INFINITY;
-    best[which] = free ? 1.0 : given[which];
-    for (size_t i = 0; i < count[which] && free; ++i) {
-      const double tried = choices[which][i];
-      const double likelihood = which == 0
-                                    ? likelihood_of(k, tried, given[1] > 0.0 ? given[1] : 1.0)
-                                    : likelihood_of(k, best[0], tried);
+    for (size_t i = 0; i < count[which] && !given[which]; ++i) {
+      const double tried[2] = {which == 0 ? choices[0][i] : best[0],
+                               which == 1 ? choices[1][i] : best[1]};
+      const double likelihood = likelihood_of(k, tried[0], tried[1]);
       if (likelihood > most) {
         most = likelihood;
-        best[which] = tried;
+        best[which] = choices[which][i];
       }
     }
   }

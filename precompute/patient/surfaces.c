@@ -55,6 +55,7 @@ static supine_status refit(const matching *m, bool shaped, supine_patient_fit_op
     supine_patient_krige_take(&krige, patient);
     options->sill = krige.sill;
     options->uncorrected = krige.sill == 0.0;
+    options->noise = krige.noise;
   }
   supine_patient_krige_free(&krige);
   return status;
@@ -68,7 +69,6 @@ static supine_status settle(matching *m, const supine_patient_fit_options *wante
   supine_patient_fit_options options = *wanted;
   supine_status status = SUPINE_OK;
   bool shaped = false;
-  options.noise = 1.0;
   m->warm = false;
   start_rows(m);
   for (size_t round = 0; status == SUPINE_OK && round < ROUNDS_MAX; ++round) {
