@@ -11,7 +11,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/text.h"
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 

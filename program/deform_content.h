@@ -5,7 +5,7 @@
 
 #include <supine/runtime.h>
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 
 #include "program/options/expected.h"
 #include "program/options/state.h"

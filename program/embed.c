@@ -6,7 +6,7 @@
 
 #include "sh/base/text.h"
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/embed.h"

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 #include "mesh/mesh.h"
 
 enum { HELPER_CROSSINGS = 32 }; /* of one row with one lung's surface, at most */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Images: NRRD and NIfTI there and back in every orientation and type, and files that lie. */
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 #include "test.h"
 
 #include "sh_helpers.h"

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 #include "mesh/labels/labels.h"
 
 /** Voxels with a margin of 0 around the nonzero ones. */

@@ -3,7 +3,7 @@
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 
 /** Points, some of which may be corners of triangles. Zero-initialise;
  * supine_inside_content_free releases it. */

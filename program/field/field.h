@@ -7,7 +7,7 @@
 
 #include <supine/runtime.h>
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 
 /** u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {

@@ -3,7 +3,7 @@
 #ifndef SUPINE_IMAGE_FORMATS_H
 #define SUPINE_IMAGE_FORMATS_H
 
-#include "mesh/image/image.h"
+#include "mesh/io/image.h"
 
 /* Largest expansion of a byte by gzip. */
 enum { SUPINE_IMAGE_GZIP_RATIO = 1032 };

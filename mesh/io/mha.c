@@ -12,7 +12,7 @@
 #include "sh/base/output.h"
 #include "sh/base/vec3.h"
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 enum { HEADER_MAX = 1 << 16 };
 

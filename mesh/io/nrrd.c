@@ -7,7 +7,7 @@
 
 #include "sh/base/output.h"
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 static const int types[SUPINE_VOXEL_COUNT] = {nrrdTypeChar,   nrrdTypeUChar, nrrdTypeShort,
                                               nrrdTypeUShort, nrrdTypeInt,   nrrdTypeUInt,

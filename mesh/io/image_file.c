@@ -8,7 +8,7 @@
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 /* Endings, with their readers and writers. */
 static const struct {

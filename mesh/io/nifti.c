@@ -14,7 +14,7 @@
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
                                               DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};

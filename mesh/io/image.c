@@ -8,7 +8,7 @@
 #include "sh/base/clones.h"
 #include "sh/base/vec3.h"
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 size_t supine_image_bytes(const supine_image *image, size_t file_size) {
   const double bytes = (double)image->size[0] * (double)image->size[1] * (double)image->size[2] *

@@ -5,7 +5,7 @@
 
 #include <zlib.h>
 
-#include "mesh/image/formats.h"
+#include "mesh/io/image_formats.h"
 
 supine_status supine_image_check_gzip(const char *path, long offset, supine_error *error) {
   enum { PIECE = 1 << 16 };
